@@ -18,7 +18,9 @@ from typing import Any
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results import frame_energies
-from benchmarks.results.run_folder import BEFORE_FRAMES, ResultsError, Row, RunFolder
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import BEFORE_FRAMES, Row
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import read_entry
 from reference_sim.command.command_line import Parser, command
 

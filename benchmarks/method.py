@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.registry import DeclarationError, load
-from benchmarks.results.run_folder import ROLES
+from benchmarks.results.row import ROLES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -103,7 +103,7 @@ class MethodEntry:
     asked for where those of the scene are. declared_ms: [ms] a frame, as its author says, where no clock of
     ours can measure it; what a trajectory says as provenance counts as well. static_known: whether its answer
     to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
-    role: one of benchmarks.results.run_folder.ROLES. reporting: its place among others, for reports alone.
+    role: one of benchmarks.results.row.ROLES. reporting: its place among others, for reports alone.
     """
 
     name: str

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from benchmarks.results.run_folder import USABLE, as_right
+from benchmarks.results.row import USABLE, as_right
 
 if TYPE_CHECKING:
     from benchmarks.method import MethodEntry

@@ -13,8 +13,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.results.run_folder import ResultsError, RunFolder, replacing
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
+from reference_sim.files.atomic_files import replacing
 from reports.run.read import read_run, read_trajectory
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from benchmarks.results.run_folder import ResultsError, RunFolder
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
 from reports.run.configuration import moment
 from reports.run.rows import Run
 from reports.tables import paper

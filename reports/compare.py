@@ -12,7 +12,8 @@ from fnmatch import fnmatchcase
 
 import pandas as pd
 
-from benchmarks.results.run_folder import ResultsError, RunFolder
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reports.run.read import read_run
 from reports.run.rows import SUITES, Metric, Run

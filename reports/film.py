@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.results.run_folder import RunFolder, replacing
+from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
+from reference_sim.files.atomic_files import replacing
 from reports.pictures.render import camera_axes, vertex_normals
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Findings
 from benchmarks.methods import find_method
 from benchmarks.registry import load
-from benchmarks.results.run_folder import STATUSES
+from benchmarks.results.row import STATUSES
 from benchmarks.scene import Scene
 from benchmarks.tasks.task import Context, Outcome, Task
 

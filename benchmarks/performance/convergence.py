@@ -15,7 +15,7 @@ import pandas as pd
 from benchmarks.performance.learning import dressed_body, training_motions
 from benchmarks.performance.microbenchmark import Settings
 from benchmarks.performance.training_step import PAPER_STEPS
-from benchmarks.results.run_folder import replacing
+from reference_sim.files.atomic_files import replacing
 
 HELD_OUT = "lunge"  # the training motion that is rolled out
 POINTS = 60  # of the curve

@@ -11,7 +11,7 @@ from benchmarks.assets.inputs import Inputs
 from benchmarks.cell import Cell, TaskId
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset
-from benchmarks.results.run_folder import LONGEST
+from benchmarks.results.row import LONGEST_NAME
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
 from benchmarks.training import Training
@@ -200,9 +200,9 @@ def check_names(cells: Sequence[Cell]) -> None:
     there: dict[str, Cell] = {}
     for cell in cells:
         for what, name in (("scene", cell.scene.name), ("method", cell.method)):
-            if len(name.encode()) > LONGEST:
+            if len(name.encode()) > LONGEST_NAME:
                 raise PlanError(
-                    f"{what} '{name[:40]}...': its name has more than {LONGEST} bytes: shorten it"
+                    f"{what} '{name[:40]}...': its name has more than {LONGEST_NAME} bytes: shorten it"
                 )
         if cell.method == "body" or cell.method.endswith("quasi-static"):
             raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")

@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.results.json_file import ResultsError
-from benchmarks.results.run_folder import Row, RunFolder, replacing
+from benchmarks.results.row import Row
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,7 +29,7 @@ ENERGY = "energy/"
 
 
 def write(folder: RunFolder, rows: Iterable[Row]) -> None:
-    """The file, whole or not at all, of all cells among the rows that take part; none where none does."""
+    """Write the file, whole or not at all, of all cells among the rows that take part; none where none does."""
     cells = dict.fromkeys(
         (row.scene, row.method, row.seed)
         for row in rows
@@ -53,7 +55,7 @@ def write(folder: RunFolder, rows: Iterable[Row]) -> None:
 
 
 def join(paths: Iterable[Path], out: Path) -> None:
-    """One file of several, those that are there: every term, and each frame once. Raises ResultsError."""
+    """Join the files that exist into one: every term, and each frame once. Raises ResultsError."""
     terms, joined = dict[str, None](), dict[tuple[str, ...], dict[str, str]]()
     for path in filter(Path.is_file, paths):
         read(path)  # refuses what is none
@@ -69,7 +71,7 @@ def join(paths: Iterable[Path], out: Path) -> None:
 
 
 def _curves(path: Path) -> dict[str, np.ndarray]:
-    """Seconds, and energies by term, of a cell; empty where somebody removed its file."""
+    """Read seconds, and energies by term, of a cell; empty where somebody removed its file."""
     from reference_sim.files.array_file import read_arrays
 
     if not path.is_file():
@@ -80,7 +82,7 @@ def _curves(path: Path) -> dict[str, np.ndarray]:
 
 
 def read(path: Path) -> tuple[list[str], list[list[str | int | float]]]:
-    """Columns and lines; nan where a cell is empty. Raises ResultsError naming file, line and column."""
+    """Read columns and lines; nan where a cell is empty. Raises ResultsError: file, line and column."""
     try:
         with path.open(newline="", encoding="utf-8") as stream:
             reader = csv.reader(stream)

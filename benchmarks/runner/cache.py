@@ -21,8 +21,10 @@ from benchmarks.fingerprint.dependencies import software
 from benchmarks.fingerprint.digest import damaged, digest, digest_of_file
 from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.json_file import ResultsError, read_json
-from benchmarks.results.run_folder import FORMAT, RunFolder, replacing
+from benchmarks.results.run_config import FORMAT
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.task import Outcome, Task
+from reference_sim.files.atomic_files import replacing
 
 NOWHERE: Mapping[str, Any] = {}
 

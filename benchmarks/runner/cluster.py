@@ -25,11 +25,12 @@ from benchmarks.cell import TaskId
 from benchmarks.fingerprint.digest import damaged, digest, digest_of_file
 from benchmarks.process.errors import one_line
 from benchmarks.process.scheduler import connect
-from benchmarks.results.run_folder import RunFolder, replacing
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster_worker
 from benchmarks.runner.cluster_worker import ASSETS, PIECE, Gone, Unfit
 from benchmarks.runner.local_executor import POLL, Done, LocalExecutor, Needed, Ready
 from benchmarks.tasks.task import Outcome, RunStopped, Task, failure
+from reference_sim.files.atomic_files import replacing
 
 ATTEMPTS = 3  # workers that may die of a task
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are

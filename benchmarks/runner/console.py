@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from benchmarks.results.run_folder import USABLE, Row
+from benchmarks.results.row import USABLE, Row
 from benchmarks.runner.rows import DECLARED, NOT_FALLING, SPREAD
 
 COLUMNS = (

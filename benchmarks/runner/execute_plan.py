@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from benchmarks.external.roll_out_option import MODULE
 from benchmarks.plan.plan import Plan
 from benchmarks.process.errors import one_line
-from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.results.row import Row
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.console import remarks, summary
 from benchmarks.runner.local_executor import Executor, LocalExecutor
 from benchmarks.runner.loop import Runner

@@ -11,7 +11,7 @@ from typing import Any
 from benchmarks.cell import Cell, TaskId
 from benchmarks.metrics import find_metric
 from benchmarks.plan.plan import Plan
-from benchmarks.results.run_folder import REFERENCE_TOLERANCE, Row, as_right
+from benchmarks.results.row import REFERENCE_TOLERANCE, Row, as_right
 from benchmarks.tasks.task import Outcome, Task
 from benchmarks.tasks.training import TrainNetwork
 

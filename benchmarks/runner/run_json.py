@@ -17,7 +17,8 @@ from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.results import frame_energies
-from benchmarks.results.run_folder import OF_TRAINING, Row, RunFolder, with_provenance
+from benchmarks.results.row import OF_TRAINING, Row, with_provenance
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
 

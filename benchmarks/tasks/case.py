@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from benchmarks.cell import TaskId
-from benchmarks.results.run_folder import Row
+from benchmarks.results.row import Row
 from benchmarks.tasks.task import Context, Outcome, Task
 
 if TYPE_CHECKING:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.cell import TaskId, flat
 from benchmarks.method import MethodEntry
-from benchmarks.results.run_folder import RunFolder, replacing
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import BuiltScene, Scene
 from benchmarks.tasks.cell_task import built
 from benchmarks.tasks.task import Context, Outcome, Task
+from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:
     import numpy as np

@@ -16,9 +16,11 @@ from benchmarks.metrics import find_metric, modules, names_of
 from benchmarks.process.errors import one_line
 from benchmarks.registry import load
 from benchmarks.results.frame_energies import SECONDS
-from benchmarks.results.run_folder import USABLE, RunFolder, replacing
+from benchmarks.results.row import USABLE
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.cell_task import built
 from benchmarks.tasks.task import Context, Outcome, Task
+from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:
     from benchmarks.tasks.training import TrainNetwork

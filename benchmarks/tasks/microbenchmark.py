@@ -12,7 +12,8 @@ from benchmarks.cell import TaskId
 from benchmarks.method import MethodEntry
 from benchmarks.performance.microbenchmark import SUITE, Settings
 from benchmarks.process.memory import peak_memory
-from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.results.row import Row
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.task import Context, Outcome, Task, failure
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from benchmarks.process.isolated_process import WorkerDied
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
-    from benchmarks.results.run_folder import Row, RunFolder
+    from benchmarks.results.row import Row
+    from benchmarks.results.run_folder import RunFolder
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.results.run_folder import Row
+from benchmarks.results.row import Row
 
 METHOD = "simulation"
 

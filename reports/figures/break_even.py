@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.results.run_folder import BEFORE_FRAMES
+from benchmarks.results.row import BEFORE_FRAMES
 from reports.figures.plotting import PAGE_WIDTH, Picture, grid, legend_above, log_axis, new_figure, save
 from reports.figures.styles import leading, style
 from reports.run.rows import Run

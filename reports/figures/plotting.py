@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.results.run_folder import replacing
+from reference_sim.files.atomic_files import replacing
 from reports.figures.styles import Style
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from benchmarks.results.run_folder import ResultsError
+from benchmarks.results.json_file import ResultsError
 from reports.figures.plotting import (
     PAGE_WIDTH,
     Picture,

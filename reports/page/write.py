@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.results.run_folder import RunFolder, replacing
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.files.atomic_files import replacing
 from reports.document.document import subtitle
 from reports.page.choice import BUDGET, RULE
 from reports.page.content import methods_of, plots_of, tables_of, trouble_of

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.results.run_folder import ResultsError, RunFolder
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
 from reference_sim.trajectory.trajectory import Trajectory
 from reports.run.read import read_run, read_trajectory
 from reports.run.rows import Run

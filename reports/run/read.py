@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.results.run_folder import ResultsError, RunFolder
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
 
 if TYPE_CHECKING:
     from reference_sim.trajectory.trajectory import Trajectory

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.results.run_folder import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row, as_right
+from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row, as_right
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 SUITES = ("garments", "speed", "validation", "extremes", "shapes", "performance")
@@ -37,7 +37,7 @@ class Metric:
 
 @dataclass(frozen=True)
 class Method:
-    """A method as its rows declare it, see benchmarks.results.run_folder.Row; label is its name for people."""
+    """A method as its rows declare it, see benchmarks.results.row.Row; label is its name for people."""
 
     name: str
     label: str

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from benchmarks.results.run_folder import BEFORE_FRAMES
+from benchmarks.results.row import BEFORE_FRAMES
 from reports.run.rows import Metric, Run
 from reports.statistics.by_frame import half_of, share_of_frames, with_shares
 from reports.statistics.means import Mean, pair

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from benchmarks.results.run_folder import ROLES, STATUSES
+from benchmarks.results.row import ROLES, STATUSES
 from reports.run.rows import Run
 from reports.tables.table import Column, Table
 
-# The columns of benchmarks.results.run_folder.Row: unit, where it has one, and meaning.
+# The columns of benchmarks.results.row.Row: unit, where it has one, and meaning.
 COLUMNS = {
     "suite": ("", "question that the row belongs to; with scene, method, seed and metric it names the row"),
     "scene": ("", "what is simulated; of a case, its name"),

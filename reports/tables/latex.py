@@ -9,7 +9,7 @@ from textwrap import wrap
 
 import pandas as pd
 
-from benchmarks.results.run_folder import replacing
+from reference_sim.files.atomic_files import replacing
 from reports.document.layout import column_texts, remarks_of
 from reports.run.rows import Run
 from reports.tables import paper

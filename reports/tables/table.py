@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.results.run_folder import replacing
+from reference_sim.files.atomic_files import replacing
 from reports.run.rows import Metric
 from reports.statistics.means import Mean
 from reports.statistics.significance import Effect

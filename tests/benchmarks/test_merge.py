@@ -10,7 +10,8 @@ import pytest
 from benchmarks import merge as command
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.merge import MergeError, joined_rows
-from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.results.row import Row
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.tasks.task import Outcome, Task
 

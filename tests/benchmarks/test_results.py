@@ -10,15 +10,11 @@ import pandas as pd
 import pytest
 
 from benchmarks.results import frame_energies
-from benchmarks.results.run_folder import (
-    COLUMNS,
-    FORMAT,
-    ResultsError,
-    Row,
-    RunFolder,
-    replacing,
-    with_provenance,
-)
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import COLUMNS, Row, with_provenance
+from benchmarks.results.run_config import FORMAT
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.files.atomic_files import replacing
 
 ROWS = [
     Row("garments", "dressed/walk", "snug", 0, "energy/strain", "J", 0.1 + 0.2, terms="strain+gravity"),

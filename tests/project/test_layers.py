@@ -20,8 +20,7 @@ ALLOWED = {
     "benchmarks": ("benchmarks", "snug", "reference_sim"),
     "reports": (
         "reports",
-        "benchmarks.results.run_folder",
-        "benchmarks.results.frame_energies",
+        "benchmarks.results",
         "benchmarks.metrics.surface.curvature",
         "reference_sim.command.command_line",
         "reference_sim.trajectory.trajectory",

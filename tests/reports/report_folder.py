@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.results.run_folder import FORMAT, Row
+from benchmarks.results.row import Row
+from benchmarks.results.run_config import FORMAT
 from reference_sim import Trajectory
 from reports.run.rows import Run, run_data
 from snug.training.kinds import find_kind

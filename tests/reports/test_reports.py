@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from benchmarks.fingerprint.digest import digest_of_file
-from benchmarks.results.run_folder import COLUMNS, FORMAT, RunFolder
+from benchmarks.results.row import COLUMNS
+from benchmarks.results.run_config import FORMAT
+from benchmarks.results.run_folder import RunFolder
 from reports import build
 from reports.document.document import document
 from reports.figures import training

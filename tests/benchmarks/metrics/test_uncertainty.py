@@ -14,7 +14,7 @@ from benchmarks.metrics.motion import dynamics
 from benchmarks.metrics.motion.hem import HemMotion
 from benchmarks.metrics.surface import curvature
 from benchmarks.metrics.surface import distances as geometry
-from benchmarks.results.run_folder import Row, as_right
+from benchmarks.results.row import Row, as_right
 from benchmarks.runner.rows import with_uncertainty
 from benchmarks.tasks.metric_task import compared, measured
 from reference_sim import Trajectory

@@ -13,7 +13,7 @@ from benchmarks.cell import Cell
 from benchmarks.methods import METHODS, find_method
 from benchmarks.plan.plan import Motions
 from benchmarks.process.timing import Reading
-from benchmarks.results.run_folder import Row
+from benchmarks.results.row import Row
 from benchmarks.runner.console import remarks, summary
 from benchmarks.runner.execute_plan import accepted
 from benchmarks.runner.rows import NOT_FALLING, clock_costs, rows_of

@@ -18,7 +18,8 @@ from benchmarks.methods import find_method
 from benchmarks.methods.outside.program import program
 from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
-from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.results.row import Row
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.dry_run import describe

@@ -6,7 +6,8 @@ import dataclasses
 
 import pytest
 
-from benchmarks.results.run_folder import Row, RunFolder
+from benchmarks.results.row import Row
+from benchmarks.results.run_folder import RunFolder
 from reports import build
 from reports.document import narrative
 from reports.document.narrative import summary

@@ -1,0 +1,158 @@
+"""One measured number of a run: a line of results.csv, and what its columns mean."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from benchmarks.results.json_file import ResultsError
+
+USABLE = ("ok", "stalled")  # statuses of cells that came to their last frame: their numbers count
+STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
+
+# In this order methods stand in a report.
+ROLES = (
+    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
+    "warm-started", "",
+)  # fmt: skip
+
+OF_TRAINING = ("cost/setup", "cost/train")  # [s] a network, on the machine that trained it
+BEFORE_FRAMES = ("cost/data", *OF_TRAINING)  # [s] all that it costs before its first frame
+REFERENCE_TOLERANCE = 1e-6  # of the reference's minimisations
+
+
+def as_right(family: str, level: float | None) -> bool:
+    """Return whether simulations of that family and level could stand in the reference's place.
+
+    From a moved start, with contact planes searched twice, or to a tolerance at least as small. Those of
+    another time step could not: they solve another discrete problem; how far off that is is the time error.
+    """
+    if family == "simulation-tolerance":
+        return level is not None and level <= REFERENCE_TOLERANCE
+    return family in ("simulation-perturbed", "simulation-refrozen")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured number: a (suite, scene, method, seed, metric) and what came out.
+
+    `value`, `expected`, `tolerance` and `uncertainty` are None where absent (an empty cell in the file); a
+    skipped row has a reason and no value. `uncertainty`, in the unit of the value: how far it moves where
+    another simulation as right as the reference takes its place, or its standard error as a sample of
+    frames; `moved`: by how much each of those simulations changes it. `terms` names the energies of the
+    scene, joined by "+".
+
+    Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
+    Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
+    that number; base, the method that it varies or starts from; seeded, whether another seed gives another
+    value; pairing_group, of variants of one method, which share the seed and are compared seed by seed.
+
+    Raises ResultsError for an unknown status, a non-finite value called ok, or a skip without a reason.
+    """
+
+    suite: str
+    scene: str
+    method: str
+    seed: int
+    metric: str
+    unit: str
+    value: float | None = None
+    status: str = "ok"
+    reason: str = ""
+    expected: float | None = None
+    tolerance: float | None = None
+    uncertainty: float | None = None
+    moved: tuple[tuple[str, float], ...] = ()
+    preset: str = ""
+    commit: str = ""
+    hardware: str = ""
+    dtype: str = "float64"
+    threads: int = 1
+    terms: str = ""
+    garment: str = ""
+    motion: str = ""
+    part: str = ""
+    family: str = ""
+    level: float | None = None
+    role: str = ""
+    base: str = ""
+    seeded: bool = False
+    pairing_group: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "moved", tuple(map(tuple, self.moved)))  # JSON gives lists
+        label = f"{self.scene} x {self.method} / {self.metric}"
+        if self.status not in STATUSES:
+            raise ResultsError(f"row {label}: status '{self.status}' is none of {', '.join(STATUSES)}")
+        if self.status == "skipped" and (self.value is not None or not self.reason):
+            raise ResultsError(f"row {label}: a skipped row has a reason and no value")
+        if self.status == "ok" and (self.value is None or not math.isfinite(self.value)):
+            raise ResultsError(f"row {label}: status ok needs a finite value, got {self.value}")
+
+    @property
+    def passed(self) -> bool:
+        """Whether the row counts as fine: ok, or skipped with its reason."""
+        return self.status in ("ok", "skipped")
+
+
+COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
+OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "uncertainty", "level")
+_WHOLE_NUMBERS = ("seed", "threads")
+_TRUTHS = {"true": True, "false": False}
+_NAMES = ("suite", "scene", "method", "metric", "garment", "motion", "part", "family", "role", "base")
+LONGEST_NAME = 150  # bytes: files are named after it
+
+
+def row_to_cells(row: Row) -> dict[str, str]:
+    """Return the text of each cell. Numbers keep all their digits, so that reading gives back the same row."""
+    cells = {}
+    for name in COLUMNS:
+        value = getattr(row, name)
+        if value is None:
+            cells[name] = ""
+        elif name in OPTIONAL_NUMBERS:
+            cells[name] = repr(float(value))
+        elif isinstance(value, bool):
+            cells[name] = str(value).lower()
+        elif name == "moved":
+            cells[name] = json.dumps(dict(value)) if value else ""
+        else:
+            cells[name] = " ".join(str(value).split())
+    return cells
+
+
+def cells_to_row(cells: dict[str, str]) -> Row:
+    """Return the row written in the cells. Raises ResultsError for a number or name that is none."""
+    values: dict[str, Any] = dict(cells)
+    try:
+        for name in OPTIONAL_NUMBERS:
+            values[name] = float(cells[name]) if cells[name] else None
+        for name in _WHOLE_NUMBERS:
+            values[name] = int(cells[name])
+            if abs(values[name]) >= 1 << 63:
+                raise ValueError("a number beyond 64 bits")
+        for name in _NAMES:
+            if not cells[name].isprintable() or len(cells[name].encode()) > LONGEST_NAME:
+                raise ValueError(f"no name of at most {LONGEST_NAME} printable bytes")
+        name = "seeded"
+        values[name] = _TRUTHS[cells[name]]
+        name = "moved"  # runs of before have none
+        values[name] = tuple((str(k), float(v)) for k, v in json.loads(cells.get(name) or "{}").items())
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise ResultsError(f"column {name}: {error}") from None
+    return Row(**values)
+
+
+def with_provenance(rows: Iterable[Row], **provenance: Any) -> list[Row]:
+    """Return the rows with their provenance columns (preset, commit, hardware, ...) filled in.
+
+    What an earlier run measured names its own, and keeps it.
+    """
+    return [
+        dataclasses.replace(row, **{name: getattr(row, name) or value for name, value in provenance.items()})
+        for row in rows
+    ]
