@@ -1,21 +1,19 @@
-"""What a worker of a cluster does for a run: keeps its files, and does its tasks in processes of their own.
+"""What a worker of a cluster does: each task in a process, in the folder of the run.
 
-Loads little: what computes is in the tasks' processes. Everything here is called by the module cluster, in
-the process of a worker of dask.distributed; `dask_worker` is that worker. A run that asks for nothing any
-more is forgotten.
+Everything here is called by cluster_executor, in the process of a worker of dask.distributed. A process stays for
+the next task of its run, and ends when nobody wants it any more.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import multiprocessing
-import os
 import pickle
 import platform
-import shutil
 import threading
-import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,163 +25,153 @@ from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task_process import TaskProcess, begin_tasks
 from benchmarks.tasks.cell_task import CellTask
-from benchmarks.tasks.task import Context, Outcome, Task, failure
+from benchmarks.tasks.task import Context, Outcome, RunStopped, Task, failure
 
-PIECE = 8 << 20  # bytes of a file at a time
-WATCH = 1.0  # [s] between looks at what nobody wants any more
-IDLE = 120.0  # [s] after which a run that nobody asks about is forgotten
-ASSETS = ".assets.pickle"  # beside the files of the run
+WATCH = 0.5  # [s] between looks at whether the scheduler still wants a task
+IDLE = 120.0  # [s] after which a process without a task ends
 SEVERAL = 3  # differences that are named
 
 
-class Gone(RuntimeError):
-    """The worker knows nothing of the run: it is another process than the one that did."""
+@dataclass(frozen=True)
+class Answer:
+    """The outcome of a task, or why the worker can do no task of this run, with its address and hardware."""
+
+    worker: str
+    outcome: Outcome = field(default_factory=Outcome)
+    hardware: str = ""
+    unfit: str = ""
 
 
-class Unfit(RuntimeError):
-    """The worker can do no task of this run; the message says why."""
+class _Process(TaskProcess):
+    """A process for tasks of one run; `batch` is the one that it was last at."""
+
+    def __init__(self, folder: str, assets: str) -> None:
+        super().__init__(_begin, folder, assets)
+        self.assets, self.batch, self.busy, self.timer = assets, "", True, threading.Timer(IDLE, self.end)
+
+    def end(self) -> None:
+        """Kill it unless it has a task."""
+        with _lock:
+            if not self.busy:
+                for processes in _processes.values():
+                    if self in processes:
+                        processes.remove(self)
+                self.process.stop()
 
 
-class _Run:
-    """What is kept for a run. at: the process that is at each task, by the task's key in dask."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.processes: dict[int, TaskProcess] = {}
-        self.at: dict[Any, TaskProcess] = {}
-        self.asked = time.monotonic()
+_lock = threading.Lock()
+_processes: dict[str, list[_Process]] = {}  # of each folder
 
 
-_runs: dict[str, _Run] = {}
+def do_task(folder: str, assets: str, batch: str, work: bytes) -> Answer:
+    """Do a task; a worker that cannot says so. Raises RunStopped.
 
-
-def open_run(run: str, dask_worker: Any) -> str:
-    """Begin with a run, with nothing of it; gives the hardware as rows name it. Raises Unfit."""
-    if multiprocessing.current_process().daemon:
-        raise Unfit(
-            "it may start no process: start it with --no-nanny, or with "
-            "DASK_DISTRIBUTED__WORKER__DAEMON=False in its environment"
-        )
-    close_run(run)
-    one_thread()
-    folder = Path(dask_worker.local_directory) / f"run-{run}"
-    folder.mkdir(exist_ok=True)
-    there = _runs[run] = _Run(folder)
-    threading.Thread(target=_watch, args=(run, there, dask_worker), name="watch", daemon=True).start()
-    return provenance.hardware_line(provenance.hardware())
-
-
-def close_run(run: str) -> None:
-    """End its processes and remove its files."""
-    if (left := _runs.pop(run, None)) is not None:
-        for process in left.processes.values():
-            process.process.stop()
-        shutil.rmtree(left.folder, ignore_errors=True)
-
-
-def progress(run: str) -> float:
-    """Progress since the last call, in seconds that it was expected to take."""
-    there = _runs.get(run)
-    if there is None:
-        return 0.0
-    there.asked = time.monotonic()
-    return sum(process.told() for process in list(there.processes.values()))
-
-
-def put_piece(run: str, name: str, offset: int, piece: bytes, content: str) -> None:
-    """Write a piece of a file. content: its digest with the last piece, else empty. Raises Gone, Unfit."""
-    path = _found(run).folder / name
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("r+b" if offset else "wb") as stream:
-            stream.seek(offset)
-            stream.write(piece)
-        if content:
-            if digest_of_file(part) != content:
-                raise Unfit(f"{name} came damaged")
-            os.replace(part, path)
-    except OSError as error:
-        raise Unfit(one_line(error)) from None
-
-
-def get_piece(run: str, name: str, offset: int) -> bytes:
-    """PIECE bytes of a file, fewer at its end. Raises Gone, Unfit."""
-    try:
-        with (_found(run).folder / name).open("rb") as stream:
-            stream.seek(offset)
-            return stream.read(PIECE)
-    except OSError as error:
-        raise Unfit(one_line(error)) from None
-
-
-def do_task(run: str, number: int, fresh: bool, work: bytes) -> Outcome:
-    """The outcome of a task, with the digests of its files. Raises Gone, Unfit, RunStopped.
-
-    number: of the process that does it; fresh: whether a batch begins with it. work: the pickled task, the
-    outcomes that it needs, and the runner's software_of it.
+    Args:
+        folder: the run's folder, as all machines see it.
+        assets: name of the pickled assets in it, which no other run has.
+        batch: key of the batch; its tasks share what a process has in its memo.
+        work: the pickled task, the outcomes that it needs, and the command's software_of it.
     """
     from distributed import get_worker
 
-    there = _found(run)
-    task, needed, expected = pickle.loads(work)
-    if line := _differences(software_of(task), expected):
-        raise Unfit(line)
-    process = there.processes.setdefault(number, TaskProcess(_begin, there.folder))
-    key = get_worker().get_current_task()
-    there.at[key] = process
+    worker = get_worker()
     try:
-        if fresh:
-            process.forget()
-        outcome = process.do(task, needed)
-        digests = {name: digest_of_file(there.folder / name) for name in outcome.files}
-        return dataclasses.replace(outcome, digests=digests)
-    except OSError as error:  # a file that the task names is not there
-        return failure(error)
-    finally:
-        del there.at[key]
+        task, needed, expected = pickle.loads(work)
+        if unfit := _why_unfit(Path(folder) / assets, software_of(task), expected):
+            return Answer(worker.address, unfit=unfit)
+        one_thread()
+        process = _take(folder, assets, batch)
+        try:
+            outcome = _do(process, task, needed, worker, worker.get_current_task())
+            digests = {name: digest_of_file(Path(folder) / name) for name in outcome.files}
+            outcome = dataclasses.replace(outcome, digests=digests)
+        except OSError as error:  # a file that the task names is not there
+            outcome = failure(error)
+        finally:
+            _give_back(process)
+    except RunStopped:
+        raise
+    except Exception as error:
+        return Answer(worker.address, unfit=one_line(error))
+    return Answer(worker.address, outcome, provenance.hardware_line(provenance.hardware()))
+
+
+def progress(folder: str) -> float:
+    """Return the progress since the last call, in seconds that it was expected to take."""
+    return sum(process.told() for process in list(_processes.get(folder, ())))
+
+
+def end_processes(folder: str) -> None:
+    """Kill all processes of a run."""
+    with _lock:
+        for process in _processes.pop(folder, ()):
+            process.timer.cancel()
+            process.process.stop()
 
 
 def software_of(task: Task) -> dict[str, str]:
-    """Name -> digest or version of all that computes the outcome, files of a user's method included."""
+    """Return name -> digest or version of all that computes the outcome, files of a user's method included."""
     files = task.cell.entry.files if isinstance(task, CellTask) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
     version = {"package Python": platform.python_version()}
-    return software("benchmarks.runner.cluster", *task.modules) | digests | version
+    return software("benchmarks.runner.cluster_executor", *task.modules) | digests | version
 
 
-def _differences(here: Mapping[str, str], expected: Mapping[str, str]) -> str:
-    """What is another than with the runner, in one line; empty where nothing is. Packages come first."""
+def _why_unfit(assets: Path, here: Mapping[str, str], expected: Mapping[str, str]) -> str:
+    """Return in one line why this worker can do no task, empty where it can. Packages are named first."""
+    if multiprocessing.current_process().daemon:
+        remedy = "start it with --no-nanny, or with DASK_DISTRIBUTED__WORKER__DAEMON=False in its environment"
+        return f"it may start no process: {remedy}"
+    if not assets.is_file():
+        return (
+            f"it does not see the folder {assets.parent} of the run: give one that all machines see by --out"
+        )
     names = sorted(here.keys() | expected.keys(), key=lambda name: (not name.startswith("package "), name))
     changed = [name for name in names if here.get(name) != expected.get(name)]
     if not changed:
         return ""
-    said = [
+    listed = [
         f"{name}: {here.get(name)} there, {expected.get(name)} here" if name.startswith("package ") else name
         for name in changed[:SEVERAL]
     ]
     more = f" and {len(changed) - SEVERAL} more" if len(changed) > SEVERAL else ""
-    return f"its software is another ({', '.join(said)}{more}); install the same there as here"
+    return f"its software is another ({', '.join(listed)}{more}); install the same there as here"
 
 
-def _found(run: str) -> _Run:
-    if run not in _runs:
-        raise Gone("the worker was started anew")
-    return _runs[run]
+def _take(folder: str, assets: str, batch: str) -> _Process:
+    """Return a process without a task, the batch's own if there is one; a new one where all have a task."""
+    with _lock:
+        processes = _processes.setdefault(folder, [])
+        idle = [process for process in processes if not process.busy and process.assets == assets]
+        process = min(idle, key=lambda process: process.batch != batch, default=None)
+        if process is None:
+            process = _Process(folder, assets)
+            processes.append(process)
+        process.timer.cancel()
+        process.busy, other = True, process.batch != batch
+        process.batch = batch
+    if other:
+        process.forget()
+    return process
 
 
-def _watch(run: str, there: _Run, dask_worker: Any) -> None:
-    """End what the scheduler has cancelled, as when the runner died, and forget a run that is over."""
-    while _runs.get(run) is there or there.at:
-        time.sleep(WATCH)
-        known = dask_worker.state.tasks
-        for key, process in list(there.at.items()):
-            if _runs.get(run) is not there or key not in known or known[key].state == "cancelled":
+def _give_back(process: _Process) -> None:
+    process.busy, process.timer = False, threading.Timer(IDLE, process.end)
+    process.timer.daemon = True
+    process.timer.start()
+
+
+def _do(process: _Process, task: Task, needed: Any, worker: Any, key: Any) -> Outcome:
+    """Return the outcome; end the process where the scheduler has cancelled the task, as when the command died."""
+    with ThreadPoolExecutor(1) as thread:
+        future = thread.submit(process.do, task, needed)
+        while not wait([future], WATCH).done:
+            state = worker.state.tasks.get(key)
+            if state is None or state.state == "cancelled":
                 process.process.stop()
-        if not there.at and time.monotonic() - there.asked > IDLE and _runs.get(run) is there:
-            close_run(run)
+        return future.result()
 
 
-def _begin(folder: Path, progress: Any) -> None:
-    """In a process that does tasks."""
-    begin_tasks(Context(RunFolder(folder), pickle.loads((folder / ASSETS).read_bytes())), progress)
+def _begin(folder: str, assets: str, progress: Any) -> None:
+    """Begin a process that does tasks."""
+    begin_tasks(Context(RunFolder(folder), pickle.loads((Path(folder) / assets).read_bytes())), progress)

@@ -68,7 +68,7 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
     if not plan.scheduler:
         return LocalExecutor(folder, assets, plan.workers)
     from benchmarks.process.scheduler import ClusterError
-    from benchmarks.runner.cluster import ClusterExecutor
+    from benchmarks.runner.cluster_executor import ClusterExecutor
 
     try:
         return ClusterExecutor(folder, assets, plan.workers, plan.scheduler)

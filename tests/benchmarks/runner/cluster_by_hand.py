@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.cluster import ClusterExecutor
+from benchmarks.runner.cluster_executor import ClusterExecutor
 from benchmarks.runner.local_executor import Executor, LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.tasks.task import Outcome, Task
@@ -39,7 +39,10 @@ class Cluster:
     def start_scheduler(self, port: int) -> None:
         file = self.folder / "scheduler.json"
         file.unlink(missing_ok=True)
-        self.scheduler = self._start("scheduler", "--port", str(port), "--scheduler-file", str(file))
+        self.scheduler = self._start(
+            "scheduler", "--port", str(port), "--scheduler-file", str(file),
+            DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="2",
+        )  # fmt: skip
         deadline = time.monotonic() + 60
         while not (file.is_file() and file.read_text().endswith("}")):
             assert self.scheduler.poll() is None and time.monotonic() < deadline

@@ -24,11 +24,12 @@ from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.plan.make_plan import check_scheduler_fits
 from benchmarks.plan.plan import PlanError
 from benchmarks.plan.request import Request
+from benchmarks.process import scheduler
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner import cluster as runner_side
+from benchmarks.runner import cluster_executor as runner_side
 from benchmarks.runner import cluster_worker
 from benchmarks.runner import execute_plan as execution
-from benchmarks.runner.cluster import ClusterExecutor
+from benchmarks.runner.cluster_executor import ClusterExecutor
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.tasks.task import Outcome, RunStopped
 from snug.networks.tensor_file import read_tensors
@@ -110,7 +111,7 @@ def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path
 
 
 def test_failures_are_values_and_a_batch_stays_together(two, folder):
-    large = 2 * runner_side.PIECE // 8 + 5  # numbers: more than two pieces
+    large = 2_000_005  # numbers
     batch = [write("one"), write("bad", how="raise"), write("large", count=large)]
     others = [[write("dies", how="die")], *([write(name)] for name in "abc")]  # two of these in one process
     found = together(folder, two.address, batch, *others)
@@ -125,29 +126,17 @@ def test_failures_are_values_and_a_batch_stays_together(two, folder):
     np.testing.assert_array_equal(np.load(folder.path / "numbers" / "from large.npy"), 2.0 * expected)
 
 
-def test_a_file_goes_to_a_worker_once(two, folder, monkeypatch):
-    (first,) = together(folder, two.address, [write("first")]).values()
-    sent, send = [], ClusterExecutor._asked
-    monkeypatch.setattr(
-        ClusterExecutor, "_asked", lambda self, *words: (sent.append(words[:3]), send(self, *words))[1]
-    )
-    batches = [[write(f"{n}", needs=(("numbers", "first"),))] for n in range(4)]
-    together(folder, two.address, *batches, needed={("numbers", "first"): first})
-    put = [(worker.address, name) for worker, function, name in sent if function is cluster_worker.put_piece]
-    assert len(put) == len(set(put)) and {name for _, name in put} >= {"numbers/first.npy"}
-
-
 def test_a_worker_has_its_next_task_before_results_of_others_are_taken(two, folder, monkeypatch):
     monkeypatch.setattr(runner_side, "POLL", 1.0)  # both have ended then
     calls = []
-    for name in ("_take", "_hand"):
+    for name in ("_take", "_submit"):
         own = getattr(ClusterExecutor, name)
         monkeypatch.setattr(
             ClusterExecutor, name,
-            lambda self, *words, own=own, name=name: (calls.append(name), own(self, *words)),
+            lambda self, *words, own=own, name=name: (calls.append(name), own(self, *words))[1],
         )  # fmt: skip
     together(folder, two.address, *([write(name)] for name in "abcd"))
-    assert calls == ["_hand", "_hand", *["_take", "_hand"] * 2, *["_take"] * 2]
+    assert calls == ["_submit", "_submit", *["_take", "_submit"] * 2, *["_take"] * 2]
 
 
 def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
@@ -182,7 +171,7 @@ def contents(folder: Path) -> dict[tuple[str, ...], str]:
     for path in folder.glob("cache/**/*.json"):
         entry = json.loads(path.read_text())
         kind = path.relative_to(folder / "cache").parts[0]
-        if kind in ("batch", "repeat", "windows"):
+        if kind in ("batch", "repeat"):
             continue  # times alone, or with them
         if kind == "metrics":
             found[kind, path.stem, "result"] = digest(entry["outcome"]["result"])
@@ -221,20 +210,35 @@ def test_a_worker_with_other_software_is_left_out_in_one_line(two, folder, monke
     assert len(said) == 2
 
 
-def test_what_comes_damaged_is_not_kept(two, folder, monkeypatch):
-    asked = ClusterExecutor._asked
+def test_a_worker_that_does_not_see_the_folder_is_left_out_in_one_line(
+    two, folder, tmp_path, monkeypatch, capsys
+):
+    own = ClusterExecutor._open
 
-    def damaged(self, worker, function, *words):
-        answer = asked(self, worker, function, *words)
-        return answer[:-1] + b"!" if function is cluster_worker.get_piece and answer else answer
+    def elsewhere(self):
+        own(self)
+        self._path = str(tmp_path / "elsewhere")
 
-    monkeypatch.setattr(ClusterExecutor, "_asked", damaged)
-    with pytest.raises(RunStopped, match=r"one\.npy came damaged"):
+    monkeypatch.setattr(ClusterExecutor, "_open", elsewhere)
+    with pytest.raises(RunStopped, match=r"does not see the folder .*elsewhere.*--out"):
         together(folder, two.address, [write("one")])
-    assert files(folder.path) == {}
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("left out: worker tcp:")]
+    assert len(said) == 2 and list(folder.path.iterdir()) == []
 
 
-def test_what_was_damaged_here_is_not_sent(two, folder):
+def test_what_comes_damaged_is_not_kept(two, folder, monkeypatch):
+    take = ClusterExecutor._take
+
+    def damaged(self, future):
+        (folder.path / "numbers" / "one.npy").write_bytes(b"damaged")
+        return take(self, future)
+
+    monkeypatch.setattr(ClusterExecutor, "_take", damaged)
+    with pytest.raises(RunStopped, match=r"one\.npy is damaged, seen from here"):
+        together(folder, two.address, [write("one")])
+
+
+def test_what_was_damaged_here_is_not_built_upon(two, folder):
     (first,) = together(folder, two.address, [write("first")]).values()
     (folder.path / first.files[0]).write_bytes(b"damaged")
     with pytest.raises(RunStopped, match=r"first\.npy is damaged since this run wrote it"):
@@ -242,7 +246,7 @@ def test_what_was_damaged_here_is_not_sent(two, folder):
 
 
 def test_a_scheduler_that_does_not_answer_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(runner_side, "FIRST", 0.3)
+    monkeypatch.setattr(scheduler, "FIRST", 0.3)
     words = ["--scenes", "free_fall", "-o", str(tmp_path / "run"), "--scheduler"]
     assert run.main([*words, "tcp://127.0.0.1:1"]) == 2
     said = capsys.readouterr().err
@@ -275,7 +279,7 @@ def test_an_interrupt_ends_what_the_cluster_does_and_leaves_the_cluster(two, fol
     with pytest.raises(KeyboardInterrupt):
         together(folder, two.address, *([write(f"{n}", seconds=60.0, mark=str(mark))] for n in range(4)))
     until(lambda: not any(alive(task) for _, task in lines(mark)), 10.0)
-    assert len(lines(mark)) == 2 and not list(two.folder.rglob("run-*"))
+    assert len(lines(mark)) == 2 and not list(folder.path.rglob(".*"))
     assert together(folder, two.address, [write("after")])["after"].status == "ok"
 
 
@@ -313,13 +317,14 @@ def test_an_outcome_that_goes_with_its_worker_keeps_nobody_waiting(folder, tmp_p
     killed: list[float] = []
     take = ClusterExecutor._take
 
-    def taken(self, worker, lane):
+    def taken(self, future):
         if not killed:
+            (address,) = self._client.nthreads()
             one.workers[0].kill()
             killed.append(time.monotonic())
             one.add()
-            until(lambda: worker.address not in self._client.nthreads())
-        take(self, worker, lane)
+            until(lambda: address not in self._client.nthreads())
+        return take(self, future)
 
     monkeypatch.setattr(ClusterExecutor, "_take", taken)
     with cluster(tmp_path, 1) as one:
