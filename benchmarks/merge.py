@@ -1,8 +1,8 @@
 """python -m benchmarks.merge: runs of several machines in one folder, for one report.
 
-Everything but times is compared first, and refused by name where it differs: what the runs were asked for,
-the inputs and the code of every task, and each number that two of them have. Times are those of one machine,
-the first named that measured any; what others measured is told and not put beside them.
+Everything but times is compared first, and refused by name where it differs: the requests, the inputs and
+the code of every task, and each number that two runs have. Times are those of one machine, the first named
+that measured any; those of others become the reason of a skipped row.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import shlex
 import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from copy import deepcopy
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from benchmarks.results.row import BEFORE_FRAMES, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import read_entry
 from reference_sim.command.command_line import Parser, command
+from reference_sim.files.atomic_files import new_folder
 
 PROGRAM = "benchmarks.merge"
 EXAMPLES = """examples:
@@ -48,120 +49,103 @@ class MergeError(ValueError):
 
 @command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     parser = Parser(prog=f"python -m {PROGRAM}", description="Join runs into one folder.", epilog=EXAMPLES)
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folders of benchmarks.run, two or more")
     parser.add_argument("-o", "--out", metavar="DIR", required=True, help="a new folder")
     options = parser.parse_args(words)
-    rows = merge(
-        [Path(run) for run in options.runs], Path(options.out),
-        command=shlex.join(["python", "-m", PROGRAM, *words]),
-    )  # fmt: skip
+    line = shlex.join(["python", "-m", PROGRAM, *words])
+    rows = merge([Path(run) for run in options.runs], Path(options.out), command=line)
     timed = of_machines(RunFolder(Path(options.out)).read_config())
-    left_out = [row for row in rows if row.status == "skipped" and row.metric in timed]
-    if left_out:
-        print(
-            f"{len(left_out)} times of other machines stand in the reasons of skipped rows", file=sys.stderr
-        )
+    if left_out := sum(row.status == "skipped" and row.metric in timed for row in rows):
+        print(f"{left_out} times of other machines stand in the reasons of skipped rows", file=sys.stderr)
     print(f"{len(rows)} rows in {options.out}; python -m reports.build {shlex.quote(options.out)}")
     return 0
 
 
-@dataclass(frozen=True)
-class _Run:
-    """A run to merge. Raises ResultsError for a folder that is none."""
-
-    folder: RunFolder
-
-    @cached_property
-    def config(self) -> dict[str, Any]:
-        return self.folder.read_config()
-
-    @cached_property
-    def rows(self) -> list[Row]:
-        return self.folder.read_rows()
-
-
 def merge(paths: Sequence[Path], out: Path, *, command: str = "") -> list[Row]:
-    """Join them; gives the rows written. Raises ValueError (MergeError, ResultsError), one line."""
+    """Join the runs in `paths` into the new folder `out`; return the rows written.
+
+    Raises:
+        MergeError: where the runs differ in what has to be the same.
+        ResultsError: for a folder that is no run, or has a damaged file.
+    """
     if len({path.resolve() for path in paths}) < max(2, len(paths)):
         raise MergeError("name two or more different folders")
-    runs = [_Run(RunFolder(path)) for path in paths]
-    for run in runs:
-        if changed := run.folder.changed(run.config):
-            raise MergeError(f"{run.folder.path / changed[0]}: is not as the run wrote it; run it again")
-        if "merged" in run.config:
-            raise MergeError(f"{run.folder.path}: is merged already; name the runs that it came of")
-    config = _joined(runs, command)
-    check_entries([run.folder for run in runs])
-    rows = joined_rows({str(run.folder.path): run.rows for run in runs}, of_machines(config))
-    from reference_sim.files.atomic_files import new_folder
-
+    folders = [RunFolder(path) for path in paths]
+    configs = [_config_of(folder) for folder in folders]
+    config = _joined(paths, configs) | {"command": command}
+    check_entries(folders)
+    rows = joined_rows({str(run.path): run.read_rows() for run in folders}, of_machines(config))
     with new_folder(out) as part:
-        folder, digests = RunFolder(part), dict[str, str]()
-        frames = folder.frame_energies_path
-        for run in runs:
-            for name, digest in run.config.get("digests", {}).items():
-                if name not in digests and name not in (p.name for p in (folder.rows_path, frames)):
-                    digests |= copied(name, digest, run.folder.path, part)
-        folder.write_rows(rows)
-        frame_energies.join([run.folder.frame_energies_path for run in runs], frames)
-        digests |= {path.name: digest_of_file(path) for path in (folder.rows_path, frames) if path.is_file()}
-        folder.write_config(config | {"digests": digests})
+        target, digests = RunFolder(part), dict[str, str]()
+        written = (target.rows_path, target.frame_energies_path)
+        for run, of_run in zip(folders, configs):
+            for name, digest in of_run.get("digests", {}).items():
+                if name not in digests and name not in [path.name for path in written]:
+                    digests |= copied(name, digest, run.path, part)
+        target.write_rows(rows)
+        frame_energies.join([run.frame_energies_path for run in folders], target.frame_energies_path)
+        digests |= {path.name: digest_of_file(path) for path in written if path.is_file()}
+        target.write_config(config | {"digests": digests})
     return rows
 
 
-def _joined(runs: Sequence[_Run], command: str) -> dict[str, Any]:
-    """run.json of the merged folder. Raises MergeError for entries that have to be equal and are not."""
-    first = runs[0]
-    for run, name in ((run, name) for run in runs[1:] for name in SAME):
-        if run.config.get(name) != first.config.get(name):
-            told = (f"{r.folder.path} ({str(r.config.get(name))[:60]})" for r in (run, first))
-            raise MergeError(f"another {name.replace('_', ' ')} in {' than in '.join(told)}")
-    joined: dict[str, Any] = {}
-    for name in JOINED:
-        joined[name] = {}
-        for run in runs:
-            where = f"{name.replace('_', ' ')} of {run.folder.path}"
-            _join(joined[name], run.config.get(name) or {}, where, strict=name in STRICT)
-    looks = [look for run in runs for look in run.config.get("test_looks") or ()]
+def _config_of(folder: RunFolder) -> dict[str, Any]:
+    config = folder.read_config()
+    if changed := folder.changed(config):
+        raise MergeError(f"{folder.path / changed[0]}: is not as the run wrote it; run it again")
+    if "merged" in config:
+        raise MergeError(f"{folder.path}: is merged already; name the runs that it came of")
+    return config
+
+
+def _joined(paths: Sequence[Path], configs: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return run.json of the merged folder. Raises MergeError for entries that should be equal."""
+    first, joined = configs[0], {name: dict[str, Any]() for name in JOINED}
+    for path, config in zip(paths, configs):
+        for name in SAME:
+            if config.get(name) != first.get(name):
+                values = (
+                    f"{path} ({str(config.get(name))[:60]}) than in {paths[0]} ({str(first.get(name))[:60]})"
+                )
+                raise MergeError(f"another {name.replace('_', ' ')} in {values}")
+        for name in JOINED:
+            where = f"{name.replace('_', ' ')} of {path}"
+            _join(joined[name], config.get(name) or {}, where, strict=name in STRICT)
+
+    def each(name: str) -> list[Any]:
+        values = [value for config in configs for value in config.get(name) or ()]
+        return [value for k, value in enumerate(values) if value not in values[:k]]
+
     kept = ("command", "commit", "started", "finished", "hardware", "versions", "seeds", "stages")
-    own = {name: value for name, value in first.config.items() if name not in ("started", "cells", "stages")}
-    return own | joined | {
-        "command": command,
-        "suites": _each(run.config.get("suites") or () for run in runs),
-        "seeds": sorted(_each(run.config.get("seeds") or () for run in runs)),
-        "finished": max(str(run.config.get("finished") or "") for run in runs),
+    of_first = {name: value for name, value in first.items() if name not in ("started", "cells", "stages")}
+    return of_first | joined | {
+        "suites": each("suites"),
+        "seeds": sorted(each("seeds")),
+        "finished": max(str(config.get("finished") or "") for config in configs),
         "earlier": [],
-        "test_looks": [look for k, look in enumerate(looks) if look not in looks[:k]],
-        "merged": [{name: run.config.get(name) for name in kept} for run in runs],
+        "test_looks": each("test_looks"),
+        "merged": [{name: config.get(name) for name in kept} for config in configs],
     }  # fmt: skip
 
 
-def _join(there: dict[str, Any], other: Mapping[str, Any], where: str, *, strict: bool) -> None:
-    """Add what is not there yet, inside of dictionaries too."""
+def _join(joined: dict[str, Any], other: Mapping[str, Any], where: str, *, strict: bool) -> None:
+    """Add the entries of `other` that are not in `joined`, inside of dictionaries too."""
     for name, value in other.items():
-        if isinstance(value, dict) and isinstance(there.get(name), dict):
-            _join(there[name], value, f"{name} among {where}", strict=strict)
-        elif strict and there.get(name, value) != value:
+        if isinstance(value, dict) and isinstance(joined.get(name), dict):
+            _join(joined[name], value, f"{name} among {where}", strict=strict)
+        elif strict and joined.get(name, value) != value:
             raise MergeError(f"another {name} among {where} than in the runs before it")
         else:
-            there.setdefault(name, _copy(value))
-
-
-def _copy(value: Any) -> Any:
-    return {name: _copy(inner) for name, inner in value.items()} if isinstance(value, dict) else value
-
-
-def _each(lists: Iterable[Iterable[Any]]) -> list[Any]:
-    return list(dict.fromkeys(value for values in lists for value in values))
+            joined.setdefault(name, deepcopy(value))
 
 
 def check_entries(folders: Iterable[RunFolder]) -> None:
-    """Raises MergeError where two tasks came of other code or other packages, or one task of other inputs.
+    """Raise MergeError where two tasks came of other code or packages, or one task of other inputs.
 
-    On which machine a task ran is no such input.
+    The machine on which a task ran is no such input.
     """
     seen: dict[Any, tuple[str, Path]] = {}
     for folder in folders:
@@ -173,21 +157,22 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
             if entry is None:
                 raise MergeError(f"{path}: damaged, or of an earlier version; run it again with --fresh")
             for name, value in entry["parts"].items():
-                own = name in entry["inputs"]
-                key = (path.relative_to(folder.cache), name) if own else name
+                key = (path.relative_to(folder.cache), name) if name in entry["inputs"] else name
                 before, where = seen.setdefault(key, (value, folder.path))
                 if before != value and name != MACHINE:
-                    told = f"{entry['task']}: another {name} in {folder.path} than in {where}"
-                    raise MergeError(f"{told}: run both by the same code; --fresh forgets what is older")
+                    difference = f"{entry['task']}: another {name} in {folder.path} than in {where}"
+                    raise MergeError(
+                        f"{difference}: run both by the same code; --fresh forgets what is older"
+                    )
 
 
 def of_machines(config: Mapping[str, Any]) -> frozenset[str]:
-    """The metrics of a run that are numbers of the machine, as every time."""
-    return frozenset(name for name, said in config["metrics"].items() if said.get("of") == "machine")
+    """Return the metrics of a run that are numbers of the machine, as every time."""
+    return frozenset(name for name, entry in config["metrics"].items() if entry.get("of") == "machine")
 
 
 def joined_rows(runs: Mapping[str, Sequence[Row]], timed: frozenset[str]) -> list[Row]:
-    """Each row once; of metrics `timed` those of one machine. Raises MergeError for numbers that differ.
+    """Return each row once; of metrics `timed` those of one machine. Raises MergeError for other numbers.
 
     runs: folder -> its rows, in the order in which machines are preferred.
     """
@@ -196,31 +181,25 @@ def joined_rows(runs: Mapping[str, Sequence[Row]], timed: frozenset[str]) -> lis
     for where, rows in runs.items():
         for row in rows:
             key = (row.suite, row.scene, row.method, row.seed, row.metric)
-            there = kept.get(key)
-            if there:
-                _compare(there, (row, where), of_a_machine=row.metric in timed)
+            if earlier := kept.get(key):
+                _compare(earlier, (row, where), of_a_machine=row.metric in timed)
             kind = row.metric if row.metric in BEFORE_FRAMES else ""
             measured = row.metric in timed and row.value is not None
-            if measured and machine.setdefault(kind, row.hardware) != row.hardware:
-                row = _told(row, machine[kind])
-            if there is None or _known(row) > _known(there[0]):
+            if measured and (first := machine.setdefault(kind, row.hardware)) != row.hardware:
+                reason = f"{row.value:.4g} {row.unit} on {row.hardware}; other times are of {first}"
+                row = replace(row, value=None, uncertainty=None, moved=(), status="skipped", reason=reason)
+            if earlier is None or _information(row) > _information(earlier[0]):
                 kept[key] = (row, where)
     return [row for row, _ in kept.values()]
 
 
-def _known(row: Row) -> tuple[bool, bool]:
-    """More of a row that says more."""
+def _information(row: Row) -> tuple[bool, bool]:
+    """Return a key that is larger of a row that says more."""
     return row.status != "skipped", row.uncertainty is not None
 
 
-def _told(row: Row, hardware: str) -> Row:
-    """A time of another machine: a reason instead of a number."""
-    reason = f"{row.value:.4g} {row.unit} on {row.hardware}; other times are of {hardware}"
-    return replace(row, value=None, uncertainty=None, moved=(), status="skipped", reason=reason)
-
-
 def _compare(one: tuple[Row, str], other: tuple[Row, str], *, of_a_machine: bool) -> None:
-    """Raises MergeError for other numbers in one cell; of times, where it ended well on one machine alone."""
+    """Raise MergeError for other numbers in one cell; of times, where it ended well on one machine alone."""
     if "skipped" in (one[0].status, other[0].status):
         return
     names = [field.name for field in fields(Row) if field.name not in OF_ONE_RUN]
@@ -232,7 +211,7 @@ def _compare(one: tuple[Row, str], other: tuple[Row, str], *, of_a_machine: bool
 
 
 def copied(name: str, digest: str, source: Path, target: Path) -> dict[str, str]:
-    """Copy a file of a folder into another; its name and digest, none where it is not there.
+    """Copy a file of a folder into another; return its name and digest, nothing where it is not there.
 
     Raises ResultsError for one that is not as it was written, or lies elsewhere.
     """

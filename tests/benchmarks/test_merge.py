@@ -152,7 +152,7 @@ def test_runs_of_other_inputs_are_refused_by_name(folder, tmp_path, changes, inp
 def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path, monkeypatch, capsys):
     one = folder("one", [row("energy/total", 1.0)])
     monkeypatch.setattr(
-        "benchmarks.runner.cache.code_of", lambda *_: {"benchmarks/results/json_file.py": "other"}
+        "benchmarks.fingerprint.dependencies.code_of", lambda *_: {"benchmarks/results/json_file.py": "other"}
     )
     two = folder("two", [row("energy/total", 1.0, seed=1)], cells=("other",))
     assert command.main([str(one), str(two), "-o", str(tmp_path / "both")]) == 2
