@@ -1,4 +1,4 @@
-"""A method: prepare off the clock, run on it, give a trajectory. Only the harness owns a clock."""
+"""Method: prepare off the clock, run on it, return a trajectory. Only the harness owns a clock."""
 
 from __future__ import annotations
 
@@ -20,45 +20,45 @@ if TYPE_CHECKING:
 
 
 class Method:
-    """What the harness asks of a method; one object serves one cell. Derive from it, or write the same names.
+    """Interface of a method; one object serves one cell. Derive from it, or write the same names.
 
     The harness owns the clock: it times the whole of run(), and inputs() by the same clock. What a method may
     add are the times of its frames, as `frame_seconds` of the trajectory.
     """
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Load, compile, warm up: all that a user pays once. Not timed."""
+        """Load, compile and warm up for a scene: all that a user pays once. Not timed."""
         raise NotImplementedError
 
     def run(self) -> Trajectory:
-        """The work, frame by frame. Timed. Failure is a status in the trajectory, not an exception.
+        """Compute the roll-out, frame by frame. Timed. Failure is a status in it, not an exception.
 
         Short ones are called again until enough time is measured: each does all of the work, from the start.
         """
         raise NotImplementedError
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object] | None:
-        """What makes, called with a frame, all that run() takes as ready of that frame's pose; None without a
-        body. Timed, one frame at a time, and added to the run: from pose to world vertices.
+        """Return a function of the frame that makes what run() takes as ready of that frame's pose.
 
-        By default the posed body, and the places of the pins.
+        Timed, one frame at a time, and added to the run: end-to-end time, from pose to world vertices. By
+        default the posed body and the places of the pins; None without a body.
         """
         return None if scene.dressed is None else posed_body(scene.dressed)
 
     def quasi_static(self) -> Trajectory | None:
-        """Its answer to each frame's pose held still; None where that is the simulator's. Not timed."""
+        """Return the quasi-static solution of each frame; None for the simulator's. Not timed."""
         return None
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
-        """What computes so many bodies at once when called, (T, copies, V, 3) [m]; that call is timed.
+        """Return a function that computes so many bodies at once when called, (T, copies, V, 3) [m].
 
-        Asked only of methods that are declared `batched`.
+        That call is timed. Asked only of methods that are declared `batched`.
         """
         raise NotImplementedError
 
 
 def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray]]:
-    """What poses the body in a frame: its vertices (B, 3) and the garment's pins (P, 3) [m]."""
+    """Return a function of the frame: vertices (B, 3) of the posed body, the garment's pins (P, 3) [m]."""
     body, motion, garment = dressed.body, dressed.motion, dressed.garment
     pose = body.poser(dressed.betas)
 
@@ -86,7 +86,7 @@ class Reporting:
 
 @dataclass(frozen=True, kw_only=True)
 class MethodEntry:
-    """The declaration of a method: cheap to list. Its module is imported when a cell needs it.
+    """Declaration of a method: cheap to list. Its module is imported when a cell needs it.
 
     label: its name for people. module: has make(*, models, seed, **options), which gives a Method; where it
     is left out, that is the file that declares the entry. declared_in: that file, or module of an installed
@@ -137,13 +137,13 @@ class MethodEntry:
             raise DeclarationError(f"method {self.name}: unknown role '{self.role}'; use one of {roles}")
 
     def meant_for(self, scene: Scene) -> bool:
-        """Whether the two may meet at all: some scenes are for networks alone, and some for none."""
+        """Return whether method and scene may meet: some scenes are for networks alone, some for none."""
         if scene.networks_only:
             return self.batched
         return not (scene.own_garment and self.trained)
 
     def skip(self, scene: Scene) -> str | None:
-        """Why this method cannot do that scene, or None."""
+        """Return why this method cannot do that scene, or None."""
         if self.left_out:
             return self.left_out
         if self.needs_body and not scene.dressed:
@@ -155,13 +155,13 @@ class MethodEntry:
         return None
 
     def make(self, *, models: Path, seed: int) -> Method:
-        """A fresh method for one cell; `models` is the folder of trained networks."""
+        """Make a fresh method for one cell; `models` is the folder of trained networks."""
         if self.declared_in:
             load(self.declared_in)  # an energy of its own is then known by name
         return load(self.module).make(models=models, seed=seed, **self.options)
 
 
 def installed(package: str) -> bool:
-    """Whether a package can be imported; a mere folder of that name cannot."""
+    """Return whether a package can be imported; a mere folder of that name cannot."""
     spec = importlib.util.find_spec(package)
     return spec is not None and spec.origin is not None

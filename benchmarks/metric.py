@@ -1,4 +1,4 @@
-"""A metric: a number of a roll-out under its name, with unit, title and definition; and what it may read.
+"""Metric: a number of a roll-out by name, unit, title and definition; and the roll-outs that it reads.
 
 A module of benchmarks/metrics holds METRICS, a tuple of Metric, and
 
@@ -44,9 +44,9 @@ COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what oth
 
 
 class Estimate(NamedTuple):
-    """A number and how far it may be off, in the same unit.
+    """Number and its uncertainty, in the same unit.
 
-    moved: of a number beside the reference, by how much each simulation as right, in its place, changes it.
+    moved: by how much each equally valid simulation, in the place of the reference, changes the number.
     """
 
     value: float
@@ -56,7 +56,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Metric:
-    """The declaration of a metric.
+    """Declaration of a metric.
 
     title: the head of its column; table: the table that has this column, or empty. arbitrary_zero: whether
     its zero is a choice, as the height of a potential energy: then differences say something, and ratios
@@ -91,19 +91,20 @@ class Metric:
 
 
 class Kept:
-    """Remembers what metric modules have made of an object: kept(make) is make(object), computed once."""
+    """Memory of what metric modules computed of an object: kept(make) is make(object), computed once."""
 
     def __init__(self) -> None:
         self._made: dict[Callable[..., Any], Any] = {}
 
     def kept(self, make: Callable[[Any], Made]) -> Made:
+        """Return make(self), computed at the first call."""
         if make not in self._made:
             self._made[make] = make(self)
         return self._made[make]
 
 
 class RollOut(Kept):
-    """What one method did in a scene. Frames from the first that is not finite on are left out of positions.
+    """Roll-out of one method in a scene. `positions` end before the first frame that is not finite.
 
     Attributes:
         group: the roll-outs of the scene.
@@ -135,31 +136,32 @@ class RollOut(Kept):
 
     @property
     def scene(self) -> BuiltScene:
+        """Scene that was rolled out."""
         return self.group.scene
 
     @property
     def reference(self) -> RollOut | None:
-        """The simulation of the same scene, where this is not that."""
+        """Reference simulation of the same scene; None where this is it, or there is none."""
         reference = self.group.reference
         return None if reference is self else reference
 
     @property
     def judged(self) -> slice:
-        """The frames after those of the warm-up."""
+        """Frames after those of the warm-up."""
         return slice(self.scene.warm_up, None)
 
     def judged_beside(self, other: np.ndarray) -> slice:
-        """Of these the frames that positions (T',V,3) [m] of another roll-out have too."""
+        """Return the frames after the warm-up that positions (T',V,3) [m] of another roll-out have too."""
         return slice(self.scene.warm_up, min(len(self.positions), len(other)))
 
     @property
     def place(self) -> int:
-        """Among the roll-outs of the group."""
+        """Index among the roll-outs of the group."""
         return self.group.roll_outs.index(self)
 
 
 class SceneRollOuts(Kept):
-    """The roll-outs of one scene that are measured together: they share its search trees.
+    """Roll-outs of one scene that are measured together: they share its search trees.
 
     Attributes:
         scene: as it was built.
@@ -175,7 +177,7 @@ class SceneRollOuts(Kept):
         self.roll_outs: list[RollOut] = []
 
     def find(self, *, role: str, family: str | None = None, level: float | None = None) -> RollOut | None:
-        """The first that came to its end, of that role, and of that family and level where they are given."""
+        """Return the first finished roll-out of that role, family and level, or None."""
         for roll_out in self.roll_outs:
             entry = roll_out.entry
             place = entry.reporting
@@ -186,11 +188,12 @@ class SceneRollOuts(Kept):
 
     @property
     def reference(self) -> RollOut | None:
+        """Reference simulation of the scene, or None."""
         return self.find(role="reference")
 
     @property
     def as_right(self) -> list[RollOut]:
-        """Simulations that could stand in the reference's place."""
+        """Equally valid simulations, which could stand in the reference's place."""
         return [
             roll_out
             for roll_out in self.roll_outs
@@ -200,12 +203,12 @@ class SceneRollOuts(Kept):
 
     @property
     def positions(self) -> list[np.ndarray]:
-        """Of each roll-out."""
+        """Positions (T,V,3) [m] of each roll-out."""
         return [roll_out.positions for roll_out in self.roll_outs]
 
 
 def skinned(group: SceneRollOuts) -> np.ndarray | None:
-    """(T,V,3) [m] the garment skinned to the poses, as the default recipe does; None without a body."""
+    """Return the garment skinned to the poses as by the default recipe, (T,V,3) [m]; None without a body."""
     if group.scene.dressed is None:
         return None
     from snug.networks.dressed_body import DressedBody

@@ -1,4 +1,4 @@
-"""A scene: what there is to simulate, its terms and no other, and the exact answer where one is known."""
+"""Scene: what is simulated, its energy terms, and the exact answer where one is known."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """The declaration of a scene: cheap to list. Its module is imported when it is built.
+    """Declaration of a scene: cheap to list. Its module is imported when it is built.
 
     module: has build(scene, assets, **options), which gives a BuiltScene. module, declared_in, files: as of a
     MethodEntry. sizes: values of the preset that build() takes as options; options: further ones.
@@ -55,26 +55,26 @@ class Scene:
 
     @property
     def timed(self) -> bool:
-        """Whether costs are measured; the cells of other scenes run side by side."""
+        """Whether costs are measured in this scene; cells of other scenes run side by side."""
         return self.metrics is None or "cost" in self.metrics
 
     @property
     def dynamic(self) -> bool:
-        """Whether answers to poses held still are measured against."""
+        """Whether metrics need quasi-static solutions of this scene."""
         return self.dressed and (self.metrics is None or "dynamics" in self.metrics)
 
     @property
     def simulated(self) -> bool:
-        """Whether a garment is to be settled on a posed body first."""
+        """Whether the garment settles on a posed body before the motion starts."""
         return self.dressed and not self.networks_only
 
     @property
     def dressed(self) -> bool:
-        """Whether there is a body that wears a garment."""
+        """Whether the scene has a body that wears a garment."""
         return bool(self.garment)
 
     def at(self, preset: Preset) -> Scene:
-        """The scene with the sizes of a preset among its options."""
+        """Return the scene with the sizes of a preset among its options. Raises DeclarationError."""
         for name in self.sizes:
             if not hasattr(preset, name):
                 raise DeclarationError(
@@ -85,7 +85,7 @@ class Scene:
         return replace(self, sizes=(), options={**sizes, **self.options})
 
     def build(self, assets: Assets | None = None) -> BuiltScene:
-        """Make everything the scene declares. Deterministic. A dressed scene needs the assets."""
+        """Build everything that the scene declares. Deterministic. Raises ValueError for missing assets."""
         if self.dressed and assets is None:
             raise ValueError(f"scene {self.name} needs assets: a body, a garment and the motion")
         return load(self.module).build(self, assets, **self.options)
@@ -93,9 +93,12 @@ class Scene:
 
 @dataclass(frozen=True)
 class Dressed:
-    """Who wears what and moves how: what a network may know of a scene. betas: (S,) shape, or the mean.
+    """Body, garment and motion: all that a network may read of a scene.
 
-    before: what the body did until then, where the motion is a part of a longer one.
+    Attributes:
+        body, garment, motion: as read or made by the assets.
+        betas: (S,) body shape; None for the mean body.
+        before: the motion until then, where `motion` is a part of a longer one.
     """
 
     body: Body
@@ -106,13 +109,13 @@ class Dressed:
 
     @property
     def pelvis(self) -> np.ndarray:
-        """(T,3) [m] of the posed root joint."""
+        """Positions (T,3) [m] of the posed root joint."""
         return self.body.joints(self.betas)[0] + self.motion.translations
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BuiltScene:
-    """All that a method may read. Frame 0 of every array is the start.
+    """Built scene: all that a method may read. Frame 0 of every array is the start.
 
     energies: the terms declared, inertia left out: the time step adds it. dt [s]; frames: positions of a
     trajectory, the start included. settle: gives the start (V,3) [m] from which to simulate, at rest, or
@@ -151,7 +154,7 @@ class BuiltScene:
 
     @cached_property
     def start_state(self) -> np.ndarray:
-        """Positions and velocities, (2,V,3) [m, m/s]."""
+        """Positions and velocities at the start, (2,V,3) [m, m/s]."""
         import numpy as np
 
         state = np.asarray(self.settle(), dtype=np.float64)
@@ -159,15 +162,15 @@ class BuiltScene:
 
     @property
     def start(self) -> np.ndarray:
-        """(V,3) [m]."""
+        """Positions (V,3) [m] at the start."""
         return self.start_state[0]
 
     @property
     def start_velocity(self) -> np.ndarray:
-        """(V,3) [m/s]."""
+        """Velocities (V,3) [m/s] at the start."""
         return self.start_state[1]
 
     @property
     def terms(self) -> tuple[str, ...]:
-        """Names of the terms that exist in this scene, in the order of the tables."""
+        """Names of the energy terms of this scene, in the order of the tables."""
         return (*(e.name for e in self.energies), "inertia")

@@ -1,4 +1,4 @@
-"""The visible tuple of methods. Nothing is imported until a cell needs it."""
+"""Methods: the visible tuple of declarations. Nothing is imported until a cell needs it."""
 
 from __future__ import annotations
 
@@ -63,5 +63,9 @@ METHODS = (
 
 
 def find_method(name: str) -> MethodEntry:
-    """The entry of that name. Raises KeyError."""
+    """Return the entry of that name. Raises KeyError.
+
+    >>> find_method("newton-4").reporting.level
+    4
+    """
     return by_name("method", METHODS)[name]

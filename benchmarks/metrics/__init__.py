@@ -1,4 +1,4 @@
-"""The visible tuple of metrics: one module each. See benchmarks.metric for what a module holds."""
+"""Metrics: the visible tuple of modules, each with the metrics it measures. See benchmarks.metric."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ MODULES = {
     "geometry": "benchmarks.metrics.surface.distances",
     "body": "benchmarks.metrics.surface.body_intersections",
     "optimality": "benchmarks.metrics.energies.energy_gap",
-    "solver": "benchmarks.metrics.cost.solver",
-    "exact": "benchmarks.metrics.motion.exact_answer",
+    "solver": "benchmarks.metrics.cost.relaxed_frames",
+    "exact": "benchmarks.metrics.motion.exact_distance",
     "dynamics": "benchmarks.metrics.motion.dynamics",
     "training_distance": "benchmarks.metrics.cost.training_distance",
     "conservation": "benchmarks.metrics.motion.conservation",
@@ -37,19 +37,22 @@ MODULE_OF = MODULES | WHERE_NAMED
 
 
 def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:
-    """The modules that a scene measures, from what it declares."""
+    """Return the names of the modules that a scene measures, from what it declares."""
     return tuple(MODULES) if chosen is None else tuple(name for name in MODULE_OF if name in chosen)
 
 
 @cache
 def modules() -> dict[str, ModuleType]:
-    """Name -> module, of all there are; loads them."""
+    """Load every module of metrics, by name."""
     return {name: load(module) for name, module in MODULE_OF.items()}
 
 
 @cache
 def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
-    """Name -> metric, of all modules, of microbenchmarks, and of modules outside. Raises DeclarationError."""
+    """Return every metric by name: of all modules, of microbenchmarks, and of modules outside.
+
+    Raises DeclarationError where a module declares no METRICS, or two declare one name.
+    """
     from benchmarks.metrics.cost.microbenchmarks import METRICS
 
     own: list[Metric] = []
@@ -62,9 +65,12 @@ def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
 
 
 def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:
-    """The declaration of a metric, also by a pattern such as "energy/*". Raises KeyError.
+    """Return the declaration of a metric, also by a pattern such as "energy/*". Raises KeyError.
 
     outside: modules, or paths of files, of metrics that are not the project's.
+
+    >>> find_metric("energy/wind").unit
+    'J'
     """
     metrics = declared(outside)
     if name in metrics:

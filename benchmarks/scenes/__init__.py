@@ -1,4 +1,4 @@
-"""The visible tuples of scenes: one line each. Nothing is imported until a scene is built."""
+"""Scenes: the visible tuples of declarations. Nothing is imported until a scene is built."""
 
 from __future__ import annotations
 
@@ -53,12 +53,19 @@ FURTHER_SCENES = (
 
 
 def find_scene(name: str, garment: str = "tshirt") -> Scene:
-    """The scene of that name, of those that hang on no motion of the run. Raises KeyError."""
+    """Return the scene of that name, of those that depend on no motion of the run. Raises KeyError.
+
+    >>> find_scene("hanging_sheet").obstacle
+    False
+    """
     return by_name("scene", (*SCENES, *further_scenes(garment)))[name]
 
 
 def further_scenes(garment: str) -> tuple[Scene, ...]:
-    """FURTHER_SCENES with that garment on the body: of another than the T-shirt without those that tailor one."""
+    """Return FURTHER_SCENES with that garment on the body.
+
+    For another garment than the T-shirt those are left out that tailor one.
+    """
     if garment == GARMENT_SCENES[0].garment:
         return FURTHER_SCENES
     kept = (scene for scene in FURTHER_SCENES if not scene.own_garment)
@@ -67,7 +74,7 @@ def further_scenes(garment: str) -> tuple[Scene, ...]:
 
 @dataclass(frozen=True)
 class GarmentScenes:
-    """A garment of snug.garments.garment: its scenes are "<garment>/<motion>", and "<garment>/<motion>@clip".
+    """Scenes of a garment of snug.garments: named "<garment>/<motion>" and "<garment>/<motion>@clip".
 
     dynamic: whether its motions are those that stop within a frame, instead of the run's own.
     """
@@ -77,7 +84,7 @@ class GarmentScenes:
     dynamic: bool = False
 
     def scene(self, motion: str, part: str = "whole") -> Scene:
-        """A body in this garment doing that motion, or its liveliest part."""
+        """Return the scene of a body in this garment doing that motion, or its liveliest part."""
         of = " (its liveliest part)" if part == "clip" else ""
         return Scene(
             name=f"{self.garment}/{motion}" + ("@clip" if part == "clip" else ""),
@@ -103,7 +110,7 @@ GARMENT_SCENES = (
 
 
 def of_garment(garment: str, worn: tuple[GarmentScenes, ...] = GARMENT_SCENES) -> GarmentScenes:
-    """The scenes of that garment. Raises DeclarationError."""
+    """Return the scenes of that garment. Raises DeclarationError."""
     known = {scenes.garment: scenes for scenes in worn}
     if garment not in known:
         raise DeclarationError(f"no garment is called '{garment}'; there are {', '.join(known)}")
@@ -115,7 +122,7 @@ def all_scenes(
     dynamic_motions: Iterable[str],
     worn: tuple[GarmentScenes, ...] = GARMENT_SCENES,
 ) -> dict[str, Scene]:
-    """Every scene by name: those without a body, then dressed bodies in each motion and in its clip.
+    """Return every scene by name: those without a body, then dressed bodies in each motion and in its clip.
 
     motions: those of the T-shirt, which can do the others too; dynamic_motions: those of garments that swing.
     worn: the garments, the first in place of the T-shirt.

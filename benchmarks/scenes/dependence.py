@@ -1,4 +1,4 @@
-"""The T-shirt in the first frames of a training motion, tailored to a given size, at a given time step.
+"""Scene of the mesh and time-step study: the T-shirt of a given size, at a given time step.
 
 How much of every headline number is the mesh's or the time step's: numbers of two meshes are two definitions
 of the energy, of contact and of curvature, so they are reported and never judged.
@@ -24,7 +24,7 @@ WARM_UP = 2  # it starts at rest, and few frames are simulated
 def build(
     scene: Scene, assets: Assets, *, dependence: Dependence, vertices: int = 0, substeps: int = 1
 ) -> BuiltScene:
-    """vertices: asked for, or those of the middle mesh; substeps: time steps of a frame."""
+    """Build the scene; `vertices` of the garment, by default the middle mesh, and `substeps` of a frame."""
     garment = find_template(scene.garment).tailor(assets.body, vertices=vertices or dependence.middle)
     motion = make_motion(scene.motion).cut(0, dependence.frames)
     own = replace(assets, garments={scene.garment: garment}, motions={scene.motion: motion})

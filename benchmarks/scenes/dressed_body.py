@@ -1,4 +1,4 @@
-"""A body in a garment, doing one motion. The simulator sees the body as a moving mesh and nothing more.
+"""Scene of a body in a garment, doing one motion. The simulator sees the body as a moving mesh.
 
 Before the motion starts the garment settles: the body, already facing and standing as in the first frame,
 moves its limbs from the T-pose into the first pose, then holds still for a while. A part of a motion begins
@@ -34,7 +34,7 @@ def build(
     warm_up_frames: int,
     betas: tuple[float, ...] = (),
 ) -> BuiltScene:
-    """The built scene of a garment and a motion, or of the clip of it.
+    """Build the scene of a garment and a motion, or of the clip of it.
 
     warm_up_frames: at the beginning, not judged; fewer where the motion is short. betas: see shape_of, which
     says what is raised.
@@ -72,8 +72,9 @@ def build(
 
 
 def shape_of(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | None:
-    """The shape (S,) of which betas are the first coefficients, the others being zero; None, the mean,
-    without any. Raises ValueError for a body with fewer shapes.
+    """Return the shape (S,) whose first coefficients are `betas`, the others zero; None, the mean, for none.
+
+    Raises ValueError for a body with fewer shapes.
     """
     if not betas:
         return None
@@ -83,7 +84,7 @@ def shape_of(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | N
 
 
 def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
-    """The paper's terms of a garment; inertia comes with the time step."""
+    """Return the paper's terms of a garment; inertia comes with the time step."""
     return (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth))
 
 
@@ -91,7 +92,7 @@ def settled(
     cloth: Cloth, energies: tuple[Energy, ...], assets: Assets, garment: Garment, motion: Motion, frames: int,
     betas: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Positions (V,3) [m] of the cloth at rest on the body of that shape in the motion's first pose.
+    """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
     Raises RuntimeError when the simulation of the approach did not stay finite.
     """
@@ -120,9 +121,9 @@ def moved_along(
     start: np.ndarray,
     betas: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Positions and velocities (2,V,3) at the motion's last frame, from start (V,3) [m] at rest in its first.
+    """Simulate the motion; return positions and velocities (2,V,3) [m, m/s] at its last frame.
 
-    Raises RuntimeError when the simulation did not stay finite.
+    start: (V,3) [m] at rest in the first frame. Raises RuntimeError when the simulation did not stay finite.
     """
     aim = "reach the first frame of the clip"
     positions = _simulated(cloth, energies, body, garment, motion, start, betas, aim)
@@ -133,7 +134,7 @@ def _simulated(
     cloth: Cloth, energies: tuple[Energy, ...], body: Body, garment: Garment, motion: Motion,
     start: np.ndarray, betas: np.ndarray | None, aim: str,
 ) -> np.ndarray:  # fmt: skip
-    """Positions (T,V,3) [m] of every frame of the motion. Raises RuntimeError, with what it did not."""
+    """Simulate every frame of the motion, (T,V,3) [m]. Raises RuntimeError naming the missed `aim`."""
     posed = body.vertices(motion.poses, motion.translations, betas)
     handles = garment.pin_positions(body, motion.poses, motion.translations, betas)
     trajectory: Trajectory = simulate(

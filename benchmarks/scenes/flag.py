@@ -1,4 +1,4 @@
-"""A flag under gravity whose pole is swung to and fro: what moves it is its pinned edge alone."""
+"""Scene of a flag under gravity whose pole is swung to and fro: its pinned edge alone moves it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PERIOD = 1.0  # [s]
 
 
 def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
-    """The built scene; no assets are needed."""
+    """Build the scene; no assets are needed."""
     flat, faces = square_sheet(sheet_cells, SIZE)
     positions = np.stack([flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1)  # upright, in the plane of x and y
     pole = np.arange(sheet_cells + 1)  # the edge at the smallest x
@@ -23,7 +23,7 @@ def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames
     dt = 1.0 / 30.0
 
     def handles(frame: int) -> np.ndarray:
-        """The pole, swung sideways: from rest, so that the first frame has no jolt."""
+        """Return the pole in a frame, (P,3) [m]: it starts from rest, so that the first frame has no jolt."""
         phase = 2.0 * np.pi * frame * dt / PERIOD
         return positions[pole] + [0.0, 0.0, SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0]
 

@@ -1,4 +1,4 @@
-"""A thrown sheet under its weight alone: backward Euler's own discrete answer is exact.
+"""Scene of a thrown sheet under its weight alone: backward Euler's own discrete answer is exact.
 
     x_n = x_0 + n dt v_0 + g dt^2 n (n+1)/2
 
@@ -21,7 +21,7 @@ VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s]
 
 
 def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
-    """The built scene with its exact answer; no assets are needed."""
+    """Build the scene with its exact answer; no assets are needed."""
     positions, faces = square_sheet(sheet_cells, 0.4)
     cloth = Cloth(positions, faces, Material())
     dt, frames = 1.0 / 30.0, sheet_frames
@@ -37,7 +37,13 @@ def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames
 
 
 def exact_fall(start: np.ndarray, velocity: np.ndarray, dt: float, frames: int) -> np.ndarray:
-    """(T,V,3) [m] of backward Euler from start (V,3) [m] with one velocity (3,) [m/s]."""
+    """Return the exact steps (T,V,3) [m] of backward Euler from start (V,3) [m] with one velocity (3,) [m/s].
+
+    >>> import numpy as np
+    >>> fall = exact_fall(np.zeros((1, 3)), np.zeros(3), 0.1, 3)[:, 0, 1]
+    >>> [round(float(height), 4) for height in fall]
+    [0.0, -0.0981, -0.2943]
+    """
     n = np.arange(frames)[:, None, None]
     fall = np.array([0.0, -GRAVITY, 0.0]) * dt**2 * n * (n + 1) / 2
     return start + n * dt * velocity + fall

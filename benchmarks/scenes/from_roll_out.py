@@ -1,4 +1,4 @@
-"""A scene that a roll-out brings itself: its cloth at rest from a mesh, the body that it moves on, its start.
+"""Scene that a stored roll-out brings itself: cloth at rest from a mesh, body, and start from the file.
 
 So the pickles of HOOD and ContourCraft are judged, which name neither a motion nor a garment of this project.
 """
@@ -21,7 +21,7 @@ FEWEST = 4  # frames: two are not judged, and a mean is of more than one
 
 
 def declared(option: RollOutOption, rest_mesh: str) -> Scene:
-    """The scene of that roll-out. Raises RollOutError for a file that cannot be read, or has half a body."""
+    """Declare the scene of that roll-out. Raises RollOutError for an unreadable file, or half a body."""
     stated, stored = option.stated, read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
     gone = [name for name, half in halves.items() if half is None]
@@ -46,7 +46,7 @@ def build(
     scene: Scene, assets: object = None, *, path: str, rest_mesh: str, units: str, up: str, fps: float | None,
     digests: tuple[str, str],
 ) -> BuiltScene:  # fmt: skip
-    """The built scene; it starts at rest in the file's first frame. Raises RollOutError."""
+    """Build the scene; it starts at rest in the file's first frame. Raises RollOutError."""
     stored = read_roll_out(path)
     positions = to_metres_y_up(stored.positions, units=units, up=up)
     if len(positions) < FEWEST:
@@ -76,7 +76,7 @@ def build(
 
 
 def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> None:
-    """Raises RollOutError for a cloth (V,3) [m] larger than any that is a garment in a smaller unit."""
+    """Raise RollOutError for a cloth (V,3) [m] that is a garment in a smaller unit."""
     across = float(np.linalg.norm(np.ptp(rest_positions, axis=0)))
     low, high = GARMENT
     fit = [f"--units {unit}" for unit, m in METRES.items() if low <= across / METRES[units] * m <= high]
@@ -87,7 +87,7 @@ def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> No
 
 
 def _obstacle(stored: StoredRollOut, units: str, up: str) -> Obstacle | None:
-    """What the file says that the cloth touches; cloth may touch all of it."""
+    """Return the obstacle of the file, or None; cloth may touch all of it."""
     if stored.obstacle is None or stored.obstacle_faces is None:
         return None
     return Obstacle(to_metres_y_up(stored.obstacle, units=units, up=up), stored.obstacle_faces)

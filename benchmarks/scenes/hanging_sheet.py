@@ -1,4 +1,4 @@
-"""A square sheet pinned at two corners and let go from the horizontal. No obstacle, no body."""
+"""Scene of a square sheet pinned at two corners and let go from the horizontal, without an obstacle."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SIZE = 0.4  # [m]
 
 
 def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
-    """The built scene; no assets are needed."""
+    """Build the scene; no assets are needed."""
     positions, faces = square_sheet(sheet_cells, SIZE)
     # Tilted by half a degree: a flat sheet hanging flat is a saddle, from which symmetry alone would choose.
     positions[:, 1] += 0.01 * positions[:, 0]

@@ -1,4 +1,4 @@
-"""Motions of a thousand frames and more, for networks alone: does a garment end where it began, or wear out?
+"""Scenes of a thousand frames and more, for networks alone: does a garment end where it began?
 
 Nobody simulates so long, so there is no body to collide with. Of ten thousand frames the body alone would
 take gigabytes. Only some frames are kept: those of two stretches that show the same motion, early and late,
@@ -26,7 +26,7 @@ EVERY = 50  # one frame in so many of a loop is kept
 
 
 def build(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> BuiltScene:
-    """The motion in a loop for so many frames; there and back without that number."""
+    """Build the scene of the motion in a loop of `loop_frames`, or there and back without that number."""
     if loop_frames:
         motion, early, late = looped(make_motion(scene.motion), loop_frames)
         kept = np.unique(np.concatenate([np.arange(0, loop_frames, EVERY), early, late]))
@@ -50,7 +50,7 @@ def build(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> BuiltScene:
 
 
 def there_and_back(motion: Motion) -> Motion:
-    """The motion again and again, every second time backwards, for `FRAMES` frames or a few more.
+    """Return the motion again and again, every second time backwards, for `FRAMES` frames or a few more.
 
     Its last hundred frames show the same as its first.
     """
@@ -62,10 +62,13 @@ def there_and_back(motion: Motion) -> Motion:
 
 
 def looped(walk: Motion, frames: int) -> tuple[Motion, np.ndarray, np.ndarray]:
-    """The walk over and over for so many frames, its end led back into its start; the frames of its second
-    loop, and of the last whole one.
+    """Repeat the walk for so many frames, its end led back into its start.
 
-    Raises ValueError for fewer than three loops.
+    Returns:
+        The motion, the frames of its second loop, and those of the last whole one.
+
+    Raises:
+        ValueError: fewer than three loops.
     """
     back = transition(walk.poses[-1], walk.poses[0], LOOP_BLEND + 2)[1:-1]
     poses = np.concatenate([walk.poses, back])

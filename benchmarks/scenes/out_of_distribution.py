@@ -1,4 +1,4 @@
-"""A walk made hard: too fast, too far, too large a body, a glitch, another material. No training saw it.
+"""Scenes of a walk made hard: too fast, too far, an extreme body, a glitch, another material.
 
 All start in the walk's first pose and share its settled shirt; but for the extreme shapes, which start in
 T-pose in the shirt's own rest shape, fitted to that body.
@@ -38,7 +38,7 @@ def build(
     material: Mapping[str, float] | None = None,
     **options: Any,
 ) -> BuiltScene:
-    """The walk after `change`, one of CHANGES, with these options.
+    """Build the scene of the walk after `change`, one of CHANGES, with these options.
 
     betas: see dressed_body.shape_of, which says what is raised. material: factors on the material, of the
     simulator and of the energies that are measured.
@@ -74,23 +74,23 @@ def build(
 
 
 def ordinary(walk: Motion) -> Motion:
-    """Its first frames, as they are."""
+    """Return the first frames of the walk, as they are."""
     return walk.cut(0, ORDINARY)
 
 
 def faster(walk: Motion, times: int) -> Motion:
-    """Every so many-th frame."""
+    """Return every `times`-th frame of the walk."""
     return replace(walk, poses=walk.poses[::times], translations=walk.translations[::times])
 
 
 def another_faster(walk: Motion, times: int, other: str) -> Motion:
-    """Into the first pose of another motion, then that faster."""
+    """Return a way into the first pose of another motion, then that motion `times` faster."""
     motion = faster(make_motion(other), times)
     return _approached(walk, motion.poses, motion.translations)
 
 
 def posed(walk: Motion, degrees: Mapping[str, tuple[float, float, float]]) -> Motion:
-    """Into the walk's first pose with some joints at other angles, and a third of a second there."""
+    """Return a way into the walk's first pose with some joints at other angles, and STILL frames there."""
     pose = walk.poses[0].copy()
     for joint, angles in degrees.items():
         pose[JOINT[joint]] = np.deg2rad(angles)
@@ -98,7 +98,7 @@ def posed(walk: Motion, degrees: Mapping[str, tuple[float, float, float]]) -> Mo
 
 
 def from_t_pose(walk: Motion) -> Motion:
-    """From T-pose into the walk's first pose and ten frames on."""
+    """Return a way from T-pose into the walk's first pose, and STILL frames of the walk."""
     t_pose = np.zeros_like(walk.poses[0])
     t_pose[0] = walk.poses[0, 0]
     poses = np.concatenate([transition(t_pose, walk.poses[0], APPROACH), walk.poses[1:STILL]])
@@ -107,7 +107,7 @@ def from_t_pose(walk: Motion) -> Motion:
 
 
 def root_jumps(walk: Motion) -> Motion:
-    """One metre to the side for a single frame."""
+    """Return the walk with the root one metre to the side for a single frame."""
     motion = ordinary(walk)
     translations = motion.translations.copy()
     translations[GLITCH, 0] += 1.0
@@ -115,7 +115,7 @@ def root_jumps(walk: Motion) -> Motion:
 
 
 def limb_flips(walk: Motion) -> Motion:
-    """The left arm turned by 180 degrees about the chest's front axis for a single frame."""
+    """Return the walk with the left arm turned by 180 degrees about the chest's front axis for one frame."""
     motion, joint = ordinary(walk), JOINT["left_shoulder"]
     poses = motion.poses.copy()
     half = rotation_matrices(np.array([0.0, 0.0, np.pi]))
@@ -124,7 +124,7 @@ def limb_flips(walk: Motion) -> Motion:
 
 
 def _approached(walk: Motion, poses: np.ndarray, translations: np.ndarray) -> Motion:
-    """The walk's first pose, a smooth way to poses[0], then poses; the root goes on from where it stands."""
+    """Return the walk's first pose, a smooth way to poses[0], then poses; the root goes on from there."""
     way = transition(walk.poses[0], poses[0], APPROACH)
     stand = np.repeat(walk.translations[:1], APPROACH, axis=0)
     moved = walk.translations[0] + translations - translations[0]

@@ -1,4 +1,4 @@
-"""A square sheet dropped onto a resting sphere: contact without a body."""
+"""Scene of a square sheet dropped onto a resting sphere: contact without a body."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GAP = 0.02  # [m] between sphere and sheet at the start
 def build(
     scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int, family: str = ""
 ) -> BuiltScene:
-    """The built scene; no assets are needed.
+    """Build the scene; no assets are needed.
 
     family: of triangles, as `rectangle` has them; such a sheet lies on the sphere and is held at its middle,
     so that it drapes and does not slide off.

@@ -1,4 +1,4 @@
-"""A strip whose two ends turn against each other until it has made one turn: large rotations, folds."""
+"""Scene of a strip whose two ends turn against each other, one turn in all: large rotations, folds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CLOSER = 0.1  # share of the length by which the ends approach, so that the stri
 
 
 def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
-    """The built scene; no assets are needed."""
+    """Build the scene; no assets are needed."""
     across = max(2, sheet_cells // 2)
     positions, faces = sheet((round(across * LENGTH / WIDTH), across), (LENGTH, WIDTH))
     ends = np.flatnonzero(np.abs(np.abs(positions[:, 0]) - LENGTH / 2) < 1e-9)
@@ -24,7 +24,7 @@ def build(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames
     frames = sheet_frames
 
     def handles(frame: int) -> np.ndarray:
-        """Both ends turned about the strip's axis and moved together, with a smooth start and stop."""
+        """Return both ends in a frame, turned about the strip's axis and moved together, smoothly."""
         share = 0.5 - 0.5 * np.cos(np.pi * frame / (frames - 1))
         angle = TURN * share * side
         rest = positions[ends]

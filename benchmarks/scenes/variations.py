@@ -1,4 +1,4 @@
-"""Declarations of scenes beside the test motions: out of distribution, very long, other meshes and steps.
+"""Declarations of scenes besides the test motions: out of distribution, very long, other meshes and steps.
 
 Their metrics leave costs out, so nothing here is timed and several run side by side.
 """
@@ -34,7 +34,7 @@ def _scene(name: str, description: str, change: str, **options: Any) -> Scene:
 
 
 def _shapes(place: int, word: str, plus: str, minus: str) -> tuple[Scene, ...]:
-    """Shape coefficient `place` at +5 and at -5."""
+    """Declare shape coefficient `place` at +5 and at -5."""
     return tuple(
         _scene(f"{word}_{beta:+.0f}", f"shape coefficient {place} at {beta:+.0f}: {title}; the shirt's rest "
                "shape stays", "from_t_pose", betas=(*(0.0,) * place, beta))
@@ -82,7 +82,7 @@ SHAPES, SHAPE_SEED = 12, 2022  # of body shapes that no training has drawn
 
 
 def shapes(motion: str, garment: str = "tshirt") -> list[Scene]:
-    """The liveliest part of a motion on the mean body, and on others drawn as a training draws them.
+    """Declare the liveliest part of a motion on the mean body and on SHAPES bodies drawn as in training.
 
     The garment's rest state stays that of the mean body, in training, simulation and metrics alike.
     """
@@ -109,7 +109,7 @@ FRAME_RATE = 30
 
 
 def meshes_and_steps(sizes: Dependence) -> list[Scene]:
-    """The T-shirt on several meshes at one step a frame, and on the middle one at several."""
+    """Declare the T-shirt on several meshes at one step a frame, and on the middle one at several."""
     meshes = [
         _dependence(f"mesh/{count}", f"the walk by a T-shirt of about {count} vertices", vertices=count)
         for count in sizes.meshes
@@ -156,7 +156,7 @@ DRAPES = tuple(
 
 
 def there_and_back(motion: str, garment: str = "tshirt") -> Scene:
-    """A motion forwards and backwards for a thousand frames."""
+    """Declare a motion forwards and backwards for a thousand frames."""
     return Scene(
         name=f"{garment}/there_and_back",
         description=f"{motion} forwards and backwards for a thousand frames; networks alone",

@@ -1,1 +1,1 @@
-"""Declarations of methods, in blocks."""
+"""Declarations of methods: networks, ablations, equal data, solvers; and the trainings of networks."""

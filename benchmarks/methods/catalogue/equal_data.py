@@ -1,4 +1,4 @@
-"""Networks that learn from the same motions: the equal-data block. They run when they are named.
+"""Networks that learn from the same motions (equal data). They run when they are named.
 
 The last training motion is held out of all of them. Those that simulated vertices teach get the same mixed
 clips with every seed, simulated once; the others mix as many anew. All have SNUG's number of steps, or go on
@@ -36,7 +36,7 @@ def _training(name: str, mixed: int, *, converged: bool) -> Training:
 
 
 def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry:
-    """Its run time is that of the network whose data it changes: nobody asks for it again."""
+    """Declare a network on equal data. Not timed: its run time is that of the network of the usual data."""
     family = f"{name}-data" + "-converged" * converged
     data = f"original data and {mixed} augmented frames for each" if mixed else "original data"
     title = f"{label}, {mixed} augmented for each" if mixed else f"{label}, original data"
@@ -52,7 +52,7 @@ def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry
 
 
 def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry, ...]:
-    """All numbers at equal steps; the ends to convergence too, and each of these post-processed."""
+    """Declare all numbers at equal steps, the ends to convergence too, and these with post-processing."""
     equal = tuple(_entry(name, label, mixed, converged=False) for mixed in numbers)
     converged = tuple(_entry(name, label, mixed, converged=True) for mixed in ENDS)
     ends = (entry for entry in (*equal, *converged) if entry.reporting.level in ENDS)

@@ -1,4 +1,4 @@
-"""Solvers: the reference at other tolerances and time steps, and everything that stops before the minimum."""
+"""Solvers: variants of the reference, and solvers that stop before the minimum."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _truncated(
     family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
     counted: str = "iterations", dtype: str = "float64", conserving: bool = False, **options: Any,
 ) -> tuple[MethodEntry, ...]:  # fmt: skip
-    """One entry for each number of iterations, which is the option `counted` of the module."""
+    """Declare one entry for each number of iterations, which is the option `counted` of the module."""
     return tuple(
         MethodEntry(
             name=f"{family}-{count}",
@@ -54,7 +54,7 @@ def _truncated(
 def warm_started(
     base: str, label: str, solver: str, *, trained: str | None, pairing_group: str = ""
 ) -> tuple[MethodEntry, ...]:
-    """A network or skinning, and some iterations of "newton", "lbfgs" or "fast-lbfgs" from there."""
+    """Declare a network or skinning and some iterations of "newton", "lbfgs" or "fast-lbfgs" from it."""
     return tuple(
         MethodEntry(
             name=f"{base}+{solver}-{count}",

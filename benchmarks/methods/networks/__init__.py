@@ -1,1 +1,1 @@
-"""Methods that roll out a network, or need a body."""
+"""Methods that need a body: networks, skinning, post-processing, vertices optimised directly."""

@@ -1,4 +1,4 @@
-"""Collision clean-up after a prediction: vertices below or within 2 mm of the skin are pushed out to 2 mm.
+"""Collision post-processing: vertices below or within 2 mm of the skin are pushed out to 2 mm.
 
     x' = x + max(2 mm - n.(x - c), 0) n      c: closest body point that x may touch, n: the skin's normal
 
@@ -19,11 +19,15 @@ MARGIN = 2e-3  # [m]
 
 
 class CollisionPostProcessing:
-    """Pushes a garment off a body that moves in a known way.
+    """Push-out of a garment from a body that moves in a known way.
 
-    rest_positions (V, 3) of the garment and body_rest (B, 3), body_faces of the body in its T-pose, which say
-    what may touch what; body_positions (T, B, 3) [m] of each frame, any origin shared with the garment.
-    Raises ValueError where garment and body are nowhere near each other.
+    Args:
+        rest_positions: (V, 3) [m] of the garment.
+        body_rest, body_faces: (B, 3) [m] and (G, 3) of the body in T-pose, which say what may touch what.
+        body_positions: (T, B, 3) [m] of each frame; any origin shared with the garment.
+
+    Raises:
+        ValueError: garment and body are nowhere near each other.
     """
 
     def __init__(
@@ -38,7 +42,7 @@ class CollisionPostProcessing:
         self._faces: np.ndarray | None = None  # found last, where the next search begins
 
     def __call__(self, x: np.ndarray, frame: int) -> np.ndarray:
-        """Vertices (V, 3) [m] of a frame, pushed out where need be; the given ones are left as they are."""
+        """Return vertices (V, 3) [m] of a frame, pushed out where need be; `x` is left as it is."""
         patch, skin = self.patch, self.body[frame]
         patch.tree.refit(skin)
         # Exact at any depth, unlike the anchors of training: what lies deep must find the near way out.

@@ -1,4 +1,4 @@
-"""A bound: no network, the vertices of a whole clip optimised directly under the training loss.
+"""Lower bound: the vertices of a whole clip optimised directly under the training loss, without a network.
 
     min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3} inertia(x_t)
     inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
@@ -39,6 +39,7 @@ class ClipInertia(Inertia):
         self.frames = frames
 
     def value_and_gradient(self, x: np.ndarray, x_hat: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+        """Return the inertia of the whole clip [J] and its gradient at x (T V, 3)."""
         clip = x.reshape(self.frames, -1, 3)
         masses = self.masses.reshape(self.frames, -1, 1)[2:] / self.dt**2
         offset = clip[2:] - 2 * clip[1:-1] + clip[:-2]
@@ -50,7 +51,7 @@ class ClipInertia(Inertia):
         return 0.5 * float(np.vdot(force, offset)), gradient.reshape(x.shape)
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The diagonal alone, 1 + 4 + 1 of m/dt^2 where a frame has two neighbours on either side."""
+        """Return the diagonal alone: 1 + 4 + 1 of m/dt^2 where a frame has two neighbours on either side."""
         count = np.zeros(self.frames)
         for shift, weight in ((2, 1.0), (1, 4.0), (0, 1.0)):
             count[shift : self.frames - 2 + shift] += weight
@@ -59,12 +60,13 @@ class ClipInertia(Inertia):
 
 
 class DirectOptimisation(Method):
-    """One clip. `sums` holds the minimised sum [J] at the end of each round, with that round's planes.
+    """Direct optimisation of one clip. `sums`: minimised sum [J] at the end of each round.
 
     Raises ValueError for a scene with other terms than the paper's of a garment.
     """
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Lay the frames out as one cloth and start from skinning. Raises ValueError for other terms."""
         from snug.networks.dressed_body import DressedBody
         from snug.recipes.recipe import DEFAULT
 
@@ -95,6 +97,7 @@ class DirectOptimisation(Method):
         self.carried = float(gravity.weights.sum() * (heights - gravity.origin_height).sum())
 
     def run(self) -> Trajectory:
+        """Minimise the clip in rounds, contact planes searched anew before each."""
         x = self.start.reshape(-1, 3)
         self.sums: list[float] = []
         potential = Potential(self.terms)
@@ -131,7 +134,7 @@ class DirectOptimisation(Method):
         )
 
     def search(self, x: np.ndarray) -> None:
-        """Contact planes of all frames at x (T V, 3)."""
+        """Search the contact planes of all frames at x (T V, 3)."""
         obstacle, frames = self.scene.obstacle, self.scene.frames
         for single, whole in zip(self.scene.energies, self.terms):
             if not isinstance(single, ContactPenalty):
@@ -148,23 +151,23 @@ class DirectOptimisation(Method):
 
 
 def _identity(terms: Sequence[Energy]) -> list[Any]:
-    """What tells one list of terms from another."""
+    """Return type and parameters of each term, which tell two lists of terms apart."""
     return [(type(term), term.parameters()) for term in terms]
 
 
 def _kinds(contact: ContactPenalty) -> list[int]:
-    """Where edge midpoints and centroids begin among the samples of one frame."""
+    """Return where edge midpoints and centroids begin among the samples of one frame."""
     vertices, edges = contact.cloth.vertex_count, len(contact.cloth.edges)
     return [vertices, vertices + edges] if contact.samples == "all" else []
 
 
 def _by_kind(values: np.ndarray, kinds: list[int]) -> np.ndarray:
-    """(T, S, 3) of frames -> (T S, 3) in the whole cloth's order: all vertices, all edges, all centroids."""
+    """Reorder (T, S, 3) of frames to (T S, 3) of the whole cloth: all vertices, all edges, all centroids."""
     return np.ascontiguousarray(
         np.concatenate([part.reshape(-1, 3) for part in np.split(values, kinds, axis=1)])
     )
 
 
 def make(*, models: Path, seed: int) -> DirectOptimisation:
-    """The bound; it has no seed and no model."""
+    """Make the bound; it has no seed and no model."""
     return DirectOptimisation()

@@ -1,4 +1,4 @@
-"""The trained networks, rolled out one frame at a time as an application would run them."""
+"""Trained networks, rolled out one frame at a time as an application would run them."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from reference_sim.trajectory.trajectory import Trajectory
 
 @dataclass
 class Network(Method):
-    """A model read from its file. Features are made and the network is warmed up before run().
+    """Network read from its file. Features are made and the network is warmed up before run().
 
-    precision: that of its matrices, one of snug.networks.one_frame.PRECISIONS. then: what is done with each frame.
+    precision: of its matrices, one of snug.networks.one_frame.PRECISIONS.
+    then: applied to each frame, as post-processing.
     """
 
     path: Path
@@ -26,6 +27,7 @@ class Network(Method):
     then: Callable[[np.ndarray, int], np.ndarray] | None = field(default=None, init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Read the model, make the features and warm up. Not timed."""
         from snug.networks.dressed_body import DressedBody
         from snug.networks.roll_out import prepare_roll_out
         from snug.networks.trained_model import TrainedModel
@@ -40,10 +42,11 @@ class Network(Method):
         )  # fmt: skip
 
     def run(self) -> Trajectory:
+        """Roll out all frames."""
         return self.frames()
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Features and joint transforms."""
+        """Return a function of the frame that makes features and joint transforms."""
         from snug.networks.roll_out import prepare_frame_inputs
 
         assert scene.dressed is not None
@@ -52,18 +55,18 @@ class Network(Method):
         )
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
-        """What computes so many bodies in this motion at once when called: (T, copies, V, 3) [m]."""
+        """Return a function that computes `copies` bodies in this motion at once, (T, copies, V, 3) [m]."""
         from snug.networks.roll_out import prepare_batch
 
         return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
 
     def quasi_static(self) -> Trajectory:
-        """What the network holds to be static: each pose kept until nothing moves. Never on the clock."""
+        """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock."""
         from snug.networks.roll_out import roll_out
 
         return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
 
 
 def make(*, models: Path, seed: int, kind: str, precision: str = "float32") -> Network:
-    """The network of that name, "untrained" or one of benchmarks.methods.catalogue.trainings.TRAININGS, and seed."""
+    """Make the network of that name and seed: "untrained" or a key of TRAININGS in catalogue/trainings.py."""
     return Network(model_path(models, kind, seed), precision)

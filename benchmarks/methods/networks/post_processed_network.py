@@ -1,4 +1,4 @@
-"""A network followed by the 2 mm collision clean-up, as the released models run; both are on the clock."""
+"""Network followed by collision post-processing to 2 mm, as the released models run; both are timed."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 
 
 class PostProcessedNetwork(Network):
-    """A model read from its file, and the body that its garment is pushed out of, posed before run()."""
+    """Network read from its file, and the body that its garment is pushed out of, posed before run()."""
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Pose the body, compile the post-processing and prepare the network. Not timed."""
         from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 
         assert scene.dressed is not None and scene.obstacle is not None
@@ -34,6 +35,7 @@ class PostProcessedNetwork(Network):
         super().prepare(scene)
 
     def run(self) -> Trajectory:
+        """Roll out, each frame post-processed."""
         from benchmarks.methods.networks.collision_post_processing import MARGIN
 
         cleaned = super().run()
@@ -41,13 +43,13 @@ class PostProcessedNetwork(Network):
         return replace(cleaned, provenance=cleaned.provenance | said)
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Features, joint transforms and the posed body."""
+        """Return a function of the frame that makes features, joint transforms and the posed body."""
         assert scene.dressed is not None
         own, body = super().inputs(scene), posed_body(scene.dressed)
         return lambda frame: (own(frame), body(frame))
 
     def quasi_static(self) -> Trajectory:
-        """What the network holds to be static, cleaned up as well. Never on the clock."""
+        """Return the network's quasi-static solutions, post-processed as well. Never on the clock."""
         assert self.then is not None
         still = super().quasi_static()
         cleaned = [self.then(x, frame) for frame, x in enumerate(still.positions)]
@@ -55,5 +57,5 @@ class PostProcessedNetwork(Network):
 
 
 def make(*, models: Path, seed: int, kind: str) -> PostProcessedNetwork:
-    """The network of that name and seed, cleaned up after."""
+    """Make the network of that name and seed with post-processing."""
     return PostProcessedNetwork(model_path(models, kind, seed))

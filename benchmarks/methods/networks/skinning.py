@@ -1,4 +1,4 @@
-"""The garment follows the body's joints and nothing else: the free baseline that belongs in every table.
+"""Skinning alone: the garment follows the body's joints. The free baseline of every table.
 
 Weights are smoothed as much as those of the networks' default recipe, so that what a network adds to
 skinning is all that tells them apart.
@@ -20,6 +20,7 @@ class Skinning(Method):
     """One linear blend a frame; joint transforms are ready before, as for the networks."""
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Smooth the weights and make the joint transforms. Not timed."""
         from snug.networks.dressed_body import DressedBody
         from snug.networks.roll_out import prepare_skinned_frames
         from snug.recipes.recipe import DEFAULT
@@ -31,6 +32,7 @@ class Skinning(Method):
         self.faces = np.asarray(scene.cloth.faces)
 
     def run(self) -> Trajectory:
+        """Skin all frames."""
         from snug.networks.roll_out import collect_frames
 
         positions, seconds = collect_frames(self.frames(), np.arange(self.motion.frames))
@@ -43,16 +45,16 @@ class Skinning(Method):
         )
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Joint transforms."""
+        """Return a function of the frame that makes joint transforms."""
         from snug.networks.roll_out import prepare_frame_inputs
 
         return prepare_frame_inputs(None, self.dressed, self.motion, self.betas)
 
     def quasi_static(self) -> Trajectory:
-        """Its answer to poses held still: the same."""
+        """Return the roll-out itself: skinning has no dynamics."""
         return self.run()
 
 
 def make(*, models: Path, seed: int) -> Skinning:
-    """Skinning alone; it has no seed and no model."""
+    """Make skinning alone; it has no seed and no model."""
     return Skinning()

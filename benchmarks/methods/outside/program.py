@@ -1,4 +1,4 @@
-"""A method that is a program with its own environment: it reads an exported scene and writes a roll-out.
+"""Method that is a program with its own environment: it reads an exported scene and writes a roll-out.
 
 What its start, its imports and its files take is no work of the method, so the harness's clock says nothing
 of it. A time of its own that it writes beside the positions is reported, and marked as declared.
@@ -33,13 +33,19 @@ OURS = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")  # of this process: another e
 def program(
     name: str, command: str, *, seconds: float = SECONDS, description: str = "", **fields: Any
 ) -> MethodEntry:
-    """The entry of a program.
+    """Return the entry of a program.
 
-    command: words as in a shell, which is not used. {scene} becomes the folder of the exported scene, {out}
-    the npz file to be written: positions (T,V,3) [m], and what else benchmarks.score reads. In it
-    seconds_per_frame, one number, is its declared time. {seed} becomes the seed, for an entry that is seeded.
-    seconds: after which it is ended. fields: of MethodEntry, as label, files and needs_body.
-    Raises DeclarationError.
+    Args:
+        name: of the method.
+        command: words as in a shell, which is not used. {scene} becomes the folder of the exported scene,
+            {out} the npz file to be written: positions (T,V,3) [m], and what else benchmarks.score reads. In
+            it seconds_per_frame, one number, is its declared time. {seed} becomes the seed, for a seeded entry.
+        seconds: after which it is ended.
+        description: one line; by default that it is this program.
+        fields: of MethodEntry, as label, files and needs_body.
+
+    Raises:
+        DeclarationError: the command lacks {scene} or {out}.
     """
     for place in PLACES:
         if place not in command:
@@ -53,21 +59,23 @@ def program(
 
 @dataclass
 class Program(Stored):
-    """A roll-out that is written when it is asked for."""
+    """Roll-out that a program writes when it is asked for."""
 
     command: str = ""
     seconds: float = SECONDS
     seed: int = 0
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Nothing yet: all that is said of its time is what it says itself."""
+        """Remember the scene: the program's own start is no work of the method."""
         self.scene = scene
 
     def run(self) -> Trajectory:
-        """What the program writes, in a folder that is gone afterwards.
+        """Return what the program writes, in a folder that is gone afterwards.
 
-        Raises RuntimeError where it fails, WorkerDied where it takes too long, and RollOutError where what it
-        has written does not belong to the scene.
+        Raises:
+            RuntimeError: the program fails.
+            WorkerDied: it takes too long.
+            RollOutError: what it has written does not belong to the scene.
         """
         with tempfile.TemporaryDirectory(prefix="program-") as folder:
             exported, out, said = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))
@@ -119,12 +127,12 @@ def _said(said: Path) -> str:
 
 
 def _milliseconds(seconds: Any) -> float:
-    """[ms] of its number [s]. Raises ValueError where it is none."""
+    """Return [ms] of the program's number [s]. Raises ValueError where it is none."""
     if seconds.size != 1 or not 0.0 < float(seconds.item()) < 1e6:
         raise ValueError("seconds_per_frame of the program is no positive number of seconds")
     return 1e3 * float(seconds.item())
 
 
 def make(*, models: Path, seed: int, command: str, seconds: float) -> Program:
-    """A fresh one; it has no model."""
+    """Make a fresh one; it has no model."""
     return Program("", Stated(), command=command, seconds=seconds, seed=seed)

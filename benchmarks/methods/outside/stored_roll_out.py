@@ -1,4 +1,4 @@
-"""A roll-out that another program has made, from its file: judged as a method, and never timed as one."""
+"""Method that is a stored roll-out of another program: evaluated as a method, and never timed as one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from reference_sim import Trajectory
 
 @dataclass
 class Stored(Method):
-    """The positions of a file, once they have been found to belong to the scene."""
+    """Positions of a file, once they have been shown to belong to the scene."""
 
     path: str
     stated: Stated
@@ -33,11 +33,11 @@ class Stored(Method):
             raise RollOutError(str(error) if self.path in str(error) else f"{self.path}: {error}") from None
 
     def run(self) -> Trajectory:
-        """What the file holds."""
+        """Return the roll-out of the file."""
         return self._trajectory(self.stored.positions, self.stored)
 
     def quasi_static(self) -> Trajectory | None:
-        """What the file says of poses held still; None where it says nothing."""
+        """Return the quasi-static solutions of the file; None where it has none."""
         held = self.stored.quasi_static
         return None if held is None else self._trajectory(held, self.stored)
 
@@ -57,12 +57,12 @@ class Stored(Method):
 
 
 def make(*, models: Path, seed: int, path: str, digest: str, **stated: object) -> Stored:
-    """The roll-out of that file; digest is of its content, for the cache. It has no seed and no model."""
+    """Make the roll-out of that file, without seed or model; digest: of its content, for the cache."""
     return Stored(path, Stated(**stated))  # type: ignore[arg-type]
 
 
 def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
-    """The method of that scene; None where it has no file. Raises RollOutError for one that is not read."""
+    """Return the entry of that scene; None where it has no file. Raises RollOutError."""
     path = option.path_for(scene)
     if option.places and not Path(path).exists() and not glob.glob(path):
         return None

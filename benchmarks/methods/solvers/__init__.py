@@ -1,1 +1,1 @@
-"""Methods that minimise: the reference and solvers stopped early."""
+"""Methods that solve the time step: the reference, its variants, stopped solvers, warm starts."""

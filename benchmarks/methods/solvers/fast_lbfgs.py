@@ -1,4 +1,4 @@
-"""The compiled truncated solver: L-BFGS in float32 on planes that slide (reference_sim.minimise.compiled)."""
+"""L-BFGS compiled as a whole, in float32, on contact planes that slide (reference_sim.minimise.compiled)."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from reference_sim.minimise.compiled.sliding_obstacle import SlidingObstacle
 
 
 class FastSimulation(Simulation):
-    """A simulation whose obstacle slides; each run begins with an exact search, whatever was run before."""
+    """Simulation whose obstacle slides; each run begins with an exact search, whatever was run before."""
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Let the obstacle slide and prepare the simulation."""
         if scene.obstacle is not None:
             scene = replace(scene, obstacle=SlidingObstacle(scene.obstacle))
         super().prepare(scene)
 
     def run(self) -> Trajectory:
+        """Simulate all frames from an exact search on."""
         assert self.scene is not None
         if isinstance(self.scene.obstacle, SlidingObstacle):
             self.scene.obstacle.start_again()
@@ -28,5 +30,5 @@ class FastSimulation(Simulation):
 
 
 def make(*, models: Path, seed: int, iterations: int) -> FastSimulation:
-    """Each step by so many iterations."""
+    """Make a simulation whose every step is `iterations` of compiled L-BFGS."""
     return FastSimulation(options={"method": CompiledLBFGS, "max_iterations": iterations})

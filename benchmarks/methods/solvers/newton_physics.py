@@ -31,7 +31,7 @@ FAR = 100.0  # [m] from the origin, where a vertex has flown away
 
 
 class NewtonCloth:
-    """A solver of newton bound to one cloth.
+    """Solver of newton bound to one cloth.
 
     Args:
         solver: "VBD" or "XPBD".
@@ -55,7 +55,7 @@ class NewtonCloth:
         self.substeps = substeps
 
     def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (V, 3) [m] and velocities [m/s] after one frame of dt [s] from x and v, in float64."""
+        """Return positions (V, 3) [m] and velocities [m/s] a frame of dt [s] after x and v, in float64."""
         now, then = self._states
         now.particle_q.assign(x.astype(np.float32))
         now.particle_qd.assign(v.astype(np.float32))
@@ -67,20 +67,21 @@ class NewtonCloth:
 
 @dataclass
 class NewtonSolver(Method):
-    """One solver of newton on one scene without contact."""
+    """Method of one solver of newton on a scene without contact."""
 
     solver: str
     iterations: int
     substeps: int
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Build the model and let it compile, by one frame that nobody looks at."""
+        """Build the model and let it compile, by one frame that is thrown away."""
         self.scene = scene
         counts = {"iterations": self.iterations, "substeps": self.substeps}
         self.newton = NewtonCloth(scene.cloth, self.solver, **counts)
         self.newton.advance(scene.start, np.zeros_like(scene.start), scene.dt)
 
     def run(self) -> Trajectory:
+        """Advance all frames; stop where a vertex is not finite or flew away."""
         scene = self.scene
         x = scene.start
         v = scene.start_velocity
@@ -119,7 +120,7 @@ class NewtonSolver(Method):
 
 
 def build_model(cloth: Cloth, solver: str) -> Any:
-    """The newton.Model of `cloth` for "VBD" or "XPBD", with the parameters of the table above."""
+    """Build the newton.Model of `cloth` for "VBD" or "XPBD", with the parameters of the table above."""
     import newton
     import warp
 
@@ -163,7 +164,7 @@ def build_model(cloth: Cloth, solver: str) -> Any:
 
 
 def _two_areas(cloth: Cloth, edges: np.ndarray) -> np.ndarray:
-    """(E,) A1 + A2 [m^2] of newton's edges (opposite, opposite, start, end); 1 for a boundary edge."""
+    """Return A1 + A2 (E,) [m^2] of newton's edges (opposite, opposite, start, end); 1 for a boundary edge."""
     x = cloth.rest_positions
     inner = (edges >= 0).all(axis=1)
     a, b, start, end = edges[inner].T
@@ -175,7 +176,7 @@ def _two_areas(cloth: Cloth, edges: np.ndarray) -> np.ndarray:
 
 
 def spring_stiffness(cloth: Cloth) -> np.ndarray:
-    """(E,) [N/m] for `cloth.edges`: E2 (A1 + A2)/l0^2, which is near an isotropic sheet of modulus E2.
+    """Return E2 (A1 + A2)/l0^2 (E,) [N/m] of `cloth.edges`, near an isotropic sheet of modulus E2.
 
     The area-weighted springs of Van Gelder (1998). They cannot have our Poisson ratio.
     """
@@ -192,5 +193,5 @@ def spring_stiffness(cloth: Cloth) -> np.ndarray:
 
 
 def make(*, models: Path, seed: int, solver: str, iterations: int, substeps: int) -> NewtonSolver:
-    """The solver "VBD" or "XPBD" of newton."""
+    """Make the solver "VBD" or "XPBD" of newton."""
     return NewtonSolver(solver, iterations, substeps)

@@ -1,4 +1,4 @@
-"""The simulation of the scene with energies of another material.
+"""Reference simulation with energies of another material, evaluated by the energies that the scene declares.
 
 It is judged, as every method, by the energies that the scene declares. Its start is theirs too.
 """
@@ -19,30 +19,31 @@ from snug.training.losses.pbns_material import BENDING
 
 @dataclass(kw_only=True)
 class OtherMaterial(Simulation):
-    """The reference with other energies in places. exchange: one of EXCHANGES."""
+    """Reference simulation with some energies exchanged. exchange: one of EXCHANGES."""
 
     exchange: str
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Exchange the energies and prepare; the start stays that of the scene's own material."""
         start = scene.start_state
         energies = tuple(map(EXCHANGES[self.exchange], scene.energies))
         super().prepare(dataclasses.replace(scene, energies=energies, settle=lambda: start))
 
 
 def _printed_bending(term: Energy) -> Energy:
-    """k/2 theta^2 of each hinge, as the SNUG paper prints it, not scaled."""
+    """Return hinges as the SNUG paper prints them, k/2 theta^2 each, not scaled; other terms as they are."""
     if not isinstance(term, BendHinge):
         return term
     return BendHinge(term.cloth, scaling="none", rest_angles=term.rest_angles)
 
 
 def _springs(term: Energy) -> Energy:
-    """k (l - l0)^2 of each edge, the membrane that recipe `springs` trains on."""
+    """Return k (l - l0)^2 of each edge, which recipe `springs` trains on, in place of the membrane."""
     return StretchSpring(term.cloth) if isinstance(term, StretchStVK) else term
 
 
 def _pbns_springs(term: Energy) -> Energy:
-    """PBNS's own springs and hinges, which recipe `pbns-springs` trains on; the weight stays the scene's."""
+    """Return PBNS's springs and hinges, as recipe `pbns-springs` has them; the weight is the scene's."""
     own = _printed_bending(_springs(term))
     if isinstance(own, BendHinge):
         own.stiffness = np.full(len(own.stencils), 2.0 * BENDING)
@@ -53,5 +54,5 @@ EXCHANGES = {"printed-bending": _printed_bending, "springs": _springs, "pbns-spr
 
 
 def make(*, models: Path, seed: int, exchange: str) -> OtherMaterial:
-    """The reference with that exchange."""
+    """Make the reference with that exchange."""
     return OtherMaterial(options={}, exchange=exchange)

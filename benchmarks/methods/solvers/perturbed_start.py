@@ -1,4 +1,4 @@
-"""The reference once more, its start moved a little: how far apart two right answers are.
+"""Perturbed reference: the reference from a start moved a little, which shows the spread of valid answers.
 
 Wrinkling cloth has several minima, and which one is reached hangs on the last digits. What these runs differ
 by is the uncertainty of whatever is compared with the reference.
@@ -18,14 +18,15 @@ from benchmarks.scene import BuiltScene
 
 @dataclass
 class PerturbedStart(Simulation):
-    """A simulation from a start whose free vertices are each moved by `shift` [m] in a random direction.
+    """Simulation from a start whose free vertices are each moved by `shift` [m] in a random direction.
 
-    The directions hang on the shift: no two of these runs are moved alike.
+    The directions are seeded by the shift, so that every run is perturbed differently.
     """
 
     shift: float = 0.0
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Move the start and prepare the simulation."""
         seed = np.float64(self.shift).view(np.uint64)
         direction = np.random.default_rng(int(seed)).standard_normal(scene.start.shape)
         direction *= self.shift / np.linalg.norm(direction, axis=1, keepdims=True)
@@ -35,5 +36,5 @@ class PerturbedStart(Simulation):
 
 
 def make(*, models: Path, seed: int, shift: float) -> PerturbedStart:
-    """The reference from a moved start."""
+    """Make the reference from a start perturbed by `shift` [m]."""
     return PerturbedStart(options={}, shift=shift)

@@ -1,4 +1,4 @@
-"""What a solver added to a network's frame, carried by the skin to the next frame.
+"""Transport of a solver's residual: what it added to a network's frame is carried by the skin to the next.
 
 A network's error changes slowly: cloth that it puts too deep, or hangs too stiffly, is so in the next frame
 too. So the next first guess is the network's frame and a share of the last residual, turned as skinning turns
@@ -16,10 +16,11 @@ from reference_sim.kernels.kernel_cache import njit
 
 
 class ResidualTransport:
-    """Turns vectors at the vertices of a garment from one frame of a motion to the next.
+    """Vectors at the vertices of a garment, turned from one frame of a motion to the next.
 
     Args:
-        weights: (V, J) of skinning. transforms: (T, J, 3, 4) of the joints, as for `snug.body.skinning.skin`.
+        weights: (V, J) of skinning.
+        transforms: (T, J, 3, 4) of the joints, as for `snug.body.skinning.skin`.
     """
 
     def __init__(self, weights: Tensor, transforms: Tensor) -> None:
@@ -28,12 +29,12 @@ class ResidualTransport:
         self._last: tuple[int, Any] = (-1, None)  # a frame, and the blended transforms there
 
     def _blended(self, frame: int) -> np.ndarray:
-        """Linear parts (V, 9)."""
+        """Return the blended linear parts (V, 9) of a frame."""
         linear = self._transforms[frame, :, :, :3].reshape(len(self._transforms[frame]), 9)
         return self._weights @ linear
 
     def carried(self, residual: np.ndarray, frame: int) -> np.ndarray:
-        """Vectors (V, 3) of frame - 1 as they are in `frame`."""
+        """Return vectors (V, 3) of frame - 1 as they are in `frame`."""
         before = self._last[1] if self._last[0] == frame - 1 else self._blended(frame - 1)
         after = self._blended(frame)
         self._last = frame, after
@@ -44,7 +45,7 @@ class ResidualTransport:
 
 @njit(cache=True)
 def _turn(vectors: np.ndarray, before: np.ndarray, after: np.ndarray, out: np.ndarray) -> None:
-    """after before^T v: blends are close to rotations, and their transpose never amplifies."""
+    """Write after before^T v: blends are close to rotations, and their transpose never amplifies."""
     for v in range(len(vectors)):
         for i in range(3):
             out[v, i] = 0.0

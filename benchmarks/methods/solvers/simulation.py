@@ -1,4 +1,4 @@
-"""The reference simulator, to its full tolerance: every other method is measured against it."""
+"""Reference solver, to its full tolerance: every other method is compared with it."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from reference_sim import Trajectory, simulate
 
 @dataclass
 class Simulation(Method):
-    """Steps minimised until the gradient is within tolerance, or stopped after `max_iterations` a step."""
+    """Simulation whose steps are minimised to a tolerance, or stopped after `max_iterations` a step."""
 
     options: dict[str, Any]
     scene: BuiltScene | None = None
     told: bool = False
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Settle the start, and compile the kernels by simulating two frames that nobody looks at."""
+        """Settle the start, and compile the kernels by simulating two frames that are thrown away."""
         self.scene = scene
         self._simulate(frames=min(2, scene.frames))
 
     def run(self) -> Trajectory:
-        """All frames."""
+        """Simulate all frames."""
         assert self.scene is not None
         # Hours at the paper's scale: a bar with the time left, a microsecond of a frame's milliseconds.
         # Once: short runs are done again until enough time is measured.
@@ -51,5 +51,5 @@ class Simulation(Method):
 
 
 def make(*, models: Path, seed: int, **options: Any) -> Simulation:
-    """A simulation to the reference's own tolerance and time step, or to those in the options."""
+    """Make a simulation with the reference's tolerance and time step, or with those in the options."""
     return Simulation(options=options)

@@ -8,7 +8,7 @@ from benchmarks.methods.solvers.simulation import Simulation
 
 
 def make(*, models: Path, seed: int, iterations: int) -> Simulation:
-    """A simulation whose every step is `iterations` sweeps of vertex block descent."""
+    """Make a simulation whose every step is `iterations` sweeps of vertex block descent."""
     from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
 
     return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})

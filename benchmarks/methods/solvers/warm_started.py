@@ -1,4 +1,4 @@
-"""A network's frame, or skinning's, as the first guess of a step, and a few iterations of a solver from it.
+"""Warm-started solver: a network's frame, or skinning's, as first guess of a step, then a few iterations.
 
 The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while the
 network sees what it always sees. The potential of the step is frozen as for every solver (contact planes at
@@ -31,7 +31,7 @@ SHARE = 0.6  # of the last residual
 
 
 class FromElsewhere:
-    """A minimiser that starts each step where `starts` says, whatever guess it is given."""
+    """Minimiser that starts each step where `starts` says, whatever guess it is given."""
 
     def __init__(self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray) -> None:
         self._inner, self._starts, self._pins = inner, starts, pins
@@ -44,9 +44,10 @@ class FromElsewhere:
 
 
 class WithResidual(FromElsewhere):
-    """The same, and SHARE of what the inner minimiser added to the last frame, carried by the skin.
+    """Minimiser that adds SHARE of the last frame's residual, carried by the skin, to each start.
 
-    first: (V, 3) [m] what the start of the scene adds to frame 0 from elsewhere.
+    The residual is what the inner minimiser added to the last frame. first: (V, 3) [m] what the start of the
+    scene adds to frame 0 of the starts.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class WithResidual(FromElsewhere):
         self._added, self._carry, self._frame = first, carry, 0
 
     def minimise(self, x0: np.ndarray) -> Result:
+        """Run from the next start and the carried residual."""
         self._frame += 1
         given = next(self._starts)
         start = given + SHARE * self._carry.carried(self._added, self._frame)
@@ -68,7 +70,7 @@ class WithResidual(FromElsewhere):
 
 @dataclass
 class WarmStarted(Method):
-    """A simulation whose steps start at frames from elsewhere and are cut short.
+    """Simulation whose steps start at frames of a network or of skinning and are cut short.
 
     residual: whether the last frame's residual is carried. simulation: what does the steps.
     Raises ValueError for a scene of several steps a frame: there is a start for its last alone.
@@ -82,6 +84,7 @@ class WarmStarted(Method):
     of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
+        """Prepare the network or skinning, and the solver that starts from its frames."""
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
         frames = self._frames(scene)
@@ -100,16 +103,17 @@ class WarmStarted(Method):
         self.simulation.prepare(scene)
 
     def run(self) -> Trajectory:
+        """Simulate all frames."""
         return self.simulation.run()
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Those of the network or of skinning, and the posed body."""
+        """Return a function of the frame: inputs of the network or of skinning, and the posed body."""
         assert scene.dressed is not None
         body = posed_body(scene.dressed)
         return lambda frame: (self.of_guess(frame), body(frame))
 
     def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
-        """What gives world positions (V, 3) [m] frame after frame, from the first one on, at each call."""
+        """Return a function that yields world positions (V, 3) [m], frame after frame, at each call."""
         from snug.networks.dressed_body import DressedBody
         from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
         from snug.networks.trained_model import TrainedModel
@@ -136,7 +140,7 @@ class WarmStarted(Method):
 
 
 def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:
-    """`iterations` of "newton", "lbfgs" or "fast-lbfgs" from the network of kind `guess`, or from "skinning".
+    """Make `iterations` of "newton", "lbfgs" or "fast-lbfgs" from the network `guess`, or from "skinning".
 
     With "fast-lbfgs" the last residual is carried.
     """

@@ -8,7 +8,7 @@ from benchmarks.methods.solvers.simulation import Simulation
 
 
 def make(*, models: Path, seed: int, iterations: int) -> Simulation:
-    """A simulation whose every step is `iterations` sweeps of XPBD."""
+    """Make a simulation whose every step is `iterations` sweeps of XPBD."""
     from benchmarks.methods.minimisers.xpbd import XPBD
 
     return Simulation(options={"method": XPBD, "max_iterations": iterations})

@@ -1,1 +1,1 @@
-"""Metrics of cost, and of what a network was trained on."""
+"""Metrics of cost and of training data: cost/*, solver/*, training_distance/*, performance/*."""

@@ -1,4 +1,4 @@
-"""What a method costs: declared here, taken from clocks, processes and trainings by benchmarks.runner.rows."""
+"""Metrics cost/*: declared here, taken from clocks, processes and trainings by benchmarks.runner.rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Metrics of microbenchmarks: times, sizes and memory under `performance/`; performance/ measures them."""
+"""Metrics performance/*: times, sizes and memory that microbenchmarks measure (benchmarks.performance)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PROCESS_MEMORY = f"{PART}/process_memory"
 
 
 def _metrics(*declared: Metric, table: str = "") -> tuple[Metric, ...]:
-    """These metrics as columns of the table of that part."""
+    """Return these metrics as columns of the table of that part."""
     name = f"{PART}_{table}" if table else PART
     return tuple(replace(metric, table=name) for metric in declared)
 

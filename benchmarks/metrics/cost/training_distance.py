@@ -1,4 +1,4 @@
-"""How new the poses of a scene are to a network: the distance of each to the nearest pose that it trained on.
+"""Metrics training_distance/*: distance of each pose of a scene to the nearest that the network trained on.
 
 Mixed training poses count. See snug.motion.motion.nearest_pose for the distance.
 """
@@ -29,6 +29,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return median and 95th percentile of these distances over frames [degrees]."""
     from snug.motion.motion import nearest_pose
 
     dressed, known = roll_out.scene.dressed, roll_out.training_poses

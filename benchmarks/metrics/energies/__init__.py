@@ -1,1 +1,1 @@
-"""Metrics of energy."""
+"""Metrics of energy: energy/*, excess/*, gap/*, step/* and gradient/norm."""

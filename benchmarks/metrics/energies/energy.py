@@ -1,4 +1,4 @@
-"""Energy of every declared term at every frame of a trajectory, by the very terms that were minimised.
+"""Metrics energy/*: every declared term at every frame, by the very terms that were minimised.
 
 Each method is judged on its own history: inertia compares a frame with the two before it in the same
 trajectory, and contact planes are searched at the method's own positions. A frame before the third has no
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metric import Metric, skinned
-from benchmarks.metrics.energies.time_step import own_terms
+from benchmarks.metrics.energies.replayed_step import copied_terms
 from reference_sim.energies.gravity import Gravity
 
 if TYPE_CHECKING:
@@ -60,11 +60,22 @@ METRICS = (
 def energy_series(
     scene: BuiltScene, trajectories: Sequence[NDArray[np.float64]]
 ) -> list[dict[str, NDArray[np.float64]]]:
-    """Of each trajectory (T,V,3) [m]: term -> (T,) [J], plus "total". Terms not declared have no entry.
+    """Return energies of each trajectory: term -> (T,) [J], plus "total".
 
     Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
+
+    Args:
+        scene: its terms are evaluated; terms that are not declared have no entry.
+        trajectories: positions (T,V,3) [m] each.
+
+    >>> from benchmarks.presets import find_preset
+    >>> from benchmarks.scenes import find_scene
+    >>> scene = find_scene("hanging_sheet").at(find_preset("smoke")).build()
+    >>> still = scene.cloth.rest_positions[None].repeat(3, axis=0)
+    >>> {term: abs(round(float(series[2]), 9)) for term, series in energy_series(scene, [still])[0].items()}
+    {'strain': 0.0, 'bending': 0.0, 'gravity': 0.0, 'inertia': 0.0, 'total': 0.0}
     """
-    own = [own_terms(scene) for _ in trajectories]
+    own = [copied_terms(scene) for _ in trajectories]
     found = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]
     for frame in range(max(map(len, trajectories), default=0)):
         for positions, terms, series in zip(trajectories, own, found):
@@ -104,7 +115,7 @@ def _terms_at(
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Means over the judged frames [J per frame]."""
+    """Return mean energies over the evaluated frames [J per frame], and the correlation of inertia."""
     found = energies(roll_out)
     means = {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in found.items()}
     correlation = correlation_with_body(roll_out)
@@ -112,11 +123,12 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
+    """Return energies of every frame, (T,) [J] each."""
     return {f"energy/{term}": series for term, series in energies(roll_out).items()}
 
 
 def energies(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
-    """Term -> (T,) [J], and "total"; of all roll-outs of the scene at once."""
+    """Return term -> (T,) [J], and "total"; computed for all roll-outs of the scene at once."""
     return roll_out.group.kept(_of_all)[roll_out.place]
 
 
@@ -125,8 +137,9 @@ def _of_all(group: SceneRollOuts) -> list[dict[str, NDArray[np.float64]]]:
 
 
 def correlation_with_body(roll_out: RollOut) -> float | None:
-    """Of the method's accelerations with the body's; None without a body, where frames of the motion are left
-    out, or where one of them does not vary.
+    """Return the correlation of the method's accelerations with the body's.
+
+    None without a body, where frames of the motion are left out, or where one of the two does not vary.
     """
     group = roll_out.group
     bare = group.kept(skinned)
@@ -143,8 +156,14 @@ def correlation_with_body(roll_out: RollOut) -> float | None:
 def accelerations(
     positions: NDArray[np.float64], masses: NDArray[np.float64], dt: float
 ) -> NDArray[np.float64]:
-    """(T,) root mean square by mass of the second difference of positions (T,V,3) [m] [m/s^2]; the first two
-    are 0. Half the whole mass times dt^2 times its square is the inertia energy.
+    """Return root mean square accelerations by mass, (T,) [m/s^2]; the first two are 0.
+
+    Half the whole mass times dt^2 times their square is the inertia energy.
+
+    Args:
+        positions: (T,V,3) [m].
+        masses: (V,) [kg].
+        dt: [s].
     """
     found = np.zeros(len(positions))
     squared = (np.diff(positions, 2, axis=0) ** 2).sum(2)

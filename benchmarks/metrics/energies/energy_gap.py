@@ -1,4 +1,4 @@
-"""How far a frame is from the minimum of its own time step: in energy, millimetres, curvature and force.
+"""Metrics gap/*, step/* and gradient/norm: how far a frame is from the minimum of its own time step.
 
 At frame t the step's objective is Phi(x) = inertia + all declared terms, with x_hat from the method's own
 two previous frames and contact planes frozen at the step's initial guess x_0 (the same guess as the
@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metric import Estimate, Metric, skinned
-from benchmarks.metrics.energies.time_step import own_terms, prepare
+from benchmarks.metrics.energies.replayed_step import copied_terms, freeze_step
 from benchmarks.metrics.surface.curvature import boundary_mask, mean_curvature
 
 if TYPE_CHECKING:
@@ -104,6 +104,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
+    """Return gaps, one-step distances and the gradient left, of the sampled frames."""
     group = roll_out.group
     scale = group.kept(gap_scale)
     found: dict[str, float | Estimate] = {}
@@ -118,7 +119,7 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
 
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
-    """step/vertices (T,V) [mm]: how far each vertex lies from y_t; nan in frames that were not looked at."""
+    """Return step/vertices (T,V) [mm]: distance of each vertex to y_t; nan in other than sampled frames."""
     away = roll_out.kept(_judge_steps).away
     shown = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
     for frame, distances in away.items():
@@ -133,7 +134,7 @@ def _judge_steps(roll_out: RollOut) -> Optimality:
 
 
 def gap_scale(group: SceneRollOuts) -> float | None:
-    """[J] of the scene; None without a reference that has a judged frame."""
+    """Return the scale [J] of the scene; None without a reference that has an evaluated frame."""
     reference = group.reference
     frames = [] if reference is None else list(_judged(group.scene, reference.positions))
     if reference is None or not frames:
@@ -141,7 +142,7 @@ def gap_scale(group: SceneRollOuts) -> float | None:
     potential, bare = _potential(group.scene), group.kept(skinned)
     above = []
     for frame in frames:
-        guess = prepare(group.scene, potential, reference.positions, frame)
+        guess = freeze_step(group.scene, potential, reference.positions, frame)
         start = guess if bare is None else np.ascontiguousarray(bare[frame])
         here = np.ascontiguousarray(reference.positions[frame])
         above.append(potential.value(start) - potential.value(here))
@@ -150,8 +151,10 @@ def gap_scale(group: SceneRollOuts) -> float | None:
 
 @dataclass
 class Optimality:
-    """What was found at sampled frames, of `judged` in all. found_by: whose minimum was the lowest; of equals
-    the first in FINDERS. refrozen: at the first of these frames alone. away: frame -> (V,) [mm] from y_t.
+    """Numbers of the sampled frames, of `judged` in all.
+
+    found_by: number of frames whose lowest minimum each found; of equals the first in FINDERS. refrozen: at
+    the first of these frames alone. away: frame -> (V,) [mm] from y_t.
     """
 
     judged: int = 0
@@ -165,7 +168,7 @@ class Optimality:
     away: dict[int, Floats] = field(default_factory=dict)
 
     def estimate(self, values: list[float]) -> Estimate:
-        """Mean, and its standard error as a sample of the judged frames; 0 where all were looked at."""
+        """Return the mean and its standard error as a sample of the judged frames; 0 for all of them."""
         count = len(values)
         if count >= self.judged:
             return Estimate(float(np.mean(values)), 0.0)
@@ -174,7 +177,7 @@ class Optimality:
         return Estimate(float(np.mean(values)), float(error))
 
     def metrics(self) -> dict[str, float | Estimate]:
-        """gap/*, step/* and gradient/norm; empty without a frame."""
+        """Return gap/*, step/* and gradient/norm; empty without a frame."""
         if not self.gaps:
             return {}
         means = {
@@ -186,7 +189,7 @@ class Optimality:
         return found | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
 
     def precise(self, scale: float) -> bool:
-        """Whether the gap is known well enough."""
+        """Return whether the standard error of the gap is small enough."""
         gap = self.estimate(self.gaps)
         return gap.uncertainty <= max(PRECISION * abs(gap.value), LEAST * scale)
 
@@ -194,7 +197,17 @@ class Optimality:
 def optimality(
     scene: BuiltScene, positions: Floats, *, samples: int, scale: float | None = None
 ) -> Optimality:
-    """Judge positions (T,V,3) [m] at `samples` frames or more, see above; scale [J] of the scene's gaps."""
+    """Solve the time steps of at least `samples` frames again and compare, as the module says.
+
+    Args:
+        scene: its terms and its step.
+        positions: (T,V,3) [m] of a roll-out.
+        samples: number of frames; more are solved until the gap is precise.
+        scale: [J] of the scene's gaps.
+
+    Returns:
+        The numbers of each sampled frame; nan where a frame has no finite energy.
+    """
     from reference_sim.minimise.descent import mean_weight
     from reference_sim.minimise.lbfgs import LBFGS
 
@@ -204,7 +217,7 @@ def optimality(
     inner = ~boundary_mask(scene.cloth.faces, scene.cloth.vertex_count)
     for frame in spread(frames):
         x = np.ascontiguousarray(positions[frame])
-        guess = prepare(scene, potential, positions, frame)
+        guess = freeze_step(scene, potential, positions, frame)
         here, gradient = potential.value_and_gradient(x)
         if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
             found.gaps, found.local, found.gradients = [np.nan], [np.nan], [np.nan]
@@ -224,7 +237,7 @@ def optimality(
         found.distances.append(float(np.sqrt((found.away[frame] ** 2).mean())))
         found.curvatures.append(_curvature_error(x, y, scene.cloth.faces, inner))
         if scene.obstacle is not None and len(found.refrozen) < samples:
-            prepare(scene, potential, positions, frame, guess=x)
+            freeze_step(scene, potential, positions, frame, guess=x)
             found.refrozen.append(potential.value(x) - min(potential.value(x), minimiser.minimise(x).energy))
         if len(found.gaps) >= samples and found.precise(scale or 0.0):
             break
@@ -232,18 +245,22 @@ def optimality(
 
 
 def _judged(scene: BuiltScene, positions: Floats) -> range:
-    """Frames; none where a frame is not one time step."""
+    """Return the frames that are evaluated; none where a frame is not one time step."""
     return range(scene.warm_up, len(positions) if scene.substeps == 1 else 0)
 
 
 def _potential(scene: BuiltScene) -> Potential:
     from reference_sim import Potential
 
-    return Potential(own_terms(scene))
+    return Potential(copied_terms(scene))
 
 
 def spread(frames: range) -> Iterator[int]:
-    """All of the frames, in an order whose every beginning is spread evenly: halves, quarters, eighths."""
+    """Yield all of the frames, in an order whose every beginning is spread evenly: halves, quarters.
+
+    >>> list(spread(range(2, 10)))
+    [2, 6, 4, 8, 3, 7, 5, 9]
+    """
     count = len(frames)
     bits = max(count - 1, 1).bit_length()
     for place in range(1 << bits):
@@ -253,7 +270,7 @@ def spread(frames: range) -> Iterator[int]:
 
 
 def _curvature_error(x: Floats, y: Floats, faces: NDArray[np.int64], inner: NDArray[np.bool_]) -> float:
-    """|H(x) - H(y)| [1/m] of inner vertices, mean by the areas of y (V,3)."""
+    """Return the mean of |H(x) - H(y)| [1/m] over inner vertices, by the areas of y (V,3) [m]."""
     if not inner.any():
         return 0.0
     ours, _ = mean_curvature(x, faces)

@@ -1,4 +1,4 @@
-"""Energies above the lowest found: a total has an arbitrary zero, the pelvis; a difference has none.
+"""Metrics excess/*: energy above that of the vertices optimised directly, the lowest found.
 
 The lowest is what optimising all vertices of the scene directly has found (the method whose role is "bound"):
 what a dresser could reach whose output were not bound to its input. It is the lowest in the sum of all terms,
@@ -29,6 +29,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the mean excess [J per frame], with and without gravity; empty without the bound."""
     lowest = roll_out.group.find(role="bound")
     if lowest is None or lowest is roll_out:
         return {}

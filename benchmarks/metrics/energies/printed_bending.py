@@ -1,4 +1,4 @@
-"""The bending of the same hinges as the SNUG paper prints them, beside the scaled ones of its code.
+"""Metric energy/bending_printed: bending of the same hinges as the SNUG paper prints them, not scaled.
 
 Papers of the field give one or the other under the same name. It is no part of the total.
 """
@@ -24,7 +24,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """[J per frame], where the scene's own hinges are scaled."""
+    """Return the mean [J per frame]; empty where the scene's own hinges are not scaled."""
     from reference_sim.energies import BendHinge
 
     hinges = [term for term in roll_out.scene.energies if isinstance(term, BendHinge)]

@@ -1,4 +1,4 @@
-"""Which laws of a backward-Euler step a roll-out keeps, frame by frame, whoever made it.
+"""Metrics conservation/*: which laws of a backward-Euler step a roll-out keeps, frame by frame.
 
 For the step from x, v to x', v' = (x' - x)/dt the laws are, with every external force at x':
 
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from benchmarks.metric import Metric
 from benchmarks.metrics.energies.energy import FIRST_FULL_FRAME
-from benchmarks.metrics.energies.time_step import own_terms, step_to
+from benchmarks.metrics.energies.replayed_step import copied_terms, step_to
 from reference_sim.material import GRAVITY
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Of the reference, skinning, what was trained, and the cheapest solvers, which stand beside networks."""
+    """Return how far each law is broken, for the methods that are declared `conserving`."""
     if roll_out not in _asked(roll_out.group):
         return {}
     laws = roll_out.group.kept(_laws_of)[roll_out]
@@ -93,14 +93,14 @@ def _asked(group: SceneRollOuts) -> list[RollOut]:
 
 
 def _laws_of(group: SceneRollOuts) -> dict[RollOut, LawSeries]:
-    """Of all that are asked at once: they share the search trees."""
+    """Return the laws of all conserving roll-outs at once: they share the search trees."""
     asked = _asked(group)
     return dict(zip(asked, law_series(group.scene, [roll_out.positions for roll_out in asked])))
 
 
 @dataclass(frozen=True)
 class LawSeries:
-    """What each step leaves undone, of the frames that have two before them: (T - 2,) each.
+    """Residuals of the laws at each step, of the frames that have two before them: (T - 2,) each.
 
     force: |P' - P - dt sum F|/dt [N]; torque: the same of angular momentum [N m]; rise and climb: how far
     energy and descent are broken [J], below zero where they hold, and the size [J] of what they compare;
@@ -117,7 +117,7 @@ class LawSeries:
     residual_rms: Floats
 
     def metrics(self, first: int = 0) -> dict[str, float]:
-        """Means over the steps from `first` on, and shares of these [%] that break an inequality."""
+        """Return means over the steps from `first` on, and shares of these [%] that break an inequality."""
         judged = slice(first, None)
         broken = (self.rise > RISE * self.size)[judged]
         climbed = (self.climb > RISE * self.size)[judged]
@@ -134,11 +134,17 @@ class LawSeries:
 
 
 def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSeries]:
-    """Of each trajectory (T,V,3) [m]; T at least 3. For scenes without pins, whose forces nobody knows,
-    and of one step a frame.
+    """Return the laws of each trajectory, of a scene without pins and of one step a frame.
 
     Frames are the outer loop, and within a frame first all guesses, then all planes: the obstacle's search
-    tree of a frame is made once. Raises ValueError for another scene or a trajectory too short.
+    tree of a frame is made once.
+
+    Args:
+        scene: its terms; pins have forces that nobody knows.
+        trajectories: positions (T,V,3) [m] each, T at least 3.
+
+    Raises:
+        ValueError: another scene, or a trajectory too short.
     """
     from reference_sim import Potential
 
@@ -149,7 +155,7 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
     frames = [len(positions) for positions in trajectories]
     if frames and min(frames) <= FIRST_FULL_FRAME:
         raise ValueError(f"scene {scene.name}: a law needs {FIRST_FULL_FRAME + 1} frames, not {min(frames)}")
-    own = [Potential(own_terms(scene)) for _ in trajectories]
+    own = [Potential(copied_terms(scene)) for _ in trajectories]
     # Angular momentum is taken about the pelvis, or the origin where there is no body.
     pivots = np.zeros((scene.frames, 3)) if scene.dressed is None else scene.dressed.pelvis
     found: list[list[tuple[float, ...]]] = [[] for _ in trajectories]
@@ -168,7 +174,7 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
 def _one_step(
     scene: BuiltScene, potential: Potential, step: Step, x: Floats, pivot: Floats
 ) -> tuple[float, ...]:
-    """The numbers of LawSeries for the step that ended at x (V,3) [m]; the potential is prepared for it."""
+    """Return the numbers of LawSeries for the step that ended at x (V,3) [m]; the potential is prepared."""
     dt, m = scene.dt, scene.cloth.masses
     before, v, after = step.previous, step.velocity, (x - step.previous) / scene.dt
     end = np.ascontiguousarray(x)

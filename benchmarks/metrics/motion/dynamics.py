@@ -1,4 +1,4 @@
-"""The dynamic metrics of a dressed scene: the hem of a method beside those of the simulator. See hem.py."""
+"""Metrics dynamics/*: the hem of a method against the simulator's. Formulas stand in hem.py."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the distance to the quasi-static solution [mm] and, for the reference, its own dynamics."""
     x, group = roll_out.positions, roll_out.group
     own = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
     found: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
@@ -51,8 +52,9 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """By the method's own answer to poses held still and, under other names, by the simulator's. Where nobody
-    knows the own one, what it does not enter is left.
+    """Return dynamics by the method's own quasi-static solution and, as common_*, by the simulator's.
+
+    Without an own solution the numbers are left out that it enters.
     """
     hem, x, own = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
     if hem is None:
@@ -69,13 +71,14 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 
 def series(roll_out: RollOut) -> dict[str, np.ndarray]:
+    """Return curves of the hem to be drawn over time."""
     reference = roll_out.group.reference
     hem = None if reference is None else reference.kept(hem_motion)
     return {} if hem is None else hem.curves(roll_out.positions)
 
 
 def hem_motion(reference: RollOut) -> HemMotion | None:
-    """What to measure hems of this scene in; None without a body or the simulator's static answer."""
+    """Return the frame of reference of the scene's hems; None without a body or a quasi-static solution."""
     group, dressed = reference.group, reference.scene.dressed
     if dressed is None or group.quasi_static is None:
         return None

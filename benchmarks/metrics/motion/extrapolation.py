@@ -1,4 +1,4 @@
-"""How a method bears what it was not made for: strain, distance from skinning, penetration, recovery.
+"""Metrics motion/*: a method on what it was not made for: strain, distance from skinning, recovery.
 
 Each is held against the same method in the scene's counterpart, the ordinary walk. A network never hears of
 another material: its energy is by the one that it should have heard of. A network's shirt that has left the
@@ -58,6 +58,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the metrics of a scene that was made hard, each against the same method's ordinary walk."""
     scene, x, whole = roll_out.scene, roll_out.positions, roll_out.trajectory.positions
     bare = roll_out.group.kept(skinned)
     assert scene.dressed is not None and bare is not None
@@ -84,6 +85,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None:
+    """Return that a network diverged whose garment left the body, or None."""
     far = values["motion/offset"] / MM
     if roll_out.entry.trained and far > LOST:
         return "diverged", f"a vertex came {far:.2g} m away from the skinned shirt"
@@ -91,7 +93,7 @@ def judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None
 
 
 def strains(cloth: Cloth, positions: np.ndarray) -> np.ndarray:
-    """(T,) [J] membrane energy of positions (T,V,3) [m]; infinite where a position is not finite."""
+    """Return the membrane energy of positions (T,V,3) [m], (T,) [J]; infinite where one is not finite."""
     from reference_sim.energies import StretchStVK
 
     term, finite = StretchStVK(cloth), np.isfinite(positions).all(axis=(1, 2))

@@ -1,4 +1,4 @@
-"""Does cloth move by itself, or only follow the pose? Measured on the hem, in the axes of the body's root.
+"""Dynamics of a hem: does cloth move by itself, or only follow the pose? In the axes of the body's root.
 
 A method's dynamic part is what motion adds to its own static answer:
 
@@ -36,39 +36,44 @@ LEAST = 1e-6  # [m] rms of a dynamic part that is none
 
 
 def in_root_frame(positions: Array, rotations: Array, origins: Array) -> Array:
-    """Positions (T,V,3) [m] in the axes of the root: rotations (T,3,3) root to world, origins (T,3) [m]."""
+    """Return positions (T,V,3) [m] in the axes of the root: rotations (T,3,3) to world, origins (T,3) [m]."""
     return np.einsum("tji,tvj->tvi", rotations, positions - origins[:, None])
 
 
 def dynamic_part(moving: Array, static: Array) -> Array:
-    """D (T,H,3) [m] of a hem and of its static answer to the same frames, both (T,H,3) in the root frame."""
+    """Return D (T,H,3) [m] of a hem and its quasi-static solution, both (T,H,3) in the root frame."""
     difference = moving - static
     return difference - difference.mean(axis=0)
 
 
 def root_mean_square(part: Array) -> float:
-    """Of vectors (T,H,3): sqrt of the mean squared length."""
+    """Return the square root of the mean squared length of vectors (T,H,3)."""
     return float(np.sqrt((part**2).sum(axis=-1).mean()))
 
 
 def amplitude(part: Array, reference: Array) -> float:
-    """rms of D (T,H,3) over that of the reference's; nan where the reference has none."""
+    """Return the rms of D (T,H,3) over that of the reference's; nan where the reference has none.
+
+    >>> import numpy as np
+    >>> amplitude(np.full((2, 1, 3), 0.01), np.full((2, 1, 3), 0.02))
+    0.5
+    """
     if root_mean_square(reference) < LEAST:
         return float("nan")
     return root_mean_square(part) / root_mean_square(reference)
 
 
 def correlation(part: Array, reference: Array) -> float:
-    """Cosine between D (T,H,3) and the reference's, as vectors of all numbers; nan where one is zero."""
+    """Return the cosine between D (T,H,3) and the reference's, as vectors; nan where one is zero."""
     if min(root_mean_square(part), root_mean_square(reference)) < LEAST:
         return float("nan")
     return float(np.vdot(part, reference) / (np.linalg.norm(part) * np.linalg.norm(reference)))
 
 
 def hem_yaw(hem: Array, axes: Array) -> Array:
-    """Turn (T,) [rad] of a hem (T,H,3) about the vertical since frame 0, world: best rotation of its shape.
+    """Return the turn (T,) [rad] of a hem about the vertical since frame 0: best rotation of its shape.
 
-    axes: (T,3,3) root to world; the hem is given in the root's axes.
+    hem: (T,H,3) in the root's axes; axes: (T,3,3) root to world.
     """
     world = np.einsum("tij,tvj->tvi", axes, hem)
     flat = (world - world.mean(axis=1, keepdims=True))[..., [2, 0]]  # z, x: the yaw is positive from z to x
@@ -78,9 +83,10 @@ def hem_yaw(hem: Array, axes: Array) -> Array:
 
 
 def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
-    """(g, l [frames]) for which g static(t - l) fits moving(t), both (T,) less their means; l within MAX_LAG.
+    """Return g and l [frames] for which g static(t - l) fits moving(t), both (T,) less their means.
 
-    Lags are tried in hundredths of a frame by linear interpolation; before its first frame a signal rests.
+    Lags within MAX_LAG are tried in hundredths of a frame by linear interpolation; before its first frame a
+    signal rests.
     """
     frames = np.arange(len(static), dtype=np.float64)
     moving = moving - moving.mean()
@@ -99,7 +105,7 @@ def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
 
 
 def response(moving: Array, static: Array, axes: Array) -> tuple[float, float]:
-    """Gain and lag [frames] of a hem (T,H,3) in the root frame to its static one; nan where that rests."""
+    """Return gain and lag [frames] of a hem (T,H,3) to its quasi-static one; nan where that rests."""
     turn = hem_yaw(static, axes)
     if turn.std() >= TURNING:
         return gain_and_lag(hem_yaw(moving, axes), turn)
@@ -112,7 +118,7 @@ def response(moving: Array, static: Array, axes: Array) -> tuple[float, float]:
 
 
 def stop_frame(poses: Array, translations: Array) -> int | None:
-    """Last frame (its pose stays from then on) of a body that holds still for HELD frames, or None."""
+    """Return the last frame of a body that then holds still for HELD frames, or None."""
     still = np.all(poses == poses[-1], axis=tuple(range(1, poses.ndim)))
     still &= np.all(translations == translations[-1], axis=1)
     first = len(still) - int(np.argmin(still[::-1])) if not still.all() else 0
@@ -120,13 +126,13 @@ def stop_frame(poses: Array, translations: Array) -> int | None:
 
 
 def ringing(hem: Array, stop: int) -> Array:
-    """rms distance (6,) [m] of a hem (T,H,3) in the root frame to its last, AFTER frames after `stop`."""
+    """Return rms distances (6,) [m] of a hem (T,H,3), in the root frame, to its last, AFTER frames on."""
     away = hem[[stop + after for after in AFTER]] - hem[-1]
     return np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
 
 
 def acceleration_spectrum(hem: Array, dt: float) -> Array:
-    """S(f) of a hem (T,H,3): rms over vertices of the amplitude of its acceleration, Hann window."""
+    """Return S(f) of a hem (T,H,3): rms over vertices of its acceleration's amplitude, Hann window."""
     acceleration = np.diff(hem, n=2, axis=0) / dt**2
     window = np.hanning(len(acceleration) + 2)[1:-1, None, None]
     amplitudes = np.abs(np.fft.rfft(window * acceleration, axis=0))
@@ -134,14 +140,14 @@ def acceleration_spectrum(hem: Array, dt: float) -> Array:
 
 
 def spectrum_distance(hem: Array, reference: Array, dt: float) -> float:
-    """sum |S - S_ref| / sum S_ref of two hems (T,H,3) over the same frames."""
+    """Return sum |S - S_ref| / sum S_ref of two hems (T,H,3) over the same frames."""
     ours, theirs = acceleration_spectrum(hem, dt), acceleration_spectrum(reference, dt)
     return float(np.abs(ours - theirs).sum() / theirs.sum()) if theirs.any() else float("nan")
 
 
 @dataclass(frozen=True)
 class HemMotion:
-    """What dynamics are measured in: the body's root, when it stops, and the simulator's two answers.
+    """Frame of reference of dynamics: the body's root, when it stops, and the simulator's two answers.
 
     axes: (T,3,3) root to world; origins: (T,3) [m]; stop: frame or None; hem: vertices (H,); simulated and
     quasi_static: the simulator's positions (T,V,3) [m], world; dt [s]; first: frame that is judged.
@@ -157,12 +163,12 @@ class HemMotion:
     first: int = 0
 
     def of(self, positions: Array) -> Array:
-        """The hem (T,H,3) in the root frame of positions (T,V,3) [m]."""
+        """Return the hem (T,H,3) in the root frame of positions (T,V,3) [m]."""
         frames = len(positions)
         return in_root_frame(positions[:, self.hem], self.axes[:frames], self.origins[:frames])
 
     def curves(self, positions: Array) -> dict[str, Array]:
-        """To be drawn over time: yaw of the hem against the root [rad], its rms distance to its end [m]."""
+        """Return curves over time: yaw of the hem against the root [rad], its rms distance to its end [m]."""
         hem = self.of(positions)
         # In the root's own axes the root does not turn: what is left is the hem's lead and overshoot.
         own = np.broadcast_to(np.eye(3), (len(hem), 3, 3))
@@ -170,7 +176,7 @@ class HemMotion:
         return {"hem/yaw": hem_yaw(hem, own), "hem/from_end": away}
 
     def measure(self, positions: Array, static: Array | None = None) -> dict[str, float]:
-        """Every dynamic metric of positions (T,V,3), [1], [frames] or [mm]; what is not defined is left out.
+        """Return every dynamic metric of positions (T,V,3), [1], [frames] or [mm]; undefined ones left out.
 
         static: (T,V,3), the method's own answer to poses held still; None takes the simulator's.
         """

@@ -1,4 +1,4 @@
-"""Does a garment look the same when the same motion comes again, a thousand frames later?
+"""Metrics roll_out/*: does a garment look the same when the same motion comes again, much later?
 
 Energies are those of the cloth alone (strain, bending, inertia), which need no body; the first two frames of
 either stretch have no inertia and are left out.
@@ -36,6 +36,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return energies [J] of the early and the late stretch, and the drift between both [mm]."""
     scene, x = roll_out.scene, roll_out.positions
     if scene.repeated is None or scene.dressed is None or len(x) < scene.frames:
         return {}

@@ -1,1 +1,1 @@
-"""Metrics of a surface, from positions alone."""
+"""Metrics of a surface, from positions alone: curvature/*, distance/*, penetration/*, shape, body."""

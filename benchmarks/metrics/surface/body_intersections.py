@@ -1,4 +1,4 @@
-"""Does the body pass through itself? Cloth in such a fold has nowhere to be, whichever method moves it.
+"""Metrics body/self_intersection*: does the body pass through itself? Cloth in such a fold has no place.
 
 Asked of the motion, so of the reference's rows alone.
 """
@@ -32,6 +32,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the share of vertices in the worst sampled frame [%], and that frame; of the reference alone."""
     scene, frames = roll_out.scene, len(roll_out.positions)
     if roll_out.entry.role != "reference" or scene.dressed is None or scene.obstacle is None:
         return {}
@@ -47,7 +48,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(B,) which vertices x (B,3) [m] of a closed surface, faces (F,3) outward, are inside another part.
+    """Return which vertices x (B,3) [m] of a closed surface, faces (F,3) outward, are inside another part.
 
     There the winding number of the surface around a point a little off the vertex, along its normal, is one.
     """

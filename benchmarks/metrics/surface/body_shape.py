@@ -1,4 +1,4 @@
-"""How far a body is from the mean one; said once, with the reference."""
+"""Metric body/shape: how far a body is from the mean one; in the reference's rows alone."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the norm of the shape coefficients; of the reference alone."""
     dressed = roll_out.scene.dressed
     if roll_out.entry.role != "reference" or dressed is None:
         return {}

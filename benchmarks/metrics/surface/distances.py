@@ -1,4 +1,4 @@
-"""Distances between surfaces and into the body, from positions alone. No physics here."""
+"""Metrics distance/*, penetration/* and drift/hem: distances between surfaces and into the body."""
 
 from __future__ import annotations
 
@@ -56,6 +56,7 @@ METRICS = (
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """Return distances [mm] of the same vertices to the reference's."""
     frames = roll_out.judged_beside(reference.positions)
     x, y = roll_out.positions[frames], reference.positions[frames]
     return {
@@ -65,6 +66,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return penetration into the obstacle, and the drift of the hem on a body."""
     scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
     if scene.obstacle is None:
         return {}
@@ -84,7 +86,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def inside_of(roll_out: RollOut) -> Penetration:
-    """How deep its vertices lie in the obstacle; of all roll-outs of the scene at once."""
+    """Return the penetration of a roll-out; computed for all roll-outs of the scene at once."""
     return roll_out.group.kept(_of_all)[roll_out.place]
 
 
@@ -94,31 +96,40 @@ def _of_all(group: SceneRollOuts) -> list[Penetration]:
 
 
 def rms(x: Floats, y: Floats) -> float:
-    """Root mean square distance [mm] between the vertices of x and y (T,V,3) [m], over all frames."""
+    """Return the root mean square distance [mm] between vertices of x and y (T,V,3) [m], over all frames.
+
+    >>> import numpy as np
+    >>> rms(np.zeros((2, 4, 3)), np.full((2, 4, 3), [0.003, 0.0, 0.004]))
+    5.0
+    """
     return MM * float(np.sqrt((distance_rms(x, y) ** 2).mean()))
 
 
 def distance_rms(positions: Floats, reference: Floats) -> Floats:
-    """(T,) root mean square distance [m] between the same vertices of (T,V,3) and (T,V,3) [m].
+    """Return the root mean square distance between the same vertices of each frame, (T,) [m].
 
-    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read
-    this beside the spread between two references, never alone.
+    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read this
+    beside the spread between two references, never alone.
     """
     return np.sqrt(((positions - reference) ** 2).sum(2).mean(1))
 
 
 @dataclass(frozen=True)
 class Penetration:
-    """Per frame, over all vertices with none left out: share below the skin and depth (0 outside) [m]."""
+    """Penetration per frame, over all vertices with none left out: share and depth (0 outside) [m]."""
 
     share: Floats  # (T,)
     depth: Floats  # (T,V)
 
 
 def penetration(trajectories: Sequence[Floats], obstacle: Obstacle) -> list[Penetration]:
-    """How deep the vertices of each trajectory (T,V,3) [m] lie in the obstacle, by its true signed distance.
+    """Return how deep the vertices of each trajectory lie in the obstacle, by its signed distance.
 
     All trajectories are asked about together at each frame: the obstacle's search tree is made once.
+
+    Args:
+        trajectories: positions (T,V,3) [m] each.
+        obstacle: with a signed distance, as a body.
     """
     depths = [np.empty(positions.shape[:2]) for positions in trajectories]
     for frame in range(max(map(len, trajectories), default=0)):
@@ -132,10 +143,15 @@ def penetration(trajectories: Sequence[Floats], obstacle: Obstacle) -> list[Pene
 
 
 def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats) -> Floats:
-    """(T,V) depth [m] of positions (T,V,3) under the part of the body that each vertex belongs to.
+    """Return the depth of each vertex under the part of the body that it belongs to, (T,V) [m].
 
     The true signed distance also counts cloth in the fold of a hip or between arm and chest, which no eye
-    sees; this one measures against the faces near a vertex's own rest position (V,3) alone.
+    sees; this one measures against the faces near a vertex's own rest position alone.
+
+    Args:
+        positions: (T,V,3) [m].
+        obstacle: the body.
+        rest_positions: (V,3) [m] of the garment.
     """
     depth = np.empty(positions.shape[:2])
     for frame, x in enumerate(positions):
@@ -146,9 +162,14 @@ def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats
 
 
 def hem_drift(positions: Floats, hem: NDArray[np.int64], origin_heights: Floats) -> float:
-    """How far the hem's mean height above the pelvis has risen from the first frame to the last [m].
+    """Return how far the hem's mean height above the pelvis rose from the first frame to the last [m].
 
-    positions (T,V,3) [m], hem: vertex indices, origin_heights (T,) [m]. A shirt that crept up stays up.
+    A shirt that crept up stays up.
+
+    Args:
+        positions: (T,V,3) [m].
+        hem: (H,) vertices.
+        origin_heights: (T,) [m] of the pelvis.
     """
     heights = positions[:, hem, 1].mean(1) - origin_heights[: len(positions)]
     return float(heights[-1] - heights[0])

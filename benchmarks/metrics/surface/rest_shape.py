@@ -1,4 +1,4 @@
-"""How far a frame is from the shape that the cloth was cut in: edges, areas and folds. No physics here."""
+"""Metrics deformation/*, dihedral/mean, intersections/triangles: a frame against the cloth's rest shape."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    from benchmarks.metrics.surface.intersections import intersecting_share
+    """Return changes of edges and areas [%], folds [degrees] and self-intersections [%]."""
+    from benchmarks.metrics.surface.self_intersections import intersecting_share
 
     cloth, x = roll_out.scene.cloth, roll_out.positions[roll_out.judged]
     return {
@@ -48,20 +49,26 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def edge_change(positions: Floats, edges: Indices, rest_lengths: Floats) -> Floats:
-    """(T,) mean over edges of |length / rest length - 1| [1]; positions (T,V,3), rest lengths (E,) [m]."""
+    """Return the mean over edges of |length / rest length - 1| of each frame, (T,) [1].
+
+    positions: (T,V,3) [m]; edges: (E,2); rest_lengths: (E,) [m].
+    """
     vectors = positions[:, edges[:, 1]] - positions[:, edges[:, 0]]
     return np.abs(np.linalg.norm(vectors, axis=2) / rest_lengths - 1.0).mean(1)
 
 
 def area_change(positions: Floats, faces: Indices, rest_areas: Floats) -> Floats:
-    """(T,) mean over faces of |area / rest area - 1| [1]; positions (T,V,3) [m], rest areas (F,) [m^2]."""
+    """Return the mean over faces of |area / rest area - 1| of each frame, (T,) [1].
+
+    positions: (T,V,3) [m]; faces: (F,3); rest_areas: (F,) [m^2].
+    """
     corners = positions[:, faces]
     normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
     return np.abs(0.5 * np.linalg.norm(normals, axis=2) / rest_areas - 1.0).mean(1)
 
 
 def dihedral_angle(positions: Floats, hinges: Indices) -> Floats:
-    """(T,) mean over inner edges of the angle between the normals of their two faces [rad], 0 where flat.
+    """Return the mean angle between normals of neighbouring faces of each frame, (T,) [rad]; 0 where flat.
 
     hinges: (H,4) the edge's ends, then the tip of either face.
     """

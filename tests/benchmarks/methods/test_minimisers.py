@@ -12,7 +12,7 @@ from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
 from benchmarks.methods.minimisers.kernels import block
 from benchmarks.methods.minimisers.xpbd import XPBD
 from benchmarks.methods.solvers.warm_started import FromElsewhere, WarmStarted
-from benchmarks.metrics.energies.time_step import first_guess
+from benchmarks.metrics.energies.replayed_step import first_guess
 from benchmarks.scenes.free_fall import exact_fall
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import (

@@ -27,8 +27,8 @@ from benchmarks.metrics.surface.curvature import (
     mean_curvature,
 )
 from benchmarks.metrics.surface.distances import distance_rms, hem_drift, own_part_depth, penetration
-from benchmarks.metrics.surface.intersections import intersecting, intersecting_share
 from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
+from benchmarks.metrics.surface.self_intersections import intersecting, intersecting_share
 from benchmarks.results.row import Row
 from benchmarks.runner.rows import remarked
 from reference_sim import Obstacle, Trajectory, simulate

@@ -91,7 +91,8 @@ def test_numbers_of_the_reference_are_as_uncertain_as_right_simulations_differ()
     def row(method, metric, value, uncertainty=None):
         entry = find_method(method)
         return Row(
-            "garments", "tshirt/x", method, 0, metric, "J", value, role=entry.role, family=entry.reporting.family,
+            "garments", "tshirt/x", method, 0, metric, "J", value, role=entry.role,
+            family=entry.reporting.family,
             uncertainty=uncertainty,
         )  # fmt: skip
 

@@ -58,7 +58,8 @@ assert result.status == "converged", result.reason
 print(*sys.modules)
 """
 BODY = (
-    "snug.body.parametric_body", "snug.networks.dressed_body", "snug.networks.regressor", "igl", "reference_sim.obstacle",
+    "snug.body.parametric_body", "snug.networks.dressed_body", "snug.networks.regressor", "igl",
+    "reference_sim.obstacle",
     "reference_sim.contact.closest_point", "reference_sim.contact.collisions",
 )  # fmt: skip
 CONTACT = ("reference_sim.energies.contact_penalty", "reference_sim.energies.contact_barrier")

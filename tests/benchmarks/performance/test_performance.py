@@ -175,7 +175,7 @@ def fail(settings):
     [("die", "the process ended with status 7"), ("fail", "ValueError: no such thing")],
 )
 def test_one_that_dies_or_raises_is_a_row_and_exit_1(function, reason, tmp_path, without_report, capsys):
-    bad = Microbenchmark(name="bad/one", description="", module="test_performance", function=function)
+    bad = Microbenchmark(name="bad/one", description="", module=__name__, function=function)
     assert execution.execute(plan_of(tmp_path, bad, SMALL_SHEET)) == 1
     first, *others = RunFolder(tmp_path).read_rows()
     assert (first.metric, first.status, first.reason) == (PROCESS_MEMORY, "failed", reason)

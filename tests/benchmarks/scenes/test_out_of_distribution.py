@@ -177,7 +177,8 @@ def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
             still = roll_out(model, dressed, scene.dressed.motion, betas, quasi_static=True)
             assert np.array_equal(made.quasi_static().positions, still.positions)
         if method == "snug+cleanup":
-            clean = CollisionPostProcessing(dressed.garment.rest_positions, dressed.body.shaped(), dressed.body.faces,
+            clean = CollisionPostProcessing(
+                dressed.garment.rest_positions, dressed.body.shaped(), dressed.body.faces,
                             scene.obstacle.positions)  # fmt: skip
             assert np.array_equal(x, [clean(frame, number) for number, frame in enumerate(by_hand)])
             assert not np.array_equal(x, by_hand)

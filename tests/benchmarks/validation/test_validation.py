@@ -69,7 +69,8 @@ def test_how_a_number_is_judged(monkeypatch, found, expected, tolerance, status)
 
     monkeypatch.setattr(known_surfaces, "torus_order", lambda: found)
     case = Case(
-        name="planted", description="", reason="planted", module=known_surfaces.__name__, function="torus_order",
+        name="planted", description="", reason="planted", module=known_surfaces.__name__,
+        function="torus_order",
         expected=expected, tolerance=tolerance,
     )  # fmt: skip
     row = case.run()

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.metrics.energies.energy import energy_series
 from benchmarks.metrics.energies.energy_gap import optimality
-from benchmarks.metrics.energies.time_step import own_terms, prepare
+from benchmarks.metrics.energies.replayed_step import copied_terms, freeze_step
 from benchmarks.metrics.motion.conservation import law_series
 from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene
@@ -135,11 +135,11 @@ def test_energies_on_a_plane_are_those_that_were_minimised(kind):
 def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
     scene, trajectory = judged
     x, frame = trajectory.positions, FRAMES - 3
-    own, row = Potential(own_terms(scene)), Potential(own_terms(scene))
-    prepare(scene, own, x, 4)  # a frame of before, far from this one
-    guess = prepare(scene, own, x, frame)
+    own, row = Potential(copied_terms(scene)), Potential(copied_terms(scene))
+    freeze_step(scene, own, x, 4)  # a frame of before, far from this one
+    guess = freeze_step(scene, own, x, frame)
     for t in range(1, frame + 1):
-        last = prepare(scene, row, x, t)
+        last = freeze_step(scene, row, x, t)
     assert np.array_equal(guess, last)
     at = np.ascontiguousarray(x[frame])
     assert own.terms(at) == row.terms(at) and own.terms(at)["friction"] > 0
@@ -148,7 +148,7 @@ def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
 
 def test_own_terms_know_each_other_and_nothing_of_the_scenes():
     scene = on_a_belt()
-    first, second = own_terms(scene), own_terms(scene)
+    first, second = copied_terms(scene), copied_terms(scene)
     assert [term.name for term in first] == list(scene.terms)
     everyone = [*scene.energies, *first, *second]
     assert len(set(map(id, everyone))) == len(everyone)
@@ -215,9 +215,9 @@ def test_friction_of_a_step_that_is_frozen_again_is_the_same_and_of_another_past
     again = simulate(scene.cloth, scene.energies, refreeze=1, **given)
     # A slope is one plane: searched again it is the same, and so is the friction on it.
     assert again.status == "converged" and np.abs(again.positions - plain.positions).max() < 1e-6
-    potential = Potential(own_terms(scene))
+    potential = Potential(copied_terms(scene))
     x = plain.positions
-    prepare(scene, potential, x, 5)
+    freeze_step(scene, potential, x, 5)
     step = Step(x[4] + 1e-3, 0 * x[4], x[5], scene.dt, scene.obstacle, 5)
     potential.prepare(step)
     with pytest.raises(ValueError, match="does not know its normal force"):

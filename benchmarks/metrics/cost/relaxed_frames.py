@@ -1,4 +1,4 @@
-"""What a minimising method says of its own steps."""
+"""Metric solver/relaxed_frames: frames that count as converged above their tolerance, at round-off."""
 
 from __future__ import annotations
 
@@ -17,6 +17,6 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Of methods that minimise to a tolerance, over all frames."""
+    """Return the number of relaxed frames of a method that minimises to a tolerance, over all frames."""
     fields = roll_out.trajectory.frame_fields
     return {METRICS[0].name: float(fields[RELAXED].sum())} if RELAXED in fields else {}

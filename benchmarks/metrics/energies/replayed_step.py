@@ -1,4 +1,4 @@
-"""The step that ended at a frame of a trajectory, prepared as for the solver that made the trajectory."""
+"""Time step that ended at a frame of a trajectory, replayed as its solver was given it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def own_terms(scene: BuiltScene) -> list[Energy]:
-    """The terms that the scene declares, and inertia, to be prepared for one trajectory alone.
+def copied_terms(scene: BuiltScene) -> list[Energy]:
+    """Copy the terms that the scene declares, and inertia, to be prepared for one trajectory alone.
 
     A term may remember the step before, and read another term: so all are copied together, and what one of
     them knows of another is the other's copy. Arrays are shared with the scene's.
@@ -31,13 +31,19 @@ def own_terms(scene: BuiltScene) -> list[Energy]:
     return list(twins.values())
 
 
-def prepare(
+def freeze_step(
     scene: BuiltScene, potential: Potential, positions: Floats, frame: int, *, guess: Floats | None = None
 ) -> Floats:
-    """Freeze the potential for the step that ended at `frame` (1 or later) of positions (T,V,3) [m], at the
-    simulator's first guess or at another; gives that guess (V,3) [m].
+    """Freeze the potential for the step that ended at `frame`; return its first guess (V,3) [m].
 
     Any frame may be jumped to: the step before is prepared first where a term remembers it.
+
+    Args:
+        scene: of the trajectory.
+        potential: of terms made by `copied_terms`.
+        positions: (T,V,3) [m].
+        frame: 1 or later.
+        guess: (V,3) [m] where contact planes are searched; the simulator's first guess by default.
     """
     if frame > 1 and any(term.remembers for term in potential.energies):
         potential.prepare(step_to(scene, positions, frame - 1))
@@ -47,7 +53,7 @@ def prepare(
 
 
 def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats | None = None) -> Step:
-    """What a solver would be given to get from frame - 1 of positions (T,V,3) [m] to `frame`, 1 or later."""
+    """Return the step from frame - 1 of positions (T,V,3) [m] to `frame`, as a solver is given it."""
     from reference_sim.energies import Step
 
     previous = positions[frame - 1]
@@ -57,7 +63,7 @@ def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats |
 
 
 def first_guess(scene: BuiltScene, previous: Floats, velocity: Floats, frame: int) -> Floats:
-    """Where a solver would start, (V,3) [m]: what a step costs nothing to get."""
+    """Return the solver's first guess of a step, (V,3) [m]: previous positions, carried along."""
     if scene.obstacle is None:
         guess = previous + scene.dt * velocity
     else:

@@ -1,4 +1,4 @@
-"""Triangles of a cloth that pass through others of the same cloth. No physics here.
+"""Self-intersections of a cloth: triangles that pass through others of the same cloth.
 
 Two triangles without a common vertex intersect where an edge of one crosses the inside of the other. Pairs
 come from a sweep along x over bounding boxes. Triangles that touch in one plane count as apart.
@@ -15,12 +15,18 @@ Floats = NDArray[np.float64]
 
 
 def intersecting_share(positions: Floats, faces: NDArray[np.int64]) -> Floats:
-    """(T,) share of the faces (F,3) that pass through another one, in positions (T,V,3) [m]."""
+    """Return the share of faces (F,3) that pass through another one in each frame, (T,)."""
     return np.array([intersecting(np.ascontiguousarray(x), faces).mean() for x in positions])
 
 
 def intersecting(x: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(F,) which faces (F,3) of positions (V,3) [m] pass through another one without a common vertex."""
+    """Return which faces (F,3) of positions (V,3) [m] pass through another without a common vertex, (F,).
+
+    >>> import numpy as np
+    >>> flat, upright = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[1, 1, -1], [1, 1, 1], [9, 9, 0]]
+    >>> intersecting(np.array(flat + upright, dtype=float), np.array([[0, 1, 2], [3, 4, 5]]))
+    array([ True,  True])
+    """
     corners = x[faces]
     low, high = corners.min(1), corners.max(1)
     order = np.argsort(low[:, 0], kind="stable")
@@ -60,7 +66,7 @@ def _neighbours(e, f):
 
 @njit(cache=True, inline="always")
 def _volume(x, a, b, c, d):
-    """Six times the signed volume of a tetrahedron."""
+    """Return six times the signed volume of a tetrahedron."""
     p0, p1, p2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     q0, q1, q2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
     r0, r1, r2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
@@ -69,7 +75,7 @@ def _volume(x, a, b, c, d):
 
 @njit(cache=True)
 def _crosses(x, edges_of, face):
-    """Whether an edge of one triangle passes through the inside of the other."""
+    """Return whether an edge of one triangle passes through the inside of the other."""
     a, b, c = face[0], face[1], face[2]
     for i in range(3):
         p, q = edges_of[i], edges_of[(i + 1) % 3]
