@@ -10,7 +10,7 @@ ROW = 2 / 3**0.5  # of the equilateral family: distance of neighbours in a colum
 
 
 def jittered_patch(cells: int) -> tuple[np.ndarray, np.ndarray]:
-    """A Delaunay mesh of the unit square in the plane: points (V,2) [m], faces (F,3), counter-clockwise."""
+    """Return a Delaunay mesh of the unit square: points (V,2) [m], faces (F,3), counter-clockwise."""
     random = np.random.default_rng(0)
     i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
     points = np.stack([i, j], -1).astype(float)
@@ -20,7 +20,7 @@ def jittered_patch(cells: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def delaunay_faces(points: np.ndarray) -> np.ndarray:
-    """Delaunay triangles (F,3) of points (V,2), counter-clockwise, without flat ones on straight borders."""
+    """Return Delaunay triangles (F,3) of points (V,2), counter-clockwise, without flat ones on borders."""
     faces = Delaunay(points).simplices.astype(np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
     signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
@@ -31,7 +31,12 @@ def delaunay_faces(points: np.ndarray) -> np.ndarray:
 
 
 def right_grid(rows: int, columns: int, height: float, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Right triangles, all diagonals alike: points (V,2) [m], row by row, faces (F,3), counter-clockwise."""
+    """Return right triangles, all diagonals alike: points (V,2) [m], row by row, faces (F,3).
+
+    >>> points, faces = right_grid(1, 2, 0.5, 1.0)
+    >>> points.shape, len(faces)
+    ((6, 2), 4)
+    """
     y, x = np.meshgrid(np.linspace(0, height, rows + 1), np.linspace(0, width, columns + 1), indexing="ij")
     a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
     b, c, d = a + 1, a + columns + 2, a + columns + 1
@@ -40,19 +45,24 @@ def right_grid(rows: int, columns: int, height: float, width: float) -> tuple[np
 
 
 def in_space(points: np.ndarray) -> np.ndarray:
-    """(V,2) -> (V,3) in the plane z = 0."""
+    """Return points (V,2) as (V,3) in the plane z = 0."""
     return np.concatenate([points, np.zeros((len(points), 1))], axis=1)
 
 
 def random_rotation(seed: int) -> np.ndarray:
-    """(3,3), a proper rotation."""
+    """Return a proper rotation (3,3)."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return q if np.linalg.det(q) > 0 else -q
 
 
 def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """An icosahedron refined and pushed out to `radius` [m]: points (V,3), outward faces (F,3)."""
+    """Return an icosahedron refined and pushed out to `radius` [m]: points (V,3), outward faces (F,3).
+
+    >>> points, faces = icosphere(1, 1.0)
+    >>> len(points), len(faces)
+    (42, 80)
+    """
     golden = (1 + 5**0.5) / 2
     corners = [(0.0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
     points = np.array([np.roll(corner, k) for k in range(3) for corner in corners])
@@ -71,16 +81,19 @@ def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def cylinder_patch(cells: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Two radians of a cylinder about the y axis, as high as its radius [m]: points (V,3), faces (F,3)."""
+    """Return two radians of a cylinder about y, as high as its radius [m]: points and faces."""
     flat, faces = right_grid(cells, cells, radius, 2.0)
     angle = flat[:, 0]
     return np.stack([radius * np.cos(angle), flat[:, 1], radius * np.sin(angle)], axis=1), faces
 
 
 def torus(cells: int, major: float, minor: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A closed torus [m] of 2 x `cells` by `cells`: points (V,3), faces (F,3), exact mean curvature (V,).
+    """Return a closed torus [m] of 2 x `cells` by `cells`, with its exact mean curvature.
 
     H = (R + 2 r cos v) / (2 r (R + r cos v)) with v the angle around the tube.
+
+    Returns:
+        Points (V,3) [m], faces (F,3), and H (V,) [1/m].
     """
     u, v = np.meshgrid(
         np.linspace(0, 2 * np.pi, 2 * cells, endpoint=False),
@@ -99,11 +112,12 @@ def torus(cells: int, major: float, minor: float) -> tuple[np.ndarray, np.ndarra
 def rectangle(
     family: str, columns: int, rows: int, length: float, width: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """[0, length] x [0, width] in `columns` x `rows` cells: points (V,2) [m], faces (F,3) counter-clockwise.
+    """Return [0, length] x [0, width] in `columns` x `rows` cells: points (V,2) [m], faces (F,3).
 
-    right: all diagonals alike; cross: both diagonals; union_jack: diagonals alternate; equilateral: columns
-    shifted by half a cell in turn (truly equilateral if cells are 1 by ROW); delaunay: inner vertices moved
-    by up to 0.3 cells. The first two columns are regular in all, so that a clamp means the same.
+    The families of triangles: right, all diagonals alike; cross, both diagonals; union_jack, diagonals
+    alternate; equilateral, columns shifted by half a cell in turn (truly equilateral if cells are 1 by ROW);
+    delaunay, inner vertices moved by up to 0.3 cells. The first two columns are regular in all, so that a
+    clamp means the same. Raises ValueError for an unknown family.
     """
     points, faces = right_grid(rows, columns, width, length)
     cell = np.array([length / columns, width / rows])
@@ -126,7 +140,7 @@ def rectangle(
 
 
 def _column(i: int, rows: int) -> np.ndarray:
-    """Vertices of one column of the equilateral family, in cells; a shifted one keeps its two ends."""
+    """Return the vertices of one column of the equilateral family, in cells; a shifted one keeps its ends."""
     y = np.arange(rows + 1.0)
     if i % 2:
         y = np.concatenate([[0.0], np.arange(rows) + 0.5, [float(rows)]])
@@ -157,16 +171,20 @@ def _crossed(points: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, n
 
 
 def square_sheet(cells: int, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """A horizontal square of `size` [m] about the origin, facing up: positions (V,3), faces (F,3)."""
+    """Return a horizontal square of `size` [m] about the origin, facing up: (V,3) [m], faces (F,3)."""
     return sheet((cells, cells), (size, size))
 
 
 def sheet(cells: tuple[int, int], size: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """A horizontal rectangle of that size along x and z [m], facing up: positions (V,3), faces (F,3).
+    """Return a horizontal rectangle about the origin, facing up: positions (V,3) [m], faces (F,3).
 
     The vertices of a regular grid are nudged by up to a quarter of a cell inside the rectangle and the
     diagonals alternate, so that no direction of the mesh is special. Vertex i * (cells[1] + 1) + j is the
     j-th along z of the i-th row along x.
+
+    Args:
+        cells: numbers along x and z.
+        size: along x and z [m].
     """
     rows, columns = cells[0] + 1, cells[1] + 1
     i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
@@ -186,9 +204,13 @@ def sheet(cells: tuple[int, int], size: tuple[float, float]) -> tuple[np.ndarray
 
 
 def sphere(radius: float, cells: int) -> tuple[np.ndarray, np.ndarray]:
-    """A closed sphere about the origin: positions (B,3) [m], outward faces (Fb,3).
+    """Return a closed sphere about the origin: positions (B,3) [m], outward faces (G,3).
 
-    A cube of `cells` x `cells` squares a side, pushed out to the radius; tan evens the squares out.
+    A cube of `cells` x `cells` squares a side, pushed out to the radius [m]; tan evens the squares out.
+
+    >>> points, faces = sphere(0.1, 4)
+    >>> len(points) - len(faces) // 2  # of a closed surface without holes
+    2
     """
     ticks = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
     u, v = np.meshgrid(ticks, ticks, indexing="ij")

@@ -1,1 +1,1 @@
-"""How fast the simulator, trainings and trained networks are: microbenchmarks, declared in registry.py."""
+"""Microbenchmarks: speed of the simulator, trainings and trained networks. registry.py declares them."""

@@ -1,4 +1,4 @@
-"""A whole training of recipe default, rolled out on a motion that it does not see.
+"""Microbenchmark convergence/*: a whole training, rolled out on a held-out motion.
 
 Time is that of training: what the validations take is left out. Leaves the curve and the network; a run that
 was killed goes on from its last checkpoint. The report draws the curve.
@@ -25,7 +25,7 @@ COLUMNS = ("step", "seconds", "loss", "validation", "strain", "bending", "gravit
 
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
-    """Train; when the value on the held-out motion came close to its last one, and for good."""
+    """Train; return the end of the training and when the held-out energy came close to it, for good."""
     from snug.training.checkpoint import Checkpoint
     from snug.training.train_network import train_network
     from snug.training.validation import Validation
@@ -56,7 +56,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
 
 
 def curve(history: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
-    """The columns of convergence.csv: steps so far, seconds without validations, joules a frame."""
+    """Return the rows of convergence.csv: steps so far, seconds without validations, joules a frame."""
     points, before, left_out = [], 0.0, 0.0
     for row in history:
         left_out += (row["step"] - before) * row.get("seconds/validation", 0.0)
@@ -68,7 +68,7 @@ def curve(history: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
 
 
 def found_on(points: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """What a curve says: the end of the training, its pace, and when it was close to the end for good."""
+    """Return the numbers of a curve: end of the training, pace, and when it was close to the end for good."""
     steps, seconds, validation = (
         np.array([point[name] for point in points]) for name in ("step", "seconds", "validation")
     )
@@ -89,8 +89,12 @@ def found_on(points: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def arrival(values: np.ndarray, share: float) -> int:
-    """The first place from which on every value is within that share of the last one; where that is no
-    number, the last place.
+    """Return the first place from which on every value is within that share of the last one.
+
+    Where the last is no number, the last place.
+
+    >>> arrival(np.array([9.0, 2.0, 1.02, 1.0]), 0.03)
+    2
     """
     far = np.flatnonzero(~(np.abs(values - values[-1]) <= share * abs(values[-1])))  # so is what is no number
     return min(int(far[-1]) + 1, len(values) - 1) if len(far) else 0

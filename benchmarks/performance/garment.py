@@ -1,4 +1,4 @@
-"""The case that matters: a T-shirt on a moving body."""
+"""Microbenchmark garment/*: a T-shirt on a moving body."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ FRAMES = 60
 
 
 def dressed(motion: str, vertices: int) -> BuiltScene:
-    """The scene of an embedded motion, cut to FRAMES frames."""
+    """Build the scene of an embedded motion, cut to FRAMES frames."""
     preset = dataclasses.replace(find_preset("quick"), garment_vertices=vertices, frames=FRAMES)
     assets = open_assets(preset, embedded_motions([motion]), [TSHIRT])
     return of_garment(TSHIRT).scene(motion).at(preset).build(assets)
 
 
 def measure(settings: Settings, *, motion: str, vertices: int) -> dict[str, float]:
-    """Median and worst frame, convergence and depth under the skin."""
+    """Return median and worst frame, convergence and penetration."""
     scene = dressed(motion, vertices)
     assert scene.obstacle is not None
     simulation = Simulation(options={})

@@ -1,4 +1,4 @@
-"""A frame at a time on one CPU core, network and skinning, as in an application; and what a network weighs.
+"""Microbenchmark inference/*: a frame at a time on one CPU core, network and skinning; size of a network.
 
 Weights are random: neither time nor size depends on them. The supervised network is SNUG's.
 """
@@ -25,9 +25,7 @@ SWEPT = 48  # [MB] of other work between two cold frames: a solver, and what lie
 
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
-    """Median, 95 % and least time over all frames of roll-outs, and the median of a cold one; memory and file
-    of the network.
-    """
+    """Return median, 95 % and least time of frames, the median of a cold one, and sizes of the network."""
     from snug.training.train_network import untrained_model
 
     chosen = settings.chosen
@@ -54,7 +52,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
 def _frame_seconds(
     model: TrainedModel, dressed: DressedBody, motion: Motion, *, swept: int = 0
 ) -> list[float]:
-    """Wall time [s] of each frame of a roll-out; inputs and joint transforms are ready before.
+    """Return wall times [s] of each frame of a roll-out; inputs and joint transforms are ready before.
 
     swept: [MB] read and written before each frame, off the clock.
     """

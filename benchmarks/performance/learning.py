@@ -1,4 +1,4 @@
-"""What all measurements of networks dress, and in what motions."""
+"""Garment and motions of all microbenchmarks of networks."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 def training_motions() -> list[Motion]:
-    """All motions that networks may learn from, whole."""
+    """Return all motions that networks may learn from, whole."""
     from snug.motion.library import TRAIN
 
     return embedded_motions(TRAIN)
 
 
 def dressed_body(vertices: int) -> DressedBody:
-    """The body in a T-shirt of about so many vertices."""
+    """Return the body in a T-shirt of about so many vertices."""
     from snug.body.parametric_body import Body
     from snug.garments.templates import TSHIRT, find_template
     from snug.networks.dressed_body import DressedBody

@@ -1,4 +1,4 @@
-"""A microbenchmark: some measured numbers of one case, alone on the machine in a process of its own.
+"""Microbenchmark: some measured numbers of one case, alone on the machine in a process of its own.
 
 Times are medians of repeats inside that process. They belong to the machine that
 they were taken on: compare ratios.
@@ -17,8 +17,15 @@ SUITE = "performance"
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a function is told. chosen: kind and recipe of the network; device, steps: of its training; files:
-    to be left behind; key: equal where an interrupted training may go on.
+    """Settings of a run that a measuring function reads.
+
+    Attributes:
+        method: of the rows.
+        repeats: of what is timed.
+        chosen: the training of the network: kind and recipe.
+        device, steps: of its training.
+        files: to be left behind.
+        key: equal where an interrupted training may go on.
     """
 
     method: str
@@ -32,7 +39,7 @@ class Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class Microbenchmark:
-    """The declaration of a microbenchmark: cheap to list. Its module is imported when it is measured.
+    """Declaration of a microbenchmark: cheap to list. Its module is imported when it is measured.
 
     `function` of `module`, called with Settings and `options`, returns numbers by the names of metrics.py,
     the suite's name left out.
@@ -61,10 +68,11 @@ class Microbenchmark:
 
     @property
     def label(self) -> str:
+        """Name of its task: case and method."""
         return f"{self.name} x {self.method}"
 
     def measure(self, settings: Settings) -> dict[str, float]:
-        """Metric -> value. Raises what the function raises."""
+        """Return metric -> value. Raises what the function raises."""
         function = getattr(importlib.import_module(self.module), self.function)
         measured = function(settings, **self.options)
         return {f"{SUITE}/{name}": value for name, value in measured.items()}

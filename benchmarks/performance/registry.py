@@ -1,4 +1,4 @@
-"""The visible tuple of microbenchmarks. Listing them imports nothing that measures."""
+"""Microbenchmarks: the visible tuple of declarations. Listing them imports nothing that measures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plain case: a sheet falling from two pinned corners, no contact."""
+"""Microbenchmarks sheet/* and scaling/*: a sheet falling from two pinned corners, no contact."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NOISE = 1e-4  # [m] of the flat start, which would otherwise be a saddle
 
 
 def regular_sheet(n: int) -> Cloth:
-    """A 1 m square of n x n vertices, pinned at two corners."""
+    """Return a 1 m square of n x n vertices, pinned at two corners."""
     i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
     h = 1.0 / (n - 1)
     positions = np.stack([h * i.ravel(), np.zeros(n * n), h * j.ravel()], axis=1)
@@ -33,8 +33,9 @@ def regular_sheet(n: int) -> Cloth:
 
 
 def fall(cloth: Cloth, frames: int, **options: Any) -> list[tuple[Result, float]]:
-    """Its first frames from a flat start moved by noise, as `simulate` steps with options of the minimiser:
-    result and seconds of each. Raises ValueError where it diverges.
+    """Simulate the first frames from a flat start moved by noise; return result and seconds of each.
+
+    options: of the minimiser. Raises ValueError where it diverges.
     """
     terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
     stepper = TimeStepper(cloth, terms, dt=DT, options=options)
@@ -52,7 +53,7 @@ def fall(cloth: Cloth, frames: int, **options: Any) -> list[tuple[Result, float]
 
 
 def frames(settings: Settings, *, side: int) -> dict[str, float]:
-    """A frame of side x side vertices and the split of its time, medians over repeats."""
+    """Return the time of a frame of side x side vertices and its split, medians over repeats."""
     cloth = regular_sheet(side)
     fall(cloth, 1)  # compiles
     medians, worst, inside, outside, converged, gradient = [], [], [], [], [], 0.0
@@ -79,7 +80,7 @@ def frames(settings: Settings, *, side: int) -> dict[str, float]:
 
 
 def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
-    """Cost of an iteration over the first frames of the fall, by L-BFGS alone and by Newton's method."""
+    """Return the cost of an iteration over the first frames, by L-BFGS alone and by Newton's method."""
     smallest = regular_sheet(SMALLEST)
     iteration_seconds(smallest, LBFGS, 1, 1)  # compiles
     base = peak_memory()
@@ -103,7 +104,7 @@ def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
 
 
 def iteration_seconds(cloth: Cloth, options: dict[str, Any], frames: int, repeats: int) -> float:
-    """Time of an iteration [s] over the first frames of the fall; the median of repeats."""
+    """Return the time of an iteration [s] over the first frames of the fall, median of repeats."""
     costs = []
     for _ in range(repeats):
         steps = fall(cloth, frames, **options)

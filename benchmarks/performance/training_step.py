@@ -1,4 +1,4 @@
-"""One training step: its time and what of, by network and size of the garment.
+"""Microbenchmark training_step/*: one training step and its parts, by network and size of the garment.
 
 The data is the whole of what a training sees, augmented motions included. The supervised network learns
 from skinned vertices here instead of simulated ones: its step takes as long.
@@ -24,7 +24,7 @@ PAPER_STEPS = find_preset("paper").steps_of("snug", "snug")
 
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
-    """Median and least time of a step over blocks, and the medians of its parts."""
+    """Return median and least time of a step over blocks, and the medians of its parts."""
     import torch
 
     from snug.training.device import find_device
@@ -61,7 +61,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
 
 
 def _timed(trainer: Trainer, blocks: int) -> tuple[list[float], dict[str, list[float]]]:
-    """Mean seconds a step of each block, whole and by part."""
+    """Return mean seconds a step of each block, whole and by part."""
     import torch
 
     numbers = itertools.count()

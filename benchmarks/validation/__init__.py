@@ -1,1 +1,1 @@
-"""Known answers and stress tests: declared as cases in four modules, measured by the others."""
+"""Validation: known answers and stress tests. Each room declares its cases; registry.py lists them."""

@@ -1,4 +1,4 @@
-"""A case: one row whose answer is known before anything is computed, or whose failure has to be reported."""
+"""Case: one row whose answer is known before anything is computed, or whose failure has to be reported."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ METHOD = "simulation"
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """What a case has measured where it says by itself how it ended: value, status and reason of the row."""
+    """Row of a case that says by itself how it ended: value, status, reason and terms."""
 
     value: float | None
     status: str
@@ -24,7 +24,7 @@ class Measurement:
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """One row: what is measured, what it must be and how far it may be off. `reason` defends the tolerance.
+    """Declaration of one row: function, expected value and tolerance. `reason` defends the tolerance.
 
     `function` of `module`, called with `options`, returns a number, (measured, expected) where the reference
     has to be solved first, or a Measurement. A number without a tolerance is reported, not judged.
@@ -56,7 +56,7 @@ class Case:
     map_point: tuple[float, float] | None = None
 
     def run(self) -> Row:
-        """The row, measured here and now. What is raised becomes a failed row with its reason."""
+        """Measure here and now and return the row. What is raised becomes a failed row with its reason."""
         try:
             found = self._imported(self.function)(**self.options)
             if isinstance(found, Measurement):
@@ -71,7 +71,7 @@ class Case:
         self._imported("warm_up", lambda: None)()
 
     def judged(self, value: float, expected: float | None) -> Row:
-        """The row of a number: ok where it is finite and within the tolerance of the expected one."""
+        """Return the row of a number: ok where it is finite and within the tolerance of the expected one."""
         if not math.isfinite(value):
             return self.row(reason=f"the measured number is {value}", expected=expected)
         if self.tolerance is None:
@@ -92,7 +92,7 @@ class Case:
         expected: float | None = None,
         terms: str = "",
     ) -> Row:
-        """The row with these values; expects what the case declares unless another number is given."""
+        """Return the row with these values; it expects what the case declares unless another is given."""
         return Row(
             suite=self.suite,
             scene=self.scene or self.name,
@@ -115,6 +115,10 @@ class Case:
 def known_answer(
     name: str, description: str, module: str, function: str, *, smoke: bool = True, **declared: Any
 ) -> Case:
-    """A case of suite validation, measured by `function` of benchmarks.validation.<module>."""
+    """Return a case of suite validation, measured by `function` of benchmarks.validation.<module>.
+
+    >>> known_answer("one", "a number", "membrane.closed_forms", "zero_modes", expected=6.0).suite
+    'validation'
+    """
     module = f"benchmarks.validation.{module}"
     return Case(name=name, description=description, module=module, function=function, smoke=smoke, **declared)

@@ -1,4 +1,4 @@
-"""A force that follows nothing: the term that loads a structure in a check."""
+"""Dead load: a constant force, the term that loads a structure in a check."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class DeadLoad(Energy):
-    """E = -f . x for each vertex, with constant forces f (V, 3) [N]."""
+    """Dead load of each vertex, E = -f . x with constant forces f (V, 3) [N]."""
 
     name = "load"
 
@@ -24,15 +24,19 @@ class DeadLoad(Energy):
         self.forces = forces
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return -f . u of each vertex, in torch."""
         import torch
 
         return -(torch.as_tensor(self.forces).to(u) * u[..., 0, :]).sum(-1)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the energy [J] and its gradient -f (V, 3) [N]."""
         return -float(np.vdot(self.forces, x)), -self.forces
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return zeros (V, 3, 3)."""
         return np.zeros((len(self.stencils), 3, 3))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return no block: the energy is linear."""
         return np.arange(0), np.zeros((0, 3, 3))

@@ -1,4 +1,4 @@
-"""The visible tuple of cases. Listing them imports nothing that measures.
+"""Cases: the visible tuples, from the cases.py of each room. Listing them imports nothing that measures.
 
 Each room declares its cases in its `cases.py`, beside the modules that measure them. The smallest preset runs
 those marked `smoke`. Known answers without a tolerance are reported, not judged.

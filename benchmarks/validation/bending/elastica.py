@@ -1,4 +1,4 @@
-"""Large bending: a clamped strip beside Euler's elastica, which scipy integrates here.
+"""Large bending: a clamped strip against Euler's elastica, which scipy integrates here.
 
 Hinges stand for a plate stiffness D that depends on the mesh (see plates.py). So D is calibrated once per
 mesh, from its small deflections, and what is judged is the shape at large ones; the spread of D over the
@@ -30,7 +30,7 @@ SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
 
 @dataclass(frozen=True)
 class Strip:
-    """A horizontal strip of 1 m, clamped at x = 0; cell and width [m], plate stiffness D [J]."""
+    """Horizontal strip of 1 m, clamped at x = 0; cell and width [m], plate stiffness D [J]."""
 
     cloth: Cloth
     cell: float
@@ -40,7 +40,7 @@ class Strip:
 
 @cache
 def strip(family: str, scaling: str = "length_area") -> Strip:
-    """Two pinned columns, half a cell to each side of the clamp: there the first hinge's share begins."""
+    """Make a strip with two pinned columns, half a cell to each side of the clamp, and calibrate its D."""
     h = 1 / (COLUMNS - 0.5)
     width = ROWS * h * (ROW if family == "equilateral" else 1.0)
     points, faces = rectangle(family, COLUMNS, ROWS, COLUMNS * h, width)
@@ -51,7 +51,7 @@ def strip(family: str, scaling: str = "length_area") -> Strip:
 
 
 def _calibrated(bend: BendHinge, width: float) -> float:
-    """D from the tip's small deflection under a unit load per area: 1/(8 D)."""
+    """Return D from the tip's small deflection under a unit load per area: 1/(8 D)."""
     cloth = bend.cloth
     stiffness = Potential([bend]).hessian(cloth.rest_positions).tocsr()[1::3][:, 1::3]
     free = np.setdiff1d(np.arange(cloth.vertex_count), cloth.pins)
@@ -61,13 +61,13 @@ def _calibrated(bend: BendHinge, width: float) -> float:
 
 
 def tip(cloth: Cloth) -> np.ndarray:
-    """Vertices of the free end."""
+    """Return the vertices of the free end."""
     return np.flatnonzero(cloth.rest_positions[:, 0] > 1 - 1e-9)
 
 
 @cache
 def reference(weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
-    """Elastica of length 1 under its weight and a force at its end: s (n,) and (x, drop) (2, n).
+    """Integrate the elastica of length 1 under its weight and a force at its end: s (n,), (x, drop) (2, n).
 
     theta, downwards, obeys theta'' = -(weight (1 - s) + load) cos theta, theta(0) = 0, theta'(1) = 0; weight
     is Gamma = rho_a g L^3 / D, load is P L^2 / D.
@@ -92,7 +92,7 @@ def _clamp_and_free_end(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def bent_strip(family: str, weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tip of the strip and of the elastica, (x, drop) [m] each."""
+    """Return the tip of the strip and of the elastica, (x, drop) [m] each."""
     made = strip(family)
     cloth = made.cloth
     acceleration = weight * made.D / MATERIAL.areal_density
@@ -119,17 +119,17 @@ def bent_strip(family: str, weight: float, load: float) -> tuple[np.ndarray, np.
 
 
 def heavy(gamma: float) -> float:
-    """Distance of the tip from the elastica's, over the length: the worst of the four symmetric families."""
+    """Return the distance of the tip to the elastica's under weight, over the length: worst of four families."""
     return max(_miss(family, gamma, 0.0) for family in SYMMETRIC)
 
 
 def end_loaded(load: float) -> float:
-    """The same for a force at the end."""
+    """Return the distance of the tip to the elastica's under a force at the end, worst of four families."""
     return max(_miss(family, 0.0, load) for family in SYMMETRIC)
 
 
 def one_sided_diagonals(gamma: float) -> float:
-    """The same where all diagonals lean one way: such a strip twists as it bends, so it is no elastica."""
+    """Return the tip's distance where all diagonals lean one way: such a strip twists, no elastica."""
     return _miss("right", gamma, 0.0)
 
 
@@ -139,6 +139,6 @@ def _miss(family: str, weight: float, load: float) -> float:
 
 
 def stiffness_spread(scaling: str) -> float:
-    """Largest over smallest D of the five families at one k."""
+    """Return the largest over the smallest D of the five families at one k."""
     found = [strip(family, scaling).D for family in FAMILIES]
     return max(found) / min(found)

@@ -12,7 +12,7 @@ COLUMNS, ROWS, CELL, DEPTH = 6, 4, 0.1, 0.7
 
 
 def folded(scaling: str, fold: float) -> float:
-    """Energy of a strip folded by `fold` [rad] at each column, over its closed form.
+    """Return the energy of a strip folded by `fold` [rad] at each column, over its closed form.
 
     Each of (COLUMNS - 1) ROWS upright edges holds k/2 fold^2, times l^2/(4 (A1 + A2)) where scaled.
     """
@@ -24,7 +24,7 @@ def folded(scaling: str, fold: float) -> float:
 
 
 def past_half_a_turn() -> float:
-    """The same with rest angles of 3 rad and a fold of -3 rad: the short way round is 2 pi - 6."""
+    """Return the energy with rest angles of 3 rad and a fold of -3 rad: the short way is 2 pi - 6."""
     cloth, x = _folded(-3.0)
     upright = np.ptp(cloth.rest_positions[cloth.hinges[:, :2], 0], axis=1) < 1e-9
     # The sign of a hinge's angle follows from its numbering; a fold of -3 is -3 or 3 there.
@@ -35,7 +35,7 @@ def past_half_a_turn() -> float:
 
 
 def rest_shape_force() -> float:
-    """Largest force [N] in a strip whose rest angles are those of its folded shape, turned in space."""
+    """Return the largest force [N] in a strip whose rest angles are those of its folded shape, turned."""
     cloth, x = _folded(0.8)
     curved = Cloth(x, cloth.faces, cloth.material)
     bend = BendHinge(curved, rest_angles="rest")
@@ -43,7 +43,7 @@ def rest_shape_force() -> float:
 
 
 def _scale() -> float:
-    """l^2 / (4 (A1 + A2)) of an upright edge."""
+    """Return l^2 / (4 (A1 + A2)) of an upright edge."""
     length = DEPTH / ROWS
     return length**2 / (4 * CELL * length)
 
@@ -59,7 +59,7 @@ def _folded(fold: float) -> tuple[Cloth, np.ndarray]:
 
 
 def _signs(cloth: Cloth) -> np.ndarray:
-    """(H,) sign of each hinge's angle where the strip is folded by a small negative angle."""
+    """Return the sign of each hinge's angle where the strip is folded by a small negative angle, (H,)."""
     from reference_sim.energies.bend_hinge.definition import dihedral_angles
 
     return np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))

@@ -25,7 +25,7 @@ ROWS = (4, 8)
 
 
 def critical_load() -> float:
-    """Load at which the tangent stiffness becomes singular, over the closed form.
+    """Return the load at which the tangent stiffness becomes singular, over the closed form.
 
     The free edges lack half a hinge, an error of first order in the cell: two meshes are extrapolated.
     """

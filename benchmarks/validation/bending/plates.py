@@ -1,4 +1,4 @@
-"""Hinges as a plate: what stiffness they stand for on each family of triangles.
+"""Hinges as a plate: the stiffness that they stand for on each family of triangles.
 
 Kirchhoff's plate has the energy D/2 [(w_xx + w_yy)^2 - 2 (1 - nu) (w_xx w_yy - w_xy^2)]. Hinges are no such
 plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles, and on
@@ -27,7 +27,7 @@ STIFFNESS = 1.0  # [J] k; every result is divided by it
 
 
 def plate_stiffness(family: str, scaling: str) -> float:
-    """C11/k: a patch bent to a cylinder at its border, everything else at rest.
+    """Return C11/k of a patch bent to a cylinder at its border, everything else at rest.
 
     Energy of an n x n patch = a n^2 + b n + c with the border in b and c; three sizes give a. The
     unstructured family has no cell that repeats, so there one larger patch is divided by its area.
@@ -41,7 +41,7 @@ def plate_stiffness(family: str, scaling: str) -> float:
 
 
 def _bent(family: str, scaling: str, cells: int, height: float) -> tuple[float, float]:
-    """Energy over k of a patch with w = x^2/2 on its two outer rings, and the area of its hinges."""
+    """Return the energy over k of a patch with w = x^2/2 on two outer rings, and the area of its hinges."""
     size = np.array([cells, cells * height])
     points, faces = rectangle(family, cells, cells, *size)
     bend, K = _stiffness(points, faces, scaling)
@@ -53,7 +53,7 @@ def _bent(family: str, scaling: str, cells: int, height: float) -> tuple[float, 
 
 
 def supported_plate(family: str, scaling: str) -> float:
-    """D/k of the Kirchhoff plate that sags as much, on the mean, as hinges on the unit square.
+    """Return D/k of the Kirchhoff plate that sags as much, on the mean, as hinges on the unit square.
 
     Simply supported along straight sides, uniform load: there the deflection does not depend on nu, so this
     is the isotropic part of the plate. The reference is solved with Morley's element in scikit-fem.
@@ -72,7 +72,7 @@ def supported_plate(family: str, scaling: str) -> float:
 
 
 def morley_deflection(width: float) -> float:
-    """Mean deflection of a simply supported plate 1 x width [m] with D = 1 under unit load.
+    """Return the mean deflection of a simply supported plate 1 x width [m], D = 1, unit load.
 
     Morley's element is of second order here; two meshes are extrapolated.
     """
@@ -102,7 +102,7 @@ def _morley(width: float, cells: int) -> float:
 
 
 def _stiffness(points: np.ndarray, faces: np.ndarray, scaling: str) -> tuple[BendHinge, sp.csr_matrix]:
-    """The bending term of a flat mesh (V,2) and its Hessian for displacements out of the plane (V,V)."""
+    """Return the bending term of a flat mesh (V,2) and its Hessian out of the plane (V,V)."""
     cloth = Cloth(in_space(points), faces, Material(bending_stiffness=STIFFNESS))
     bend = BendHinge(cloth, scaling=scaling)
     hessian = Potential([bend]).hessian(cloth.rest_positions).tocsr()

@@ -26,7 +26,7 @@ STAGES = 12
 
 
 def corner(which: str) -> float:
-    """Lift [m] of the free lip's "inner" or "outer" corner."""
+    """Return the lift [m] of the free lip's "inner" or "outer" corner."""
     inner, outer = _lifted()
     return inner if which == "inner" else outer
 

@@ -13,7 +13,7 @@ from reference_sim.material import GRAVITY
 
 
 def penalty_depth() -> float:
-    """Mean depth into the margin over sqrt(rho_a g / (3 k)), contact on vertices.
+    """Return the mean depth into the margin over sqrt(rho_a g / (3 k)), contact on vertices.
 
     A vertex of area a carries rho_a a g and is pushed by 3 k a depth^2: the area cancels.
     """
@@ -23,14 +23,14 @@ def penalty_depth() -> float:
 
 
 def sampled_area() -> float:
-    """Area of all contact samples of a sheet over its own: vertices, edges and faces carry it once each."""
+    """Return the area of all contact samples of a sheet over its own: each kind carries it once."""
     points, faces = jittered_patch(8)
     contact = ContactPenalty(Cloth(in_space(points), faces, Material()))
     return float(contact.sample_areas.sum())  # the sheet has unit area
 
 
 def contact_force() -> float:
-    """Total upward contact force over the weight of the sheet, all contact samples on."""
+    """Return the total upward contact force over the weight of the sheet, all contact samples on."""
     contact, x, areal_density = _sheet_at_rest("all")
     upward = -contact.value_and_gradient(x)[1][:, 1].sum()
     return float(upward / (areal_density * GRAVITY))  # the sheet has unit area
@@ -52,7 +52,7 @@ def _sheet_at_rest(samples: str) -> tuple[ContactPenalty, np.ndarray, float]:
 
 
 def box(*, half: float, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """A closed box under the plane y = 0, `half` to each side and `height` deep [m]; outward faces."""
+    """Return a closed box under the plane y = 0, `half` to each side and `height` deep [m]; outward faces."""
     corners = np.array([[x, y, z] for x in (-half, half) for y in (-height, 0.0) for z in (-half, half)])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])

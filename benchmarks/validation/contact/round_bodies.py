@@ -26,7 +26,7 @@ SLACK = 0.1  # [m] of each end of the strip below the axis
 
 
 class RoundBody:
-    """A sphere about the origin, or (axis=2) a cylinder about the z axis, of `radius` [m]."""
+    """Sphere about the origin, or (axis=2) cylinder about the z axis, of `radius` [m]."""
 
     fingerprint = "round"
 
@@ -39,7 +39,7 @@ class RoundBody:
     bounded = False
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
-        """Tangent planes below points (S, 3); faces and places on them do not exist."""
+        """Return tangent planes below points (S, 3); faces and places on them do not exist."""
         radial = points * self.keep
         normals = radial / np.linalg.norm(radial, axis=1, keepdims=True)
         count = len(points)
@@ -48,13 +48,13 @@ class RoundBody:
 
 
 def leaving_point() -> float:
-    """cos theta at which a point leaves a sphere, over (2/3) cos theta_0: two time steps, extrapolated."""
+    """Return cos theta at which a point leaves a sphere, over (2/3) cos theta_0, extrapolated in dt."""
     coarse, fine = _leaving(480), _leaving(960)
     return (2 * fine - coarse) / (2 / 3 * np.cos(START))
 
 
 def leaving_order() -> float:
-    """Order in dt of the error of cos theta."""
+    """Return the order in dt of the error of cos theta."""
     rates = (240, 480, 960)
     exact = 2 / 3 * np.cos(START)
     return fitted_order([abs(_leaving(rate) - exact) for rate in rates], [1 / rate for rate in rates])
@@ -62,7 +62,7 @@ def leaving_order() -> float:
 
 @cache
 def _leaving(rate: int) -> float:
-    """cos theta where the contact force reaches zero, with `rate` steps a second.
+    """Return cos theta where the contact force reaches zero, with `rate` steps a second.
 
     The point is a triangle of 4 mm. It starts at rest, as deep in the margin as its weight presses it.
     """
@@ -98,19 +98,19 @@ def _leaving(rate: int) -> float:
 
 
 def drum_tension() -> float:
-    """Worst error of the strip's tension from its end's plus w times the height above it, over the mean."""
+    """Return the worst error of the strip's tension from its end's plus w times height, over the mean."""
     tension, expected, _, _ = _strip_on_drum()
     return float(np.abs(tension - expected).max() / expected.mean())
 
 
 def drum_pressure() -> float:
-    """Mean over the arc of contact pressure / (tension/R + w cos phi)."""
+    """Return the mean over the arc of contact pressure / (tension/R + w cos phi)."""
     _, _, pressure, expected = _strip_on_drum()
     return float((pressure / expected).mean())
 
 
 def _strip_on_drum() -> tuple[np.ndarray, ...]:
-    """Tension and pressure per width [N/m], [N/m^2] along a strip whose two ends are held: ours, exact, each.
+    """Return tension [N/m] and pressure [N/m^2] along a strip whose ends are held: ours, exact, each.
 
     Without friction only weight changes the tension N along the strip: dN/ds = w dy/ds, and an arc of radius
     R under tension N presses with N/R + w cos phi, where phi is the angle from the top.
@@ -141,7 +141,7 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
 
 
 def wrapped(rest: np.ndarray, radius: float, length: float, stretch: float) -> np.ndarray:
-    """The strip on a circle of `radius` about z, both ends hanging straight down."""
+    """Return the strip on a circle of `radius` about z, both ends hanging straight down."""
     s = (rest[:, 0] - length / 2) * stretch
     angle = np.clip(s / radius, -np.pi / 2, np.pi / 2)
     below = np.abs(s) - np.pi / 2 * radius

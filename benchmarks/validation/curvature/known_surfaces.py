@@ -1,4 +1,4 @@
-"""The curvature metric on surfaces whose curvature is known: it has to be right before it judges."""
+"""Curvature metric on surfaces whose curvature is known: it has to be right before it is used."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from benchmarks.validation.convergence import fitted_order
 
 
 def sphere_curvature() -> float:
-    """Largest relative error of H over the vertices of a sphere, the twelve 5-valent ones included."""
+    """Return the largest relative error of H over a sphere, the twelve 5-valent vertices included."""
     radius = 0.25
     x, faces = icosphere(3, radius)
     return float(np.abs(mean_curvature(x, faces)[0] * radius - 1.0).max())
 
 
 def torus_order() -> float:
-    """Order of the largest error of H on a torus."""
+    """Return the order of the largest error of H on a torus."""
     errors = []
     for cells in (24, 48, 96):
         x, faces, exact = torus(cells, 0.3, 0.1)
@@ -26,7 +26,7 @@ def torus_order() -> float:
 
 
 def sphere_order() -> float:
-    """Order of the largest error of H on a sphere, on a band of right triangles along parallels.
+    """Return the order of the largest error of H on a band of a sphere, right triangles along parallels.
 
     On triangles that are all nearly alike, as an icosahedron's, the error falls faster still.
     """
@@ -41,7 +41,7 @@ def sphere_order() -> float:
 
 
 def cylinder_order() -> float:
-    """Order of the largest error of H on a cylinder of right triangles with no edge along the circle."""
+    """Return the order of the largest error of H on a cylinder, no edge along the circle."""
     errors, sizes = [], (12, 24, 48)
     for cells in sizes:
         flat, faces = rectangle("right", cells, cells, 1.0, 1.0)
@@ -52,7 +52,7 @@ def cylinder_order() -> float:
 
 
 def cylinder_curvature() -> float:
-    """Mean of H over interior vertices [1/m] of a cylinder of radius 0.1 m: 1/(2 R) = 5."""
+    """Return the mean of H over interior vertices [1/m] of a cylinder of radius 0.1 m: 1/(2 R) = 5."""
     x, faces = cylinder_patch(40, 0.1)
     curvature, area = mean_curvature(x, faces)
     inside = ~boundary_mask(faces, len(x))
@@ -60,7 +60,7 @@ def cylinder_curvature() -> float:
 
 
 def cylinder_floor() -> float:
-    """Relative rms error of H on a cylinder of jittered triangles: finer ones do not lower it."""
+    """Return the relative rms error of H on a cylinder of jittered triangles, at any size."""
     flat, faces = rectangle("delaunay", 48, 48, 1.0, 1.0)
     x = _wrapped(flat)
     inside = ~boundary_mask(faces, len(x))
@@ -68,7 +68,7 @@ def cylinder_floor() -> float:
 
 
 def sphere_floor() -> float:
-    """The same on a cap of the unit sphere, seen from above as a jittered square of side 1."""
+    """Return the relative rms error of H on a cap of the unit sphere, jittered seen from above."""
     flat, faces = rectangle("delaunay", 48, 48, 1.0, 1.0)
     flat = flat - 0.5
     x = np.column_stack([flat, np.sqrt(1 - (flat**2).sum(axis=1))])
@@ -77,5 +77,5 @@ def sphere_floor() -> float:
 
 
 def _wrapped(flat: np.ndarray) -> np.ndarray:
-    """Points (V,2) of the plane rolled onto a cylinder of radius 1: (V,3)."""
+    """Return points (V,2) of the plane rolled onto a cylinder of radius 1: (V,3)."""
     return np.stack([np.sin(flat[:, 1]), np.cos(flat[:, 1]), flat[:, 0]], axis=1)

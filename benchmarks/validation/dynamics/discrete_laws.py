@@ -25,7 +25,7 @@ HANGING = Scene(
 
 
 def free_fall() -> float:
-    """Largest distance [m] to x_0 + n dt v_0 + g dt^2 n (n+1)/2."""
+    """Return the largest distance [m] to x_0 + n dt v_0 + g dt^2 n (n+1)/2."""
     scene = fall.build(FALL, sheet_cells=14, sheet_frames=45)
     trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, velocity=scene.start_velocity
@@ -35,7 +35,7 @@ def free_fall() -> float:
 
 
 def free_fall_in_substeps() -> float:
-    """The same for four steps a frame: backward Euler with a quarter of the time step."""
+    """Return the largest distance of four steps a frame to the fall with a quarter of the time step."""
     scene, steps = fall.build(FALL, sheet_cells=6, sheet_frames=10), 4
     trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.start, substeps=steps
@@ -47,7 +47,7 @@ def free_fall_in_substeps() -> float:
 
 
 def moving_pins_in_substeps() -> float:
-    """Worst distance [m] between four steps a frame and a quarter of the time step, pins moved alike.
+    """Return the worst distance [m] of four steps a frame to a quarter of the time step, pins moved alike.
 
     Between frames pins move straight on.
     """
@@ -69,11 +69,13 @@ def moving_pins_in_substeps() -> float:
 
 
 def stretched_membrane(amplitude: float) -> tuple[Cloth, np.ndarray, np.ndarray, float]:
-    """A square membrane of 1 m held at its border: cloth, start (V,3) [m] with its lowest mode of that
-    amplitude [m], the mode (V,) and omega^2 [1/s^2] of it.
+    """Make a square membrane of 1 m, held at its border, that starts in its lowest mode.
 
-    With stretch s, spacing h and lumped masses: S = (lam + mu)(s^2 - 1), omega^2 = (S/rho_a) (4/h^2)
-    2 sin^2(pi h/2).
+    With stretch s, spacing h and lumped masses: S = (lam + mu)(s^2 - 1),
+    omega^2 = (S/rho_a) (4/h^2) 2 sin^2(pi h/2).
+
+    Returns:
+        Cloth, start (V,3) [m] with the mode of that amplitude [m], the mode (V,), and omega^2 [1/s^2].
     """
     cells, s, material = 8, 1.2, Material()
     points, faces = right_grid(cells, cells, 1.0, 1.0)
@@ -88,7 +90,7 @@ def stretched_membrane(amplitude: float) -> tuple[Cloth, np.ndarray, np.ndarray,
 
 
 def membrane_vibration() -> float:
-    """Largest error of the lowest mode of a stretched square membrane, as a share of its first amplitude.
+    """Return the largest error of a stretched membrane's lowest mode, over its first amplitude.
 
     The discrete motion is z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega^2 dt^2).
     """
@@ -103,7 +105,7 @@ def membrane_vibration() -> float:
 
 
 def momentum_balance() -> float:
-    """Largest |P' - P - dt weight| over steps of a crumpled sheet thrown freely, over dt times weight.
+    """Return the largest |P' - P - dt weight| of a crumpled sheet thrown freely, over dt times weight.
 
     Strain and bending are internal: their forces sum to zero.
     """
@@ -116,7 +118,7 @@ def momentum_balance() -> float:
 
 
 def angular_momentum_balance() -> float:
-    """Largest error of L' = L - dt sum m v x v' + dt tau(x') over the same steps, over the largest |L|.
+    """Return the largest error of L' = L - dt sum m v x v' + dt tau(x'), over the largest |L|.
 
     Backward Euler loses angular momentum by the second term; strain and bending have no torque.
     """
@@ -148,7 +150,7 @@ def _thrown_sheet() -> tuple[Trajectory, Cloth]:
 
 
 def unique_step() -> float:
-    """Largest distance [m] between the ends of one step from two random starts, under the convexity bound.
+    """Return the largest distance [m] of one step from two random starts, under the convexity bound.
 
     The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter than
     h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
@@ -158,7 +160,7 @@ def unique_step() -> float:
 
 
 def ambiguous_step() -> float:
-    """The same distance [m] at 1/30 s, far above the bound: how much two honest solvers may differ."""
+    """Return that distance [m] at 1/30 s, far above the bound: how much two valid solvers may differ."""
     material = Material()
     bound = SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
     first, second = _step_from_random_starts(DT / bound)
@@ -166,7 +168,7 @@ def ambiguous_step() -> float:
 
 
 def _step_from_random_starts(share: float) -> list[np.ndarray]:
-    """Ends of one step of `share` times the bound, thrown into disorder, from two guesses far off."""
+    """Return ends of one step of `share` times the bound, thrown into disorder, from two far guesses."""
     material = Material()
     cells = 12
     points, faces = right_grid(cells, cells, cells * SPACING, cells * SPACING)
@@ -184,7 +186,7 @@ def _step_from_random_starts(share: float) -> list[np.ndarray]:
 
 
 def energy_inequality() -> float:
-    """Largest excess of Phi' + |v' - v|_M^2/2 over Phi + |v|_M^2/2, over the largest kinetic energy.
+    """Return the largest excess of Phi' + |v' - v|_M^2/2 over Phi + |v|_M^2/2, over the kinetic energy.
 
     Both sides are the step's objective, at its end and at the previous positions: a step that ends above the
     place it came from is wrong. Measured on the hanging sheet.

@@ -1,4 +1,4 @@
-"""How much of a headline number is the mesh's or the time step's: the hanging sheet at two of each."""
+"""Dependence of headline numbers on mesh and time step: the hanging sheet at two of each."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ SHORTER = 4  # times as many steps
 
 
 def mesh_dependence(quantity: str) -> float:
-    """Mean over frames on cells half as wide, over that on the others."""
+    """Return the mean over frames on cells half as wide, over that on the others."""
     return _means(CELLS * FINER, 1)[quantity] / _means(CELLS, 1)[quantity]
 
 
 def time_step_dependence(quantity: str) -> float:
-    """Mean over the same instants with a quarter of the time step, over that at 1/30 s."""
+    """Return the mean over the same instants with a quarter of the time step, over that at 1/30 s."""
     return _means(CELLS, SHORTER)[quantity] / _means(CELLS, 1)[quantity]
 
 

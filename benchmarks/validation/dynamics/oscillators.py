@@ -1,4 +1,4 @@
-"""Motions of so few vertices that backward Euler can be solved beside the simulator, by scipy.
+"""Motions of so few vertices that scipy solves backward Euler, for comparison with the simulator.
 
 Pendulum: one triangle hangs by its base; by symmetry its third vertex stays half-way between the two pins,
 at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) G^2, G = ((r/h)^2 - 1)/2. So
@@ -26,12 +26,12 @@ RIGIDITY = HEIGHT * BASE / 2 * (SOFT.lame_lambda / 2 + SOFT.lame_mu)  # [J] A (l
 
 
 def _pull(r: float) -> float:
-    """dE/dr of the pendulum [N]."""
+    """Return dE/dr of the pendulum [N]."""
     return RIGIDITY * ((r / HEIGHT) ** 2 - 1) * r / HEIGHT**2
 
 
 def _simulated_pendulum(start: np.ndarray, dt: float, frames: int, *, gravity: float = GRAVITY) -> np.ndarray:
-    """Path (frames, 2) [m] of the free vertex in the plane across the base, from `start` (2,), at rest."""
+    """Return the path (frames, 2) [m] of the free vertex across the base, from `start` (2,), at rest."""
     rest = np.array([[0.0, 0.0, -BASE / 2], [0.0, 0.0, BASE / 2], [HEIGHT, 0.0, 0.0]])
     cloth = Cloth(rest, np.array([[0, 1, 2]]), SOFT, pins=[0, 1])
     x = rest.copy()
@@ -42,7 +42,7 @@ def _simulated_pendulum(start: np.ndarray, dt: float, frames: int, *, gravity: f
 
 
 def pendulum() -> float:
-    """Largest distance [m] of the pendulum to its backward-Euler steps solved by scipy, over 60 steps."""
+    """Return the largest distance [m] of the pendulum to its steps solved by scipy, over 60 steps."""
     dt, start = 1 / 30, np.array([0.52, 0.1])
 
     def balance(q, before, last):
@@ -57,7 +57,7 @@ def pendulum() -> float:
 
 
 def time_step_order() -> float:
-    """Order in dt of the pendulum's place after half a second; the reference is integrated by scipy."""
+    """Return the order in dt of the pendulum's place after half a second; scipy integrates the reference."""
     start, end = np.array([0.52, 0.1]), 0.5
 
     def rate(_, state):
@@ -72,7 +72,7 @@ def time_step_order() -> float:
 
 
 def numerical_damping(frequency: float) -> tuple[float, float]:
-    """Amplitude left after 1 s at 30 steps a second of a mass that swings at `frequency` [rad/s].
+    """Return the amplitude left after 1 s at 30 steps a second of a swing at `frequency` [rad/s], and exact.
 
     Backward Euler multiplies x + i v/omega by 1/(1 + i omega dt) in each step. The pendulum of a fitting
     length swings along itself, weightless, by a hundred thousandth.
@@ -88,7 +88,7 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
 
 
 def rotor() -> float:
-    """Largest distance [m] between a turning hexagon and its exact backward-Euler steps, over 60 steps.
+    """Return the largest distance [m] between a turning hexagon and its exact steps, over 60 steps.
 
     The force is along z' itself, so z' (1 + dt^2 f(|z'|)) = 2 z - z_before: the direction is that of the
     right side, and the radius the root of one equation.

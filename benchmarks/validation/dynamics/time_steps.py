@@ -26,7 +26,7 @@ BALL = 0.1  # [m] radius
 
 
 def membrane_order() -> float:
-    """Order of the lowest mode of a stretched square membrane after a tenth of a second: A cos(omega t)."""
+    """Return the order of a stretched membrane's lowest mode after a tenth of a second: A cos(omega t)."""
     amplitude, end = 1e-5, 0.1
     cloth, start, mode, omega2 = stretched_membrane(amplitude)
     exact = amplitude * np.cos(np.sqrt(omega2) * end) * mode
@@ -36,7 +36,7 @@ def membrane_order() -> float:
 
 
 def swing_order() -> float:
-    """Order of a sheet, hanging from its upper edge and let go at 20 degrees, after a quarter of a second."""
+    """Return the order of a sheet that hangs from its upper edge, let go at 20 degrees, after 0.25 s."""
     flat, faces = sheet((8, 6), (0.4, 0.3))
     upright = np.stack([flat[:, 2], -flat[:, 0], flat[:, 1]], axis=1)
     cloth = Cloth(upright, faces, Material(), pins=np.arange(7))
@@ -50,25 +50,26 @@ def swing_order() -> float:
 
 
 class MovingBall(RoundBody):
-    """A ball whose centre is at `heights` (T,) [m] above the origin, frame by frame."""
+    """Ball whose centre is at `heights` (T,) [m] above the origin, frame by frame."""
 
     def __init__(self, heights: Sequence[float] | np.ndarray) -> None:
         super().__init__(BALL)
         self.heights = heights
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+        """Return tangent planes below points (S, 3) [m] in a frame."""
         centre = np.array([0.0, self.heights[min(frame, len(self.heights) - 1)], 0.0])
         found = super().planes(points - centre, frame)
         return Planes(found.points + centre, found.normals, found.faces, found.barycentric)
 
 
 def pressed_order() -> float:
-    """Order of a taut sheet that a ball, already in touch, is pressed into smoothly."""
+    """Return the order of a taut sheet that a ball, already in touch, is pressed into smoothly."""
     return halving_order(_pressed(), (30, 60, 120, 240))
 
 
 def chord_distance() -> float:
-    """Distance [m] of that sheet to one whose ball moves at even speed between frames of 1/30 s.
+    """Return the distance [m] of that sheet to one whose ball moves evenly between frames of 1/30 s.
 
     Both with 480 steps: what sub-steps of a body known frame by frame converge to is not the smooth motion.
     """
@@ -76,7 +77,7 @@ def chord_distance() -> float:
 
 
 def _pressed(frames: int | None = None) -> Callable[[int], np.ndarray]:
-    """Number of steps -> positions after 0.2 s; the ball rises linearly between `frames`, or smoothly."""
+    """Return a function: number of steps -> positions after 0.2 s; the ball rises smoothly or by `frames`."""
     end = 0.2
     flat, faces = square_sheet(8, 0.4)
     border = np.flatnonzero((np.abs(flat[:, [0, 2]]) > 0.2 - 1e-9).any(axis=1))
@@ -104,7 +105,7 @@ def _pressed(frames: int | None = None) -> Callable[[int], np.ndarray]:
 
 
 class Viscosity(Energy):
-    """E = c/(2 dt) |(x_j - x_i) - (x_j - x_i)_t|^2 [J] of an edge: a force -c times the relative velocity."""
+    """Viscosity of an edge, E = c/(2 dt) |(x_j - x_i) - (x_j - x_i)_t|^2 [J], c times relative velocity."""
 
     name = "viscosity"
 
@@ -113,10 +114,12 @@ class Viscosity(Energy):
         self.before, self.factor = np.zeros((len(cloth.edges), 3)), 0.0
 
     def prepare(self, step: Step) -> None:
+        """Remember the edges at the start of the step."""
         self.before = step.previous[self.stencils[:, 1]] - step.previous[self.stencils[:, 0]]
         self.factor = VISCOSITY / step.dt
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the energy [J] and its gradient (V, 3) [N]."""
         first, second = self.stencils.T
         change = x[second] - x[first] - self.before
         gradient = np.zeros_like(x)
@@ -125,23 +128,25 @@ class Viscosity(Energy):
         return 0.5 * self.factor * float((change**2).sum()), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the Hessian of each edge, (E, 6, 6) [N/m]."""
         _, blocks = self.scalar_stiffness(x)
         return np.kron(blocks, np.eye(3))
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the edges and their blocks (E, 2, 2) [N/m], the same for all coordinates."""
         block = self.factor * np.array([[1.0, -1.0], [-1.0, 1.0]])
         return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
 
 
 def hanging_sheet_order(viscous: bool) -> float:
-    """Order of the sheet held at two corners, wrinkled after 0.7 s, with viscous edges or as it is."""
+    """Return the order of the sheet held at two corners, wrinkled after 0.7 s, viscous or as it is."""
     scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=22)
     energies = [*scene.energies, *([Viscosity(scene.cloth)] if viscous else [])]
     return halving_order(lambda n: _end(scene.cloth, energies, scene.start, 0.7, n), (42, 84, 168, 336))
 
 
 def halving_order(end: Callable[[int], np.ndarray], steps: Sequence[int]) -> float:
-    """Order of what `end` gives for a number of steps (V,3) [m]; each of `steps` is twice the one before."""
+    """Return the order of `end` (V,3) [m] over numbers of steps, each twice the one before."""
     ends = [end(n) for n in steps]
     return fitted_order([_distance(a, b) for a, b in pairwise(ends)], [1 / n for n in steps[:-1]])
 
@@ -153,6 +158,6 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
 def _end(
     cloth: Cloth, energies: Sequence[Energy], start: np.ndarray, end: float, n: int, **options: Any
 ) -> np.ndarray:
-    """Positions (V,3) [m] after `end` [s] in n steps, from rest."""
+    """Return positions (V,3) [m] after `end` [s] in n steps, from rest."""
     trajectory = simulate(cloth, energies, dt=end / n, frames=n + 1, start=start, **options)
     return demand_converged(trajectory, "the simulation").positions[-1]

@@ -1,4 +1,4 @@
-"""A strip held at both ends over a drum that turns under it: the pulls are to each other as exp(mu phi).
+"""Capstan: a strip held at both ends over a drum that turns under it; the pulls differ by exp(mu phi).
 
 Everything slips one way, and nothing moves any more once the tension has found its profile, so the friction
 of each vertex is mu N on its own tangent. Where the strip turns by b at a vertex whose normal halves the
@@ -30,7 +30,7 @@ TURN = 0.02  # [rad] of the drum in a step
 
 
 class TurningDrum(RoundBody):
-    """The cylinder about the z axis, turning by `turn` [rad] a step; its skin is known exactly.
+    """Cylinder about the z axis, turning by `turn` [rad] a step; its skin is known exactly.
 
     Its one face has the turned unit vectors as corners, so that "barycentric" coordinates on it are the
     coordinates of a point in the frame that turns.
@@ -43,27 +43,29 @@ class TurningDrum(RoundBody):
         self.turn = turn
 
     def at(self, frame: int) -> np.ndarray:
+        """Return the turned unit vectors of a frame, (3, 3)."""
         c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+        """Return tangent planes below points (S, 3) [m], with places on the turning skin."""
         found = super().planes(points, frame)
         return Planes(found.points, found.normals, found.faces, found.points @ self.at(frame).T)
 
 
 def ratio(mu: float, stiffness: float = HARD) -> float:
-    """Pull on the tight end over that on the slack one, over exp(mu phi); phi is the angle between both."""
+    """Return the pull on the tight end over that on the slack one, over exp(mu phi)."""
     return float(np.exp(_excess(mu, stiffness, 60)))
 
 
 def order() -> float:
-    """Order in the length of a cell of the error of the logarithm of that ratio, at mu = .5."""
+    """Return the order in the length of a cell of the error of the logarithm of that ratio, at mu = 0.5."""
     columns = (30, 60, 120)
     return fitted_order([abs(_excess(0.5, HARD, n)) for n in columns], [1 / n for n in columns])
 
 
 def _excess(mu: float, stiffness: float, columns: int) -> float:
-    """Logarithm of the ratio of the pulls, less mu times the angle between the first and the last cell."""
+    """Return the logarithm of the ratio of the pulls, less mu times the angle from first to last cell."""
     material = Material(young_modulus=7e6, poisson_ratio=0.0)  # stiff: exact formulas need no stretch
     radius = DRUM + DEFAULT_MARGIN - np.sqrt(PULL / DRUM / (3 * stiffness))
     length = np.pi * radius + 2 * SLACK

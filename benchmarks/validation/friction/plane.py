@@ -31,14 +31,14 @@ LEVEL, STILL = np.eye(3), np.zeros((1, 1, 3))
 
 
 def creep_speed(ratio: float) -> float:
-    """Speed of a patch on a slope of tan(a) = ratio mu after 30 steps, over that at which u' = u in (1)."""
+    """Return the speed of a patch on a slope of tan(a) = ratio mu, over that of u' = u in (1)."""
     path, downhill = _slope(ratio, frames=31)
     speed = float((path[-1] - path[-2]) @ downhill) / DT
     return speed / (SPEED * (1 - np.sqrt(1 - ratio)))
 
 
 def slope_path(ratio: float) -> float:
-    """Worst distance [m] of a patch on a slope to where (1) has it, over 30 steps."""
+    """Return the worst distance [m] of a patch on a slope to its path by (1), over 30 steps."""
     path, downhill = _slope(ratio, frames=31)
     angle = np.arctan(ratio * MU)
     exact = _slip(0.0, ratio, DT * MU * GRAVITY * np.cos(angle) / SPEED, steps=30)
@@ -46,7 +46,7 @@ def slope_path(ratio: float) -> float:
 
 
 def slide_path(ratio: float) -> float:
-    """Worst distance [m] to the path of a constant force: g (sin a - mu cos a) dt^2 n (n + 1) / 2."""
+    """Return the worst distance [m] to g (sin a - mu cos a) dt^2 n (n + 1) / 2, a constant force."""
     path, downhill = _slope(ratio, frames=31)
     angle, n = np.arctan(ratio * MU), np.arange(31)
     exact = GRAVITY * (np.sin(angle) - MU * np.cos(angle)) * DT**2 * n * (n + 1) / 2
@@ -54,7 +54,7 @@ def slide_path(ratio: float) -> float:
 
 
 def belt_path(substeps: int = 1) -> float:
-    """Worst distance [m] of a patch put at rest on a belt to where (1) has it: u is how fast it lags."""
+    """Return the worst distance [m] of a patch put on a belt to its path by (1); u: how fast it lags."""
     along = np.array([BELT * DT, 0.0, 0.0]) * np.arange(16)[:, None, None]
     path = _patch(LEVEL, along, frames=16, substeps=substeps)[:, 0]
     dt = DT / substeps
@@ -63,7 +63,7 @@ def belt_path(substeps: int = 1) -> float:
 
 
 def landing_speed() -> float:
-    """Speed a patch keeps that lands while it slides, over v - mu (v_n + g t).
+    """Return the speed that a sliding patch keeps when it lands, over v - mu (v_n + g t).
 
     The table gives it the momentum m (v_n + g t) upwards, and takes mu times that of its sliding. Friction
     is a step late, but loses nothing: the force before the first step is that of the last, its weight.
@@ -74,7 +74,10 @@ def landing_speed() -> float:
 
 
 def _slip(u: float, drive: float, c: float, *, steps: int, dt: float = DT) -> np.ndarray:
-    """(steps + 1,) [m] slipped by (1) from u on. Below 1 it is c u'^2 - (1 + 2 c) u' + u + c r = 0."""
+    """Return the distance (steps + 1,) [m] slipped by (1) from u on.
+
+    Below 1 it is c u'^2 - (1 + 2 c) u' + u + c r = 0.
+    """
     slipped = [0.0]
     for _ in range(steps):
         smooth = (1 + 2 * c - np.sqrt(max((1 + 2 * c) ** 2 - 4 * c * (u + c * drive), 0.0))) / (2 * c)
@@ -98,7 +101,7 @@ def _patch(
     velocity: np.ndarray = STILL[0, 0],
     substeps: int = 1,
 ) -> np.ndarray:
-    """(T, 3) [m] middle of a patch on a turned plane that moves by motion (T, 1, 3)."""
+    """Return the path (T, 3) [m] of the middle of a patch on a turned plane moved by motion (T, 1, 3)."""
     points, faces = right_grid(2, 2, 0.1, 0.1)
     flat = in_space(points)[:, [0, 2, 1]]
     cloth = Cloth(flat, faces[:, ::-1], Material())
@@ -123,7 +126,7 @@ def slid(
     quasi_static: bool = False,
     substeps: int = 1,
 ) -> np.ndarray:
-    """(frames, V, 3) [m] of a cloth laid flat (V, 3) [m] on the plane y = 0, both turned by `turn` (3, 3).
+    """Simulate a cloth laid flat (V, 3) [m] on the plane y = 0, both turned by `turn`: (frames, V, 3) [m].
 
     It starts as deep in the margin as its weight presses it. The plane moves by motion (T, 1, 3) [m], pins
     by pull (3,) [m] a frame; velocity (3,) [m/s] is that of the start. `speed` [m/s] is that of the

@@ -40,13 +40,13 @@ COLUMNS = 40
 
 
 def spring_path() -> float:
-    """Worst distance [m] of the pulled point to the path of (1), over 300 steps."""
+    """Return the worst distance [m] of the pulled point to the path of (1), over 300 steps."""
     path, exact = _pulled_point()[:2]
     return float(np.abs(path - exact).max())
 
 
 def spring_pull() -> float:
-    """Pull of the spring after 300 steps, over mu m g."""
+    """Return the pull of the spring after 300 steps, over mu m g."""
     return _pulled_point()[2]
 
 
@@ -80,7 +80,7 @@ def _pulled_point() -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def strip_pull() -> float:
-    """Worst error of the pull on a strip, until all of it slides, from (2); over mu times its weight."""
+    """Return the worst error of the pull on a strip from (2), until all slides, over mu times weight."""
     ends, pulls = _pulled_strip()
     sticking = ends < _end(1.0)
     exact = [brentq(lambda share, u=u: _end(share) - u, 0.0, 1.0) for u in ends[sticking]]
@@ -88,19 +88,19 @@ def strip_pull() -> float:
 
 
 def strip_slide() -> float:
-    """Pull on a strip of which all slides, over mu times its weight."""
+    """Return the pull on a strip of which all slides, over mu times its weight."""
     ends, pulls = _pulled_strip()
     return float(pulls[ends > 1.1 * _end(1.0)].mean())
 
 
 def _end(share: float) -> float:
-    """u [m] at which the pull is that share of mu times the strip's weight, by (2)."""
+    """Return u [m] at which the pull is that share of mu times the strip's weight, by (2)."""
     return quad(lambda X: string_stretch(MU * WEIGHT * X) - 1, 0, share * LENGTH, epsabs=1e-14)[0]
 
 
 @cache
 def _pulled_strip() -> tuple[np.ndarray, np.ndarray]:
-    """Where the pulled end is [m], and the pull over mu times the weight, step by step."""
+    """Return the place of the pulled end [m], and the pull over mu times the weight, step by step."""
     width = LENGTH / COLUMNS
     points, faces = right_grid(1, COLUMNS, width, LENGTH)
     rest = in_space(points)[:, [0, 2, 1]]

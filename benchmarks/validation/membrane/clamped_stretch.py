@@ -22,12 +22,12 @@ GOLD_CELLS = 24
 
 
 def force() -> tuple[float, float]:
-    """Pull on a clamp [N], ours and theirs."""
+    """Return the pull on a clamp [N], ours and theirs."""
     return _ours()[0], _gold()[0]
 
 
 def neck() -> tuple[float, float]:
-    """Width [m] half-way between the clamps, ours and theirs."""
+    """Return the width [m] half-way between the clamps, ours and theirs."""
     return _ours()[1], _gold()[1]
 
 

@@ -12,7 +12,7 @@ STRETCH, SHEAR = 1.3, 0.4
 
 
 def closed_form(state: str) -> float:
-    """Energy of a homogeneous state of a rotated, unstructured patch over its closed form.
+    """Return the energy of a homogeneous state of a rotated, unstructured patch over its closed form.
 
     With G = (s^2 - 1)/2, per unit area: uniaxial strain (lam/2 + mu) G^2; uniaxial stress E2 G^2/2 at
     lateral stretch^2 1 - nu2 (s^2 - 1); equibiaxial 2 (lam + mu) G^2; simple shear g
@@ -30,7 +30,7 @@ def _turned_patch() -> tuple[Cloth, np.ndarray]:
 
 
 def _states() -> dict[str, tuple[np.ndarray, float]]:
-    """Deformation (2,2) and energy per area [J/m^2], by name."""
+    """Return deformation (2,2) and energy per area [J/m^2] of each state, by name."""
     material = Material()
     lam, mu = material.lame_lambda, material.lame_mu
     s, g = STRETCH, SHEAR
@@ -47,7 +47,10 @@ def _states() -> dict[str, tuple[np.ndarray, float]]:
 
 
 def uniaxial_pull() -> tuple[float, float]:
-    """Force [N] on an end of unit width in uniaxial stress, s E2 G. Raises if anything pulls across."""
+    """Return the force [N] on an end of unit width in uniaxial stress, and its closed form s E2 G.
+
+    Raises RuntimeError if anything pulls across.
+    """
     cloth, points = _turned_patch()
     deformation, _ = _states()["uniaxial stress"]
     turn = random_rotation(2)
@@ -59,28 +62,28 @@ def uniaxial_pull() -> tuple[float, float]:
 
 
 def constant(name: str) -> float:
-    """A number of the default cotton, E = 70 kPa, nu = 0.485, t = 0.47 mm, rho = 426 kg/m^3."""
+    """Return a number of the default cotton, E = 70 kPa, nu = 0.485, t = 0.47 mm, rho = 426 kg/m^3."""
     return float(getattr(Material(), name))
 
 
 def weight_of_a_square_metre() -> float:
-    """[N]"""
+    """Return the weight of a square metre of the default cotton [N]."""
     cloth, _ = _turned_patch()
     return float(Gravity(cloth).value_and_gradient(cloth.rest_positions)[1][:, 1].sum())
 
 
 def scikit_fem_energy() -> float:
-    """Relative difference of the membrane energy to an assembly by scikit-fem, in a random 3D state."""
+    """Return the relative difference of the membrane energy to scikit-fem's, in a random 3D state."""
     return _scikit_fem_differences()[0]
 
 
 def scikit_fem_gradient() -> float:
-    """Relative difference of the membrane's gradient to scikit-fem's."""
+    """Return the relative difference of the membrane's gradient to scikit-fem's."""
     return _scikit_fem_differences()[1]
 
 
 def scikit_fem_hessian() -> float:
-    """Relative difference of the membrane's Hessian to scikit-fem's."""
+    """Return the relative difference of the membrane's Hessian to scikit-fem's."""
     return _scikit_fem_differences()[2]
 
 
@@ -143,13 +146,13 @@ def _scikit_fem_differences() -> tuple[float, float, float]:
 
 
 def rigid_motion() -> float:
-    """Largest force [N] in a flat patch after a rigid motion, hinges on."""
+    """Return the largest force [N] in a flat patch after a rigid motion, hinges on."""
     potential, x = _moved_patch()
     return float(np.abs(potential.gradient(x)).max())
 
 
 def rigid_invariance() -> float:
-    """Relative change of the forces on a patch in disorder as it moves and turns, seen from the patch."""
+    """Return the relative change of the forces on a disordered patch under a rigid motion."""
     potential, x = _moved_patch()
     x = x + np.random.default_rng(6).normal(0, 0.03, x.shape)
     turn = random_rotation(9)
@@ -158,7 +161,7 @@ def rigid_invariance() -> float:
 
 
 def zero_modes() -> float:
-    """Number of eigenvalues of the Hessian under 1e-9 of the largest, at rest after a rigid motion."""
+    """Return the number of eigenvalues of the Hessian under 1e-9 of the largest, at rest."""
     potential, x = _moved_patch()
     values = np.linalg.eigvalsh(potential.hessian(x).toarray())
     return float((np.abs(values) < 1e-9 * values[-1]).sum())

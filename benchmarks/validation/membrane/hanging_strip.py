@@ -25,22 +25,22 @@ ROWS = (12, 24, 48)
 
 
 def string_stretch(force: float) -> float:
-    """s with E2 s (s^2 - 1)/2 = force [N/m]."""
+    """Return s with E2 s (s^2 - 1)/2 = force [N/m]."""
     return brentq(lambda s: E2 * s * (s * s - 1) / 2 - force, 1.0, 3.0, xtol=1e-15)
 
 
 def exact_tip() -> float:
-    """Length [m] of the strip of 1 m hanging by one end."""
+    """Return the length [m] of the strip of 1 m hanging by one end."""
     return quad(lambda hanging: string_stretch(WEIGHT * hanging), 0, 1, epsabs=1e-13)[0]
 
 
 def hanging_strip_tip() -> tuple[float, float]:
-    """Distance [m] of the free end from the hung one, measured and exact."""
+    """Return the distance [m] of the free end from the hung one, measured and exact."""
     return _hanging(ROWS[1]), exact_tip()
 
 
 def hanging_strip_order() -> float:
-    """Order at which that distance converges."""
+    """Return the order at which that distance converges."""
     exact = exact_tip()
     return fitted_order([abs(_hanging(rows) - exact) for rows in ROWS], [1 / rows for rows in ROWS])
 
@@ -54,7 +54,10 @@ def _hanging(rows: int) -> float:
 
 
 def exact_catenary() -> tuple[float, float]:
-    """Horizontal force per width [N/m] and sag [m]; X is measured from the lowest point."""
+    """Return the horizontal force per width [N/m] and the sag [m] of the elastic catenary.
+
+    X is measured from the lowest point.
+    """
 
     def over_half(force: float, vertical: bool) -> float:
         def share(X: float) -> float:
@@ -68,17 +71,17 @@ def exact_catenary() -> tuple[float, float]:
 
 
 def catenary_sag() -> tuple[float, float]:
-    """Depth [m] of the middle below the ends."""
+    """Return the depth [m] of the middle below the ends, measured and exact."""
     return _catenary(ROWS[-1])[1], exact_catenary()[1]
 
 
 def catenary_force() -> tuple[float, float]:
-    """Horizontal force per width on an end [N/m]."""
+    """Return the horizontal force per width on an end [N/m], measured and exact."""
     return _catenary(ROWS[-1])[0], exact_catenary()[0]
 
 
 def catenary_order() -> float:
-    """Order at which the sag converges."""
+    """Return the order at which the sag converges."""
     exact = exact_catenary()[1]
     return fitted_order([abs(_catenary(rows)[1] - exact) for rows in ROWS], [1 / rows for rows in ROWS])
 

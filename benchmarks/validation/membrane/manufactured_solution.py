@@ -23,13 +23,13 @@ CELLS = (8, 16, 32)
 
 
 def surface(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
-    """x (3, ...) [m] of material points."""
+    """Return x (3, ...) [m] of material points."""
     bump = np.sin(np.pi * X) * np.sin(np.pi * Y)
     return np.stack([1.15 * X + 0.04 * bump, 1.1 * Y + 0.05 * X * Y * (1 - Y), 0.15 * bump])
 
 
 def gradient(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
-    """F = dx/dX (3, 2, ...)."""
+    """Return F = dx/dX (3, 2, ...)."""
     along = np.pi * np.cos(np.pi * X) * np.sin(np.pi * Y)
     across = np.pi * np.sin(np.pi * X) * np.cos(np.pi * Y)
     zero = np.zeros_like(X)
@@ -43,12 +43,12 @@ def gradient(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
 
 
 def mean_square_order() -> float:
-    """Order of the error of positions in the mean square."""
+    """Return the order of the error of positions in the mean square."""
     return fitted_order([_errors(cells)[0] for cells in CELLS], [1 / cells for cells in CELLS])
 
 
 def gradient_order() -> float:
-    """Order of the error of the deformation gradient in the mean square."""
+    """Return the order of the error of the deformation gradient in the mean square."""
     return fitted_order([_errors(cells)[1] for cells in CELLS], [1 / cells for cells in CELLS])
 
 

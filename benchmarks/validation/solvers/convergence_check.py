@@ -1,4 +1,4 @@
-"""What is true of the end of a stress step, found without the solver's kernels.
+"""Independent check of a stress step's end, without the solver's kernels.
 
 Energies, gradient and Hessian come from automatic differentiation of each term's torch definition; the
 curvature from all eigenvalues of the dense Hessian. A claim that does not hold is a failure, whatever else.
@@ -31,7 +31,7 @@ STATUS = {"converged": "ok", "max_iterations": "stalled"}
 
 @dataclass(frozen=True)
 class StressStep:
-    """A prepared potential, the guess (V, 3) [m] to start from, pins and the mean weight of a vertex [N].
+    """Prepared potential, guess (V, 3) [m] to start from, pins, and the mean weight of a vertex [N].
 
     `weight` is that under Earth's gravity, whatever the step's own.
     """
@@ -44,30 +44,30 @@ class StressStep:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedResult(Measurement):
-    """The row of one minimisation: `value` is the relative residual, found independently."""
+    """Row of one minimisation: `value` is the relative residual, computed independently."""
 
     iterations: int
 
     @property
     def counted(self) -> Measurement:
-        """The same with the number of iterations as its value."""
+        """The same row with the number of iterations as its value."""
         return dataclasses.replace(self, value=float(self.iterations))
 
 
 def solve_and_check(step: StressStep, solve: Callable[..., Result] = minimise) -> CheckedResult:
-    """Minimise, watched, and check what came out."""
+    """Minimise, keep the points on the way, and check the result."""
     kept: list[np.ndarray] = []
     result = solve(step.potential, step.guess, tolerance=TOLERANCE, timeout=TIMEOUT, observe=kept.append)
     return check_result(step, result, kept)
 
 
 def lbfgs_then_newton(potential: Potential, x0: np.ndarray, **options: Any) -> Result:
-    """The simulator's own way through a step: L-BFGS, finished by Newton's method."""
+    """Minimise as the simulator does: L-BFGS, finished by Newton's method."""
     return minimise(potential, x0, method="lbfgs", **options)
 
 
 def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = ()) -> CheckedResult:
-    """The claim of the solver, and the points it kept on the way, held against what is found here."""
+    """Check the solver's claim, and the points it kept on the way, against independent numbers."""
     terms = "+".join(energy.name for energy in step.potential.energies)
     status = STATUS.get(result.status, result.status)
 
@@ -104,14 +104,14 @@ def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = 
 
 
 def energy_of(potential: Potential, x: np.ndarray) -> tuple[float, float]:
-    """Energy [J] at x (V, 3), and the sum of its terms' sizes, from the definitions."""
+    """Return the energy [J] at x (V, 3) and the sum of its terms' sizes, from the definitions."""
     with torch.no_grad():
         parts = [float(energy.energy(torch.as_tensor(x)).sum()) for energy in potential.energies]
     return sum(parts), sum(map(abs, parts))
 
 
 def first_rise(potential: Potential, points: Sequence[np.ndarray]) -> str:
-    """Where the energy rose from one of the points (V, 3) to the next, in words; "" if it never did.
+    """Return where the energy rose from one of the points (V, 3) to the next; "" if it never did.
 
     Beside a collapsed triangle the angle of a hinge is known to a few digits only, and in the end to none:
     there the definition and the solver's kernels differ, and a rise within that difference is none that
@@ -129,8 +129,10 @@ def first_rise(potential: Potential, points: Sequence[np.ndarray]) -> str:
 
 
 def undetermined_energy(potential: Potential, x: np.ndarray) -> float:
-    """Energy [J] that hinges may hold, times the share of half a turn within which round-off of x (V, 3)
-    leaves the angle of each of their triangles: that of a coordinate over the height of the triangle.
+    """Return the energy [J] of hinges whose angle round-off leaves undetermined at x (V, 3).
+
+    What hinges may hold, times the share of half a turn within which round-off leaves the angle of each of
+    their triangles: that of a coordinate over the height of the triangle.
     """
     corner = x[potential.cloth.faces]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
@@ -141,14 +143,14 @@ def undetermined_energy(potential: Potential, x: np.ndarray) -> float:
 
 
 def areas(potential: Potential, x: np.ndarray) -> np.ndarray:
-    """(F,) [m^2] of the triangles at x (V, 3)."""
+    """Return the areas (F,) [m^2] of the triangles at x (V, 3)."""
     corner = x[potential.cloth.faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return 0.5 * np.linalg.norm(normal, axis=1)
 
 
 def collapse_reason(potential: Potential, x: np.ndarray) -> str:
-    """How many triangles collapsed, and whether they may: what a stall of these energies comes from.
+    """Return how many triangles collapsed, and whether they may; "" where none matters.
 
     A triangle without area has no normal, so that its hinges turn to any angle at no way at all: the energy
     jumps there and takes no minimum. What keeps a triangle from it is its membrane alone.
@@ -175,7 +177,7 @@ def collapse_reason(potential: Potential, x: np.ndarray) -> str:
 
 
 def collapse_energies(potential: Potential) -> tuple[np.ndarray, np.ndarray]:
-    """Of each face (F,) [J]: at most what its membrane pays for collapsing and its hinges hold."""
+    """Return what each membrane triangle pays at most for collapsing, and what its hinges hold, (F,) [J]."""
     cloth = potential.cloth
     terms = {energy.name: energy for energy in potential.energies}
     m = cloth.material
@@ -192,8 +194,11 @@ def collapse_energies(potential: Potential) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Optimality:
-    """What holds at a point: relative residual and what round-off does to it [1]; the smallest eigenvalue of
-    the Hessian over free vertices, and the size below which one counts as zero [N/m]."""
+    """Residual and curvature at a point.
+
+    residual, round_off: relative residual, and what round-off does to it [1]. lowest_curvature: smallest
+    eigenvalue of the Hessian over free vertices; zero_curvature: size below which one counts as zero [N/m].
+    """
 
     residual: float
     round_off: float
@@ -202,7 +207,7 @@ class Optimality:
 
 
 def optimality_of(step: StressStep, x: np.ndarray) -> Optimality:
-    """Gradient and curvature at x (V, 3) over the free vertices."""
+    """Compute gradient and curvature at x (V, 3) over the free vertices."""
     potential = step.potential
     free = np.setdiff1d(np.arange(len(x)), step.pins)
     variable = torch.as_tensor(x).clone().requires_grad_(True)
@@ -224,7 +229,7 @@ def optimality_of(step: StressStep, x: np.ndarray) -> Optimality:
 
 
 def dense_hessian(energies: Sequence[Energy], x: np.ndarray) -> np.ndarray:
-    """(3V, 3V) [N/m], from the second derivatives of each element's definition."""
+    """Return the Hessian (3V, 3V) [N/m] from the second derivatives of each element's definition."""
     total = np.zeros((x.size, x.size))
     for energy in energies:
         if energy.name == "gravity":  # linear

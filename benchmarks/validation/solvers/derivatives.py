@@ -25,7 +25,7 @@ WEIGHTS = np.array([1, -8, 8, -1]) / 12  # at -2, -1, 1 and 2 steps
 
 
 def gradient_error(term: str) -> float:
-    """Largest relative error of the slope of the energy along random directions."""
+    """Return the largest relative error of the slope of the energy along random directions."""
     energy, x = _in_disorder(term)
 
     def value(at: np.ndarray) -> np.ndarray:
@@ -36,7 +36,7 @@ def gradient_error(term: str) -> float:
 
 
 def hessian_error(term: str) -> float:
-    """Largest relative error of the change of the gradient along random directions."""
+    """Return the largest relative error of the change of the gradient along random directions."""
     energy, x = _in_disorder(term)
 
     def force(at: np.ndarray) -> np.ndarray:
@@ -83,7 +83,7 @@ def _in_disorder(term: str) -> tuple[Energy, np.ndarray]:
 
 
 def _all_in_contact(cloth: Cloth, x: np.ndarray, random: np.random.Generator) -> ContactPenalty:
-    """Every sample a few centimetres deep in a margin of a metre, against a plane of its own."""
+    """Return contact of every sample, deep in a margin of a metre, against a plane of its own."""
     contact = ContactPenalty(cloth, margin=1.0, stiffness=1.0)
     samples = contact.sample_matrix @ x
     normals = random.normal(size=samples.shape)

@@ -1,4 +1,4 @@
-"""What a minimiser promises: one step on a quadratic, order two near the end, no rise, no saddle."""
+"""Properties of a minimiser: one step on a quadratic, order two near the end, no rise, no saddle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TWO_CYCLE = 1.0886617668
 
 
 def work_on_a_quadratic() -> float:
-    """Factorisations for inertia and weight alone: one for the step, one to confirm the minimum."""
+    """Return the factorisations for inertia and weight alone: one to step, one to confirm the minimum."""
     cloth = _patch(5)
     inertia = Inertia(cloth, 1 / 30)
     inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.1, cloth.rest_positions.shape)
@@ -25,7 +25,7 @@ def work_on_a_quadratic() -> float:
 
 
 def newton_order() -> float:
-    """Slope of log error over log of the error before it, on the last steps of a stretched sheet."""
+    """Return the slope of log error over log of the error before it, on the last steps."""
     potential, start = _stretched()
     end = demand_converged(minimise(potential, start, tolerance=1e-13), "the minimiser").positions
     errors = [
@@ -37,10 +37,10 @@ def newton_order() -> float:
 
 
 def largest_rise() -> float:
-    """Largest rise of the energy from one kept point to the next, from random places, over the first energy.
+    """Return the largest rise of the energy between kept points, over the first energy.
 
-    And from the edge of a two-cycle: for log cosh y, Newton's method goes from y to y - sinh y cosh y, which
-    is -y at TWO_CYCLE. A little further out every full step rises a little.
+    From random places; and from the edge of a two-cycle: for log cosh y, Newton's method goes from y to
+    y - sinh y cosh y, which is -y at TWO_CYCLE. A little further out every full step rises a little.
     """
     cloth = _patch(2)
     start = np.full(cloth.rest_positions.shape, TWO_CYCLE + 1e-6)
@@ -55,7 +55,7 @@ def _rise(potential: Potential, start: np.ndarray, steps: int) -> float:
 
 
 class LogCosh(Energy):
-    """log cosh of every coordinate: convex, and too flat outside for full Newton steps."""
+    """Sum of log cosh of every coordinate: convex, and too flat outside for full Newton steps."""
 
     name = "log_cosh"
 
@@ -64,14 +64,16 @@ class LogCosh(Energy):
         self.stencils = np.arange(cloth.vertex_count)[:, None]
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum and its gradient, tanh."""
         return float(np.log(np.cosh(x)).sum()), np.tanh(x)
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return 1 / cosh^2 on the diagonals, (V, 3, 3)."""
         return np.eye(3) / np.cosh(x)[:, :, None] ** 2
 
 
 def small_gradient() -> float:
-    """How far, in edge lengths, a very soft strip is left from its rest by the default tolerance.
+    """Return how far, in edge lengths, a very soft strip is left from rest by the default tolerance.
 
     Its own weight, of a ten millionth of the Earth's gravity, is below that tolerance from the start; but the
     strip sags by a fifth of an edge.
@@ -89,7 +91,7 @@ def small_gradient() -> float:
 
 
 def negative_curvature() -> float:
-    """Negative eigenvalues of the Hessian where a flat, compressed sheet is said to have come to rest.
+    """Return the negative eigenvalues where a flat, compressed sheet is said to have come to rest.
 
     It starts perfectly flat: without a force out of its plane, but not at a minimum.
     """
@@ -104,7 +106,7 @@ def negative_curvature() -> float:
 
 
 def lbfgs_distance() -> float:
-    """Distance [m] of the end of L-BFGS, not finished by Newton, to Newton's; there is one minimiser."""
+    """Return the distance [m] of the end of L-BFGS alone to Newton's; there is one minimiser."""
     potential, start = _stretched()
     newton = demand_converged(minimise(potential, start, tolerance=1e-12), "the minimiser").positions
     result = minimise(potential, start, "lbfgs", finish=False, max_iterations=LBFGS_STEPS, tolerance=1e-12)
@@ -117,7 +119,7 @@ def _patch(cells: int, pins: np.ndarray | tuple[int, ...] = ()) -> Cloth:
 
 
 def _stretched() -> tuple[Potential, np.ndarray]:
-    """One step of a sheet pulled to 1.2 of its width: tension everywhere, and one minimiser."""
+    """Return one step of a sheet pulled to 1.2 of its width: tension everywhere, and one minimiser."""
     points, faces = right_grid(8, 8, 0.3, 0.3)
     border = (points[:, 0] < 1e-9) | (points[:, 0] > 0.3 - 1e-9)
     cloth = Cloth(in_space(points), faces, Material(poisson_ratio=0.0), pins=np.flatnonzero(border))
@@ -131,7 +133,7 @@ def _stretched() -> tuple[Potential, np.ndarray]:
 
 
 def _crumpled() -> tuple[Potential, np.ndarray]:
-    """One step of a sheet whose vertices start anywhere."""
+    """Return one step of a sheet whose vertices start anywhere."""
     cloth = _patch(6)
     inertia = Inertia(cloth, 1 / 30)
     start = np.random.default_rng(4).uniform(-0.15, 0.15, cloth.rest_positions.shape)

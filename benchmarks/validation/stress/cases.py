@@ -18,12 +18,12 @@ ALL = "membrane+bending+area"
 
 
 def sheet(name: str, description: str, *, smoke: bool = False, **options: Any) -> Case:
-    """One step of a sheet that differs by `options` from an ordinary one, see stress_steps.sheet."""
+    """Declare one step of a sheet that differs by `options` from an ordinary one, see sheet_steps.sheet."""
     return _solved(name, description, "stress.sheet_steps", "solve_sheet", options, smoke)
 
 
 def shirt(name: str, description: str, **options: Any) -> Case:
-    """One step of a T-shirt on a body, see stress_tshirt.shirt."""
+    """Declare one step of a T-shirt on a body, see tshirt_steps.shirt."""
     return _solved(name, description, "stress.tshirt_steps", "solve_shirt", options, False)
 
 
@@ -40,7 +40,7 @@ def _solved(
 def stability_map(
     name: str, what: str, module: str, function: str, *, long: bool = False
 ) -> tuple[Case, ...]:
-    """Iterations of one step at every stiffness and time step, the rows of one scene."""
+    """Declare the iterations of one step at every stiffness and time step, the rows of one scene."""
     return tuple(
         Case(
             name=f"{name}/{factor:g}/{dt:.3g}", scene=name, suite="extremes", seconds=DEADLINE, long=long,

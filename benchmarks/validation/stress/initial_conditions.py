@@ -1,4 +1,4 @@
-"""Where the vertices of a stress step stand and how fast they are: each start is one line of mathematics.
+"""Initial conditions of stress steps: each start is one line of mathematics.
 
 A start takes the rest positions (V, 3) [m] of a horizontal sheet about the origin, to be overwritten, and a
 random generator. Starts that are symmetric to the last bit are saddles of the energy: they are perturbed by
@@ -18,6 +18,7 @@ PERTURBATION = 1e-6  # [m], enough to leave a saddle
 
 
 def noisy(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return positions x (V, 3) [m] with noise of NOISE."""
     return x + random.normal(0, NOISE, x.shape)
 
 
@@ -26,12 +27,12 @@ def _anywhere(width: float) -> Start:
 
 
 def _scaled(along_x: float, along_z: float) -> Start:
-    """Pressed together or pulled apart in its plane, with a perturbation: exactly flat is a saddle."""
+    """Return a start pressed together or pulled apart in its plane, perturbed: exactly flat is a saddle."""
     return lambda x, random: x * [along_x, 1.0, along_z] + random.normal(0, PERTURBATION, x.shape)
 
 
 def _folded(angle: float) -> Start:
-    """The half x > 0 turned up about the z axis by `angle` [rad], with a perturbation."""
+    """Return a start whose half x > 0 is turned up about the z axis by `angle` [rad], perturbed."""
 
     def start(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
         arm = np.maximum(x[:, 0], 0.0)
@@ -43,7 +44,7 @@ def _folded(angle: float) -> Start:
 
 
 def _pleated(angle: float) -> Start:
-    """A row of folds, up and down by turns, each of `angle` [rad] to the horizontal."""
+    """Return a start of a row of folds, up and down by turns, each of `angle` [rad] to the horizontal."""
 
     def start(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
         columns = np.round((x[:, 0] / np.ptp(x[:, 0]) + 0.5) * 8)
@@ -55,7 +56,7 @@ def _pleated(angle: float) -> Start:
 
 
 def _rolled(turns: float) -> Start:
-    """Rolled up tightly around the z axis, through itself."""
+    """Return a start rolled up tightly around the z axis, through itself."""
 
     def start(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
         angle = 2 * np.pi * turns * x[:, 0] / np.ptp(x[:, 0])
@@ -67,7 +68,7 @@ def _rolled(turns: float) -> Start:
 
 
 def _twisted(turns: float) -> Start:
-    """Turned about the x axis, by more and more along it."""
+    """Return a start turned about the x axis, by more and more along it."""
 
     def start(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
         angle = 2 * np.pi * turns * (x[:, 0] / np.ptp(x[:, 0]) + 0.5)
@@ -78,18 +79,18 @@ def _twisted(turns: float) -> Start:
 
 
 def spike(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """One vertex 10 m away."""
+    """Return a noisy start with one vertex 10 m away."""
     x[40] += [0.0, 10.0, 0.0]
     return noisy(x, random)
 
 
 def shuffled(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Every vertex in the place of another: as tangled as can be without leaving the rest shape."""
+    """Return every vertex in the place of another: as tangled as the rest shape allows."""
     return noisy(x[random.permutation(len(x))], random)
 
 
 def collapsed_triangle(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Two neighbours at one place: the hinges between them have no angle."""
+    """Return a noisy start with two neighbours at one place: their hinges have no angle."""
     x = noisy(x, random)
     x[41] = x[40]
     return x
@@ -124,12 +125,12 @@ INITIAL_POSITIONS: dict[str, Start] = {
 
 
 def _slivers(x: np.ndarray) -> np.ndarray:
-    """A ten-thousandth as wide as long: every triangle a sliver."""
+    """Return the sheet a ten-thousandth as wide as long: every triangle a sliver."""
     return x * [1.0, 1.0, 1e-4]
 
 
 def _one_sliver_row(x: np.ndarray) -> np.ndarray:
-    """One row of cells of aspect 1e4 between even ones: stiffness beside softness."""
+    """Return the sheet with one row of cells of aspect 1e4 between even ones."""
     column = np.round((x[:, 0] / np.ptp(x[:, 0]) + 0.5) * 8)
     width = np.ptp(x[:, 0]) / 8
     x[:, 0] = np.where(column == 4, np.ptp(x[:, 0]) * (3 / 8 - 0.5) + 1e-4 * width, x[:, 0])
@@ -161,5 +162,5 @@ VELOCITIES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {  # of 
 def initial_velocities(
     speed: float | str, x: np.ndarray, rest: np.ndarray, random: np.random.Generator
 ) -> np.ndarray:
-    """Velocities (V, 3) [m/s] at positions x: a named field, or noise of that scale."""
+    """Return velocities (V, 3) [m/s] at positions x: a named field, or noise of that scale."""
     return VELOCITIES[speed](x, rest) if isinstance(speed, str) else random.normal(0, 1.0, x.shape) * speed

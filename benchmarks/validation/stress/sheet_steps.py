@@ -41,12 +41,12 @@ MARGIN = 4e-3  # [m] of the contact penalty
 
 
 def solve_sheet(**options: Any) -> CheckedResult:
-    """The step of a sheet, solved as a simulation does and checked; options: see `sheet`."""
+    """Solve the step of a sheet as a simulation does, and check it; options: see `sheet`."""
     return solve_and_check(sheet(**options), lbfgs_then_newton)
 
 
 def sheet_iterations(**options: Any) -> Measurement:
-    """The same; its value is the number of iterations."""
+    """Solve the step of a sheet; the value of the row is the number of iterations."""
     return solve_sheet(**options).counted
 
 
@@ -76,11 +76,15 @@ def sheet(
     body: str = "",
     contact: float = 1.0,
 ) -> StressStep:
-    """A step of a sheet.
+    """Make a step of a sheet.
 
     Args:
-        stiffness, bending, mass, gravity, contact: factors on Young's modulus, hinge stiffness, density,
-            g and contact stiffness.
+        stiffness: factor on Young's modulus.
+        bending: factor on the hinge stiffness.
+        mass: factor on the density.
+        gravity: factor on g.
+        contact: factor on the contact stiffness.
+        scaling: of the hinges, see BendHinge.
         ratio: hinge stiffness over membrane modulus and squared mean edge, instead of `bending`.
         dt: time step [s]; None leaves inertia out.
         pins: "corners", "side" or "none".
@@ -128,7 +132,7 @@ def prepared(
     obstacle: Obstacle | None = None,
     frame: int = 0,
 ) -> StressStep:
-    """The step from `previous` with `velocity`; the guess is the previous positions unless given."""
+    """Make the step from `previous` with `velocity`; the guess is the previous positions unless given."""
     guess = previous if guess is None else guess
     potential = Potential([*energies, Inertia(cloth, dt)] if dt else energies)
     potential.prepare(Step(previous, velocity, guess, dt or DT, obstacle, frame))
@@ -141,7 +145,7 @@ def _ball(radius: float, *, centre: tuple[float, float, float], cells: int = 10)
 
 
 def _box(half: tuple[float, float, float], centre: tuple[float, float, float]) -> Obstacle:
-    """A box with edges of the given half lengths: sharp edges, and thin where one is small."""
+    """Return a box with edges of the given half lengths: sharp edges, and thin where one is small."""
     points, faces = sphere(1.0, 6)
     points = points / np.abs(points).max(axis=1, keepdims=True)
     return Obstacle(points * np.array(half) + np.array(centre), faces)

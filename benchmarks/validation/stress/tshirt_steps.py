@@ -31,12 +31,12 @@ SHOULDERS = {"left_shoulder": -1.0, "right_shoulder": 1.0}
 
 
 def solve_shirt(**options: Any) -> CheckedResult:
-    """The step of the shirt, solved as a simulation does and checked; options: see `shirt`."""
+    """Solve the step of the shirt as a simulation does, and check it; options: see `shirt`."""
     return solve_and_check(shirt(**options), lbfgs_then_newton)
 
 
 def shirt_iterations(**options: Any) -> Measurement:
-    """The same; its value is the number of iterations."""
+    """Solve the step of the shirt; the value of the row is the number of iterations."""
     return solve_shirt(**options).counted
 
 
@@ -52,15 +52,19 @@ def shirt(
     jump: float = 0.0,
     turn: float = 0.0,
 ) -> StressStep:
-    """The step from the shirt's rest shape on a body in T-pose that moves its arms.
+    """Make the step from the shirt's rest shape on a body in T-pose that moves its arms.
 
     Args:
-        stiffness, gravity: factors on Young's modulus and g.
-        dt: [s]. noise [m] and speed [m/s]: scales of the start's disorder.
+        stiffness: factor on Young's modulus.
+        gravity: factor on g.
+        dt: [s].
+        noise: scale [m] of the disorder of the start.
+        speed: scale [m/s] of its velocities.
         scale: size of the shirt at the start about its centre; its rest shape stays.
         arms: degrees by which both arms go down within the step.
-        jump: [m] by which the body moves sideways, and turn: degrees about its axis, while the guess leaves
-            the shirt where it was. Otherwise the guess carries the shirt along with the body.
+        jump: [m] by which the body moves sideways, while the guess leaves the shirt where it was; otherwise
+            the guess carries the shirt along with the body.
+        turn: degrees by which the body turns about its axis, with such a guess.
     """
     random = np.random.default_rng(11)
     body, garment = _dressed()
@@ -87,7 +91,7 @@ def _dressed() -> tuple[Body, Garment]:
 
 
 def _moving(body: Body, arms: float, jump: float, turn: float) -> Obstacle:
-    """The body in T-pose, then moved."""
+    """Return the body in T-pose, then moved."""
     poses = np.zeros((2, len(body.parents), 3))
     for name, side in SHOULDERS.items():
         poses[1, body.joint_names.index(name), 2] = side * np.deg2rad(arms)
