@@ -19,7 +19,7 @@ class Simulated:
 
     Attributes:
         mixed: frames of augmented clips for each original frame, up to 20,000. The clips are the same for
-            every training and seed, see snug.training.augmentation.mixed_clips.shared_clips.
+            every training and seed, see snug.training.augmentation.mixed_clips.make_shared_clips.
         method: name of the method that simulates.
         swinging: whether the clips turn to and fro and stop, see snug.training.augmentation.swinging_clips.
     """

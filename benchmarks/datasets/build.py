@@ -123,7 +123,7 @@ def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str,
     """Return name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
     from snug.motion import library
     from snug.motion.files import load_motions
-    from snug.training.augmentation.mixed_clips import FRAMES, SHARED_SEED, mixed_motions
+    from snug.training.augmentation.mixed_clips import CLIP_FRAMES, SHARED_SEED, make_mixed_clips
 
     reading, given = parse_motion_options(options), list[Any]()
     for path in options.motions or ["library"]:
@@ -132,7 +132,7 @@ def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str,
     count = len(given) if options.sequences is None else options.sequences
     if more := max(0, count - len(given)):
         turn, lifted = DEFAULT.mixed_turn, DEFAULT.mixed_lift
-        given += mixed_motions(given, more * FRAMES, turn=turn, lifted=lifted, seed=SHARED_SEED)
+        given += make_mixed_clips(given, more * CLIP_FRAMES, turn=turn, lifted=lifted, seed=SHARED_SEED)
     if not 0 <= options.first < count:
         raise PlanError(f"--from {options.first}: give a whole number below {count}, that of the sequences")
     motions: dict[str, Motion] = by_name("motion", given[:count])

@@ -140,7 +140,7 @@ class SimulateClips(Task):
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         import numpy as np
 
-        from snug.training.augmentation.mixed_clips import shared_clips
+        from snug.training.augmentation.mixed_clips import make_shared_clips
 
         assets, run, garment = context.assets, context.folder, self.scene.garment
         assert assets is not None
@@ -148,7 +148,7 @@ class SimulateClips(Task):
         left_out: dict[str, str] = {}
         vertices = len(assets.garments[garment].rest_positions)
         before, clips = (
-            shared_clips(assets.named(self.motions), share, vertices=vertices, swinging=self.swinging)
+            make_shared_clips(assets.named(self.motions), share, vertices=vertices, swinging=self.swinging)
             for share in (self.part, self.part + 1)
         )
         own = clips[len(before) :]

@@ -159,7 +159,7 @@ def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> N
 
 def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
     """(N,24,3) [rad], mixed ones included; None of a network that was not trained. Kept within a batch."""
-    from snug.training.augmentation.mixed_clips import mixed_for, shared_clips
+    from snug.training.augmentation.mixed_clips import augment, make_shared_clips
     from snug.training.kinds import find_kind
 
     assets, how = context.assets, training.chosen
@@ -169,9 +169,9 @@ def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | No
         given = assets.named(training.motions)
         vertices = len(assets.garments[training.garment].rest_positions)
         drawn = find_kind(how.kind).physics
-        mixed = mixed_for(given, how.recipe, vertices=vertices, seed=training.seed) if drawn else []
+        mixed = augment(given, how.recipe, vertices=vertices, seed=training.seed) if drawn else []
         if said := how.simulated:
-            mixed += shared_clips(given, said.mixed, vertices=vertices, swinging=said.swinging)
+            mixed += make_shared_clips(given, said.mixed, vertices=vertices, swinging=said.swinging)
         context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
     return context.memo[training.id]
 

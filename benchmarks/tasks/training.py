@@ -133,7 +133,7 @@ class TrainNetwork(Task):
     ) -> tuple[list[Motion], dict[str, np.ndarray]]:
         """The mixed clips that were simulated, and their vertices by name."""
         from reference_sim.files.array_file import read_arrays
-        from snug.training.augmentation.mixed_clips import shared_clips
+        from snug.training.augmentation.mixed_clips import make_shared_clips
 
         found: dict[str, np.ndarray] = {}
         for id in self.clips:
@@ -143,7 +143,7 @@ class TrainNetwork(Task):
             raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
         vertices = len(assets.garments[self.garment].rest_positions)
         said = self.chosen.simulated if self.chosen else None
-        clips = shared_clips(
+        clips = make_shared_clips(
             assets.named(self.motions), len(self.clips), vertices=vertices,
             swinging=said is not None and said.swinging,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What happens when a batch is not finite or far too high: it is named, and good weights come back.
+"""Guard against divergence: batches that are not finite or far too high are named, good weights come back.
 
 Three cases, from harmless to grave:
 - a window is above the recipe's `spike`: the gradient of its step is clipped;
@@ -30,7 +30,13 @@ SNAPSHOT_EVERY = 100  # steps between two copies of good weights
 
 
 class DivergenceGuard:
-    """Judges each batch before its update. spike [J]: see Recipe; None where the loss is no energy."""
+    """A verdict on each batch before its update.
+
+    Args:
+        network: its weights are copied when good, and put back when lost.
+        optimiser: with its moments.
+        spike: see Recipe [J]; None where the loss is no energy.
+    """
 
     def __init__(self, network: nn.Module, optimiser: optim.Optimizer, *, spike: float | None) -> None:
         self.network, self.optimiser, self.spike = network, optimiser, spike
@@ -44,11 +50,19 @@ class DivergenceGuard:
         self._good: dict[str, Tensor] = {}
 
     def judge(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> str:
-        """What to do after windows (N,) [J a frame]; name(row) tells a window in words.
+        """Return the verdict on a batch, before its update.
 
-        `update`; `clip` the gradient; `distrust`: clip it, and learn nothing else from what was predicted;
-        `leave out`.
-        Raises TrainingError after GIVE_UP updates left out in a row.
+        Args:
+            number: of the step.
+            joules: of each window, (N,), mean a frame.
+            name: gives the name of a window, by its row.
+
+        Returns:
+            `update`; `clip` the gradient; `distrust`: clip it, and learn nothing else from the prediction;
+            `leave out`.
+
+        Raises:
+            TrainingError: after GIVE_UP updates left out in a row.
         """
         bad = ~np.isfinite(joules)
         if bad.any():
@@ -70,8 +84,10 @@ class DivergenceGuard:
     def accepts(
         self, number: int, verdict: str, gradient_norm: float, joules: np.ndarray, name: Callable[[int], str]
     ) -> bool:
-        """Whether the gradient of a batch judged so may be followed. One that is not finite would ruin the
-        weights, whatever the energies; the highest window is named. Raises TrainingError as `judge` does.
+        """Return whether the gradient of a batch with that verdict may be followed.
+
+        One that is not finite would ruin the weights, whatever the energies; the highest window is named.
+        Raises TrainingError as `judge` does.
         """
         if np.isfinite(gradient_norm):
             self._skipped_in_a_row = 0
@@ -96,7 +112,7 @@ class DivergenceGuard:
         self._count_bad(number, joules, name)
 
     def _count_bad(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> bool:
-        """One more bad batch; whether that brought good weights back."""
+        """Count one more bad batch; return whether that brought good weights back."""
         self._bad_in_a_row += 1
         if self._bad_in_a_row < PATIENCE or not self._good:
             return False
@@ -131,7 +147,7 @@ class DivergenceGuard:
                 tensor.detach().zero_()
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
-        """Everything that a resumed run needs: tensors and plain facts."""
+        """Return everything that a resumed run needs: tensors and plain facts."""
         facts = {
             "rate": self.rate, "summary": self.summary, "usual": self._usual, "good_step": self._good_step,
             "bad_in_a_row": self._bad_in_a_row, "skipped_in_a_row": self._skipped_in_a_row,
@@ -139,7 +155,7 @@ class DivergenceGuard:
         return dict(self._good), facts
 
     def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-        """The inverse of `state`."""
+        """Continue from a `state`."""
         device = next(self.network.parameters()).device
         self._good = {name: tensor.to(device) for name, tensor in tensors.items()}
         self.rate, self.summary, self._usual = facts["rate"], facts["summary"], facts["usual"]
@@ -148,8 +164,8 @@ class DivergenceGuard:
 
 
 def live_tensors(network: nn.Module, optimiser: optim.Optimizer) -> list[tuple[str, Tensor]]:
-    """The weights and Adam's state, by name, as they are held: what is written into them counts."""
-    found = [(f"network.{name}", tensor) for name, tensor in network.state_dict(keep_vars=True).items()]
+    """Return the weights and Adam's state by name, not copied: writing into them changes the network."""
+    tensors = [(f"network.{name}", tensor) for name, tensor in network.state_dict(keep_vars=True).items()]
     for name, parameter in network.named_parameters():
-        found += [(f"adam.{name}.{key}", tensor) for key, tensor in optimiser.state[parameter].items()]
-    return found
+        tensors += [(f"adam.{name}.{key}", tensor) for key, tensor in optimiser.state[parameter].items()]
+    return tensors

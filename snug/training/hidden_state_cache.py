@@ -1,4 +1,4 @@
-"""The state that a recurrent network last had after each training frame: what windows start from.
+"""Cache of a recurrent network's state after each training frame, which windows start from.
 
 A window of three frames says nothing of the state before it. Drawn from noise alone it is unlike any state of
 a roll-out, and the network learns to shake it off; cached when the frame before last ended a window,
@@ -16,10 +16,14 @@ from snug.training.process_group import ALONE, Group
 
 
 class HiddenStateCache:
-    """first: rows at which motions begin, and the number of all frames at the end (TrainingSet.first).
+    """States (L, F + 1, H) after each frame, zero where it never ended a window.
 
-    states (L, F + 1, H): after each frame, zero where it never ended a window; the last row stands for the
-    time before a motion, when a roll-out has a state of zero.
+    The last row stands for the time before a motion, when a roll-out has a state of zero.
+
+    Args:
+        first: rows at which motions begin, and the number of all frames at the end (TrainingSet.first).
+        shape: layers L and width H of a state.
+        device: where the states lie.
     """
 
     def __init__(self, first: np.ndarray, shape: tuple[int, int], device: torch.device) -> None:
@@ -30,11 +34,11 @@ class HiddenStateCache:
         self.states = torch.zeros(shape[0], frames + 1, shape[1], device=device)
 
     def at(self, frames: np.ndarray) -> Tensor:
-        """States (L, N, H) before frames (N,)."""
+        """Return the states (L, N, H) before frames (N,)."""
         return self.states[:, self.before[torch.as_tensor(frames, device=self.before.device)]]
 
     def keep(self, frames: np.ndarray, states: Tensor, group: Group = ALONE) -> None:
-        """Cache states (L, N, H) after frames (N,); those of all processes of a group, each its own."""
+        """Cache states (L, N, H) after frames (N,); in a group each process gives its own."""
         rows = group.gathered(torch.as_tensor(frames, device=self.before.device)).cpu().numpy()
         # Of a frame that comes twice the first: which of two writes lands last is not a GPU's to choose.
         once = torch.as_tensor(np.unique(rows, return_index=True)[1], device=states.device)

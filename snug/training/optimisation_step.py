@@ -20,7 +20,7 @@ from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
 from snug.recipes.recipe import Recipe
-from snug.training.augmentation.mixed_clips import mixed_for, shapes_of_mixed
+from snug.training.augmentation.mixed_clips import augment, draw_clip_shapes
 from snug.training.contact.planes import Posed, TrainingContact
 from snug.training.device import CPU
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
@@ -70,7 +70,7 @@ class Trainer:
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
         self.posed_by = FastSkin.apply if self.kernels else skin
-        mixed = mixed_for(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
+        mixed = augment(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
         drawn = (
             recipe.shape_range
             and dressed.body.shape_count
@@ -81,7 +81,7 @@ class Trainer:
         shapes = None
         if drawn and recipe.shape_of == "clip":
             mean = np.zeros((len(motions), dressed.body.shape_count))
-            of_mixed = shapes_of_mixed(len(mixed), dressed.body.shape_count, recipe, seed=seed)
+            of_mixed = draw_clip_shapes(len(mixed), dressed.body.shape_count, recipe, seed=seed)
             shapes = np.concatenate([mean, of_mixed])
         self.data = TrainingSet(
             dressed, [*motions, *mixed], recipe, features=how.network.feature_set, sequences=how.network.sequential,

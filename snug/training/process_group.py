@@ -2,9 +2,8 @@
 
 Every process makes the same data and draws the same random numbers for the whole batch, then works on its own
 windows. Gradients are averaged by DistributedDataParallel; the energies of all windows are gathered, so that
-every process judges the same batch; contact anchors that one process moved or found anew, and states that it
-remembers, are sent to the others. So
-the run is that of a single process with the same batch up to the rounding of float32 sums, which are taken in
+every process evaluates the same batch; contact anchors that one process moved or found anew, and states that
+it caches, are sent to the others. So the run is that of a single process with the same batch up to the rounding of float32 sums, which are taken in
 another order, and up to the anchors of a frame that comes twice in a step: it repeats bit for bit with the
 same number of processes, and not across numbers.
 """
@@ -13,7 +12,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -25,31 +23,31 @@ class GroupError(ValueError):
 
 @dataclass(frozen=True)
 class Group:
-    """Process `rank` of `size`. Alone, every method gives back what it was given."""
+    """Process `rank` of `size`. Alone, every method returns its argument."""
 
     rank: int = 0
     size: int = 1
 
     @property
     def writes(self) -> bool:
-        """Whether this process is the one that writes files and talks."""
+        """Whether this process is the one that writes files and messages."""
         return self.rank == 0
 
     def part(self, count: int) -> slice:
-        """The places of this process among `count`. Raises GroupError where they cannot be shared evenly."""
+        """Return this process's part of `count` places. Raises GroupError if they cannot be shared evenly."""
         if count % self.size:
             raise GroupError(f"{count} windows a step cannot be shared evenly by {self.size} processes")
         share = count // self.size
         return slice(self.rank * share, (self.rank + 1) * share)
 
-    def wrapped(self, network: nn.Module) -> Any:
-        """The network to call in training: gradients of it are means over all processes."""
+    def wrapped(self, network: nn.Module) -> nn.Module:
+        """Return the network to call in training: its gradients are means over all processes."""
         if self.size == 1:
             return network
         return nn.parallel.DistributedDataParallel(network, broadcast_buffers=False)
 
     def gathered(self, tensor: Tensor) -> Tensor:
-        """The tensors of all processes, one after another along the first axis."""
+        """Return the tensors of all processes, one after another along the first axis."""
         if self.size == 1:
             return tensor
         tensor = tensor.contiguous()
@@ -58,13 +56,13 @@ class Group:
         return torch.cat(parts)
 
     def sent(self, tensor: Tensor, owner: int) -> Tensor:
-        """The owner's tensor; the others give one of the same shape and type."""
+        """Return the owner's tensor; the others give one of the same shape and type."""
         if self.size > 1:
             torch.distributed.broadcast(tensor, src=owner)
         return tensor
 
     def agreed(self, value: float) -> float:
-        """The first process's number: devices may differ in the last digit, decisions must not."""
+        """Return the first process's number: devices may differ in the last digit, decisions must not."""
         if self.size == 1:
             return value
         box = [value]
@@ -76,7 +74,7 @@ ALONE = Group()
 
 
 def join_group(device: torch.device) -> tuple[Group, torch.device]:
-    """The group that torchrun started this process in, or ALONE; and this process's own device."""
+    """Return the group that torchrun started this process in, or ALONE; and this process's device."""
     size = int(os.environ.get("WORLD_SIZE", "1"))
     if size == 1:
         return ALONE, device

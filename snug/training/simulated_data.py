@@ -1,4 +1,4 @@
-"""A data set: simulated motions in the files of one folder, and an index of them, dataset.json.
+"""Data sets: simulated motions in the files of one folder, and an index of them, dataset.json.
 
 A sequence is three files: its simulation (.vtkhdf), the motion (.npz), and the simulated vertices as networks
 see them (.npy), of which training reads a few frames at a time. The index says what all sequences share (the
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from snug.garments.garment import Garment
     from snug.training.losses.vertex_targets import StoredVertices
 
-INDEX, FORMAT = "dataset.json", 1
+INDEX, DATA_SET_FORMAT = "dataset.json", 1
 MISSING = "missing"  # status of a sequence that was asked for and is not there yet
 _TYPES: dict[str, Any] = {
     "name": str, "trajectory": str, "motion": str, "vertices": str, "digests": dict, "frames": int,
@@ -41,11 +41,19 @@ class DataSetError(ValueError):
 
 @dataclass(frozen=True)
 class SimulatedSequence:
-    """A line of the index. trajectory, motion, vertices: names of its files in the folder; digests: of these,
-    by name.
+    """A line of the index.
 
-    status, reason: how the simulation ended, or MISSING. usable: whether it has all frames of the motion.
-    seconds: wall time of the simulation, on `hardware`, by the code of `commit`.
+    Attributes:
+        name: of the motion.
+        trajectory, motion, vertices: names of its files in the folder.
+        digests: of these files, by name.
+        frames: number of simulated frames.
+        status: of the simulation, or MISSING.
+        reason: of a failure.
+        usable: whether it has all frames of the motion.
+        seconds: wall time of the simulation [s].
+        hardware: on which it ran.
+        commit: of the code that ran.
     """
 
     name: str
@@ -64,7 +72,14 @@ class SimulatedSequence:
 
 @dataclass(frozen=True)
 class DataSet:
-    """A folder and its index. settings: what all sequences share; commands: those that made it."""
+    """A folder and its index.
+
+    Attributes:
+        folder: holds the index and all files.
+        settings: common to all sequences, see `settings_of`.
+        sequences: lines of the index.
+        commands: those that made the data set.
+    """
 
     folder: Path
     settings: Mapping[str, Any]
@@ -73,13 +88,13 @@ class DataSet:
 
     @classmethod
     def read(cls, folder: str | Path) -> DataSet:
-        """The data set of a folder; its files are not looked at. Raises DataSetError."""
+        """Read the index of a folder; the other files are not opened. Raises DataSetError."""
         path = Path(folder) / INDEX
         try:
             index = json.loads(path.read_text(encoding="utf-8"))
-            if index["format"] != FORMAT:
+            if index["format"] != DATA_SET_FORMAT:
                 raise DataSetError(
-                    f"{path}: format {str(index['format'])[:20]!r}; this version reads {FORMAT}"
+                    f"{path}: format {str(index['format'])[:20]!r}; this version reads {DATA_SET_FORMAT}"
                 )
             lines = tuple(_line(line) for line in index["sequences"])
             if len({line.name for line in lines}) < len(lines):
@@ -95,9 +110,9 @@ class DataSet:
             raise DataSetError(f"{path}: no index of a data set ({reason})") from None
 
     def write(self) -> None:
-        """The index, whole or not at all."""
+        """Write the index, whole or not at all."""
         index = {
-            "format": FORMAT,
+            "format": DATA_SET_FORMAT,
             "settings": self.settings,
             "commands": self.commands,
             "sequences": [asdict(line) for line in self.sequences],
@@ -107,15 +122,15 @@ class DataSet:
 
     @property
     def usable(self) -> list[SimulatedSequence]:
-        """Those to learn from."""
+        """Sequences to learn from."""
         return [line for line in self.sequences if line.usable]
 
     def motions(self) -> list[Motion]:
-        """The motions of the usable sequences. Raises ValueError for a file that is not as it should be."""
+        """Read the motions of the usable sequences. Raises ValueError for an unfit file."""
         return [read_motion(self.folder / line.motion, line) for line in self.usable]
 
     def targets(self) -> dict[str, StoredVertices]:
-        """Name -> the vertices of each usable sequence; they stay in their files."""
+        """Return name -> vertices of each usable sequence; they stay in their files."""
         from snug.training.losses.vertex_targets import StoredVertices
 
         count = int(self.settings["vertices"])
@@ -127,15 +142,15 @@ class DataSet:
         }
 
     def check(self, settings: Mapping[str, Any]) -> None:
-        """Raises DataSetError naming what differs, of those settings that are given."""
+        """Raise DataSetError unless the data set has these settings."""
         for name, value in settings.items():
-            if (there := self.settings.get(name)) != value:
-                said = f": {there} there, {value} here" if isinstance(value, str | int | float) else ""
-                raise DataSetError(f"{self.folder}: a data set of another {name}{said}")
+            if (stored := self.settings.get(name)) != value:
+                values = f": {stored} there, {value} here" if isinstance(value, str | int | float) else ""
+                raise DataSetError(f"{self.folder}: a data set of another {name}{values}")
 
 
 def settings_of(body: Body, garment: Garment) -> dict[str, Any]:
-    """What must be the same for simulations of a garment on a body to be of the same cloth."""
+    """Return the facts that must be equal for simulations of a garment on a body to be of the same cloth."""
     weights = np.round(garment.skinning_weights[garment.pins], MICROMETRES)
     rest = [np.round(garment.rest_positions, MICROMETRES), garment.faces, garment.pins, weights]
     if garment.rest_uv is not None:
@@ -153,23 +168,23 @@ def settings_of(body: Body, garment: Garment) -> dict[str, Any]:
 
 
 def write_motion(path: Path, motion: Motion) -> None:
-    """poses (T, 24, 3) [rad], translations (T, 3) [m] and fps in an .npz file, as they are simulated."""
+    """Write poses (T, 24, 3) [rad], translations (T, 3) [m] and fps to an .npz file."""
     with replacing(path) as temporary:
         np.savez(temporary, poses=motion.poses, translations=motion.translations, fps=motion.fps)
 
 
 def write_vertices(path: Path, positions: np.ndarray, motion: Motion, body: Body) -> None:
-    """Simulated world positions (T, V, 3) [m] as networks see them: from the pelvis, in float32."""
+    """Write simulated world positions (T, V, 3) [m] as training reads them: from the pelvis, float32."""
     pelvis = body.joints()[0] + motion.translations[: len(positions)]
     with replacing(path) as temporary:
         write_array(temporary, (positions - pelvis[:, None]).astype(np.float32))
 
 
 def read_motion(path: Path, line: SimulatedSequence) -> Motion:
-    """The motion of a sequence. Raises ValueError for a file that does not hold it."""
-    found = read_arrays(path, ("poses", "translations", "fps"))
+    """Read the motion of a sequence. Raises ValueError for a file that does not hold it."""
+    arrays = read_arrays(path, ("poses", "translations", "fps"))
     try:
-        motion = Motion(line.name, found["poses"], found["translations"], float(found["fps"]), "simulated")
+        motion = Motion(line.name, arrays["poses"], arrays["translations"], float(arrays["fps"]), "simulated")
     except (KeyError, TypeError) as error:
         raise DataSetError(f"{path}: no motion of a data set ({error}); verify {path.parents[2]}") from None
     if motion.frames != line.frames:
@@ -178,7 +193,7 @@ def read_motion(path: Path, line: SimulatedSequence) -> Motion:
 
 
 def _digest(arrays: Sequence[np.ndarray]) -> str:
-    """Of shapes and values; a zero has no sign."""
+    """Return a digest of shapes and values; a zero has no sign."""
     digest = hashlib.sha256()
     for array in arrays:
         plain = np.asarray(array, np.float64) + 0.0
@@ -187,15 +202,15 @@ def _digest(arrays: Sequence[np.ndarray]) -> str:
 
 
 def _line(line: Mapping[str, Any]) -> SimulatedSequence:
-    """Raises ValueError for what does not describe a sequence, or names a file outside of the folder."""
-    found = SimulatedSequence(**line)
+    """Read a line. Raises ValueError for an invalid entry, or a file outside of the folder."""
+    sequence = SimulatedSequence(**line)
     for name, kind in _TYPES.items():
-        if not isinstance(value := getattr(found, name), kind):
-            raise ValueError(f"sequence {str(found.name)[:60]!r}: {name} is {str(value)[:40]!r}")
-    files = {found.trajectory, found.motion, found.vertices}
-    for name in filter(None, (*files, *found.digests)):
+        if not isinstance(value := getattr(sequence, name), kind):
+            raise ValueError(f"sequence {str(sequence.name)[:60]!r}: {name} is {str(value)[:40]!r}")
+    files = {sequence.trajectory, sequence.motion, sequence.vertices}
+    for name in filter(None, (*files, *sequence.digests)):
         if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-            raise ValueError(f"sequence {found.name!r}: its file {name!r} lies outside of the folder")
-    if found.usable and not files <= set(found.digests):
-        raise ValueError(f"sequence {found.name!r}: no digest of its files")
-    return found
+            raise ValueError(f"sequence {sequence.name!r}: its file {name!r} lies outside of the folder")
+    if sequence.usable and not files <= set(sequence.digests):
+        raise ValueError(f"sequence {sequence.name!r}: no digest of its files")
+    return sequence

@@ -10,12 +10,13 @@ import torch
 
 PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "optimiser", "requery")
 
-WATCHED = 10
+WATCH_EVERY = 10  # steps, on a GPU
 
 
 class Stopwatch:
-    """Sums up wall time by part. On a GPU it must wait for the work of each part to end, so there it watches
-    one step in WATCHED.
+    """Wall time by part of a step.
+
+    On a GPU it must wait for the work of each part to end, so there it watches one step in WATCH_EVERY.
     """
 
     def __init__(self, device: torch.device) -> None:
@@ -25,7 +26,7 @@ class Stopwatch:
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
-        """Everything inside counts for the part of that name (one of PARTS)."""
+        """Count the time of the block for the part of that name (one of PARTS)."""
         if not self._live:
             yield
             return
@@ -39,12 +40,12 @@ class Stopwatch:
         return time.perf_counter()
 
     def step_begins(self, number: int) -> None:
-        """Said before the parts of each step."""
-        self._live = not self._waits or number % WATCHED == 0
+        """Begin step `number`."""
+        self._live = not self._waits or number % WATCH_EVERY == 0
         self.steps += self._live
 
     def taken(self) -> dict[str, float]:
-        """Mean seconds a step of each part that took any, since the last call; starts anew."""
-        found = {name: s / self.steps for name, s in self._seconds.items() if s and self.steps}
+        """Return the mean seconds a step of each part since the last call, and start anew."""
+        means = {name: s / self.steps for name, s in self._seconds.items() if s and self.steps}
         self._seconds, self.steps = dict.fromkeys(PARTS, 0.0), 0
-        return found
+        return means

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor
 
 from snug.body.skinning import joint_transforms
+from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipes.recipe import Recipe
 from snug.training.device import CPU
 
-if TYPE_CHECKING:
-    from snug.motion.motion import Motion
-
-# Spread below which an input's is not taken for a scale: rotations are numbers up to 1 in size, and one that
-# hardly moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
+# Smallest spread by which an input is divided: rotations are numbers up to 1 in size, and one that hardly
+# moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
 STD_FLOOR = 0.2
 CONSTANT = 1e-5  # spread below which an input did not move at all, but for rounding
 
@@ -41,9 +39,21 @@ class Batch:
 
 
 class TrainingSet:
-    """Motions made ready for one recipe. Raises TrainingError when no motion is long enough for a window.
+    """All frames of the motions, preprocessed for one recipe.
 
     Everything that a batch is made of lies on `device`; only row numbers are kept in numpy.
+
+    Args:
+        dressed: body and garment.
+        motions: all of one frame rate.
+        recipe: form of the inputs, length and stride of windows.
+        features: set of inputs, see DressedBody.features.
+        sequences: False for a static network, whose frames need no past.
+        device: where the tensors lie.
+        shapes: shape numbers (M, S), one row for each motion; None: all on the mean body.
+
+    Raises:
+        TrainingError: when no motion is long enough for a window, or their frame rates differ.
     """
 
     def __init__(
@@ -57,9 +67,6 @@ class TrainingSet:
         device: torch.device = CPU,
         shapes: np.ndarray | None = None,
     ) -> None:
-        """features: see DressedBody.features; sequences: False for a static network, whose frames need no
-        past. shapes: (M, S) shape numbers, one row for each motion; None: all on the mean body.
-        """
         rates = {float(motion.fps) for motion in motions}
         if len(rates) != 1:
             raise TrainingError(
@@ -90,19 +97,20 @@ class TrainingSet:
 
     @property
     def frames(self) -> int:
+        """Number of all frames."""
         return int(self.first[-1])
 
-    def motion_of(self, frames: Any) -> Any:
-        """Places of the motions that row numbers belong to."""
+    def motion_of(self, frames: ArrayLike) -> np.ndarray:
+        """Return the places of the motions that row numbers belong to."""
         return np.searchsorted(self.first, frames, side="right") - 1
 
     def where(self, frame: int) -> str:
-        """A row number in words a user can look up."""
+        """Name a row number by motion and frame."""
         motion = int(self.motion_of(frame))
         return f"motion {self.names[motion]!r} frame {frame - self.first[motion]}"
 
     def input_statistics(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and spread (D,) of the inputs; of the shape numbers those of the recipe's U(-r, r).
+        """Return mean and spread (D,) of the inputs; for the shape numbers those of the recipe's U(-r, r).
 
         An input that never varies gets an infinite spread: the network then never reads it, for the weights
         behind it stay as random as they began.
@@ -116,7 +124,7 @@ class TrainingSet:
         return mean, std
 
     def at(self, frames: np.ndarray) -> Batch:
-        """Rows (N, T), those of a line from one motion, as tensors; each motion on its own body."""
+        """Return rows (N, T), those of a line from one motion, as tensors; each motion on its own body."""
         rows = torch.as_tensor(frames, device=self.device)
         batch = Batch(frames, self.features[rows], self.rest, self.transforms[rows], self.ahead[rows])
         if self.shapes is None:
@@ -124,7 +132,7 @@ class TrainingSet:
         return self._dressed(batch, self.shapes[self.motion_of(frames[:, 0])])
 
     def batch(self, windows: np.ndarray, betas: np.ndarray | None = None) -> Batch:
-        """Windows (N,) as tensors, each on the body of its motion, or of a shape of its own, betas (N, S)."""
+        """Return windows (N,) as tensors, each on the body of its motion, or of its shape in betas (N, S)."""
         batch = self.at(self.starts[windows][:, None] + np.arange(self.window))
         if betas is None:
             return batch
@@ -136,7 +144,7 @@ class TrainingSet:
         return replace(batch, features=inputs)
 
     def _dressed(self, batch: Batch, betas: np.ndarray) -> Batch:
-        """With the unposed garments of shapes (N, S)."""
+        """Return the batch with the unposed garments of shapes (N, S)."""
         shapes = torch.as_tensor(betas, dtype=torch.float32, device=self.device)
         if self._rest_directions is None:
             self._rest_directions = self.dressed.rest_directions().to(self.device)
@@ -145,7 +153,7 @@ class TrainingSet:
 
 
 def _reposed(dressed: DressedBody, transforms: Tensor, betas: Tensor) -> Tensor:
-    """The same poses on other skeletons: rotations are read back from the transforms of the mean body.
+    """Return the same poses on other skeletons; rotations are read from the transforms of the mean body.
 
     transforms (N, T, 24, 3, 4) float32, betas (N, 10) float64.
     """
@@ -162,7 +170,7 @@ def _reposed(dressed: DressedBody, transforms: Tensor, betas: Tensor) -> Tensor:
 
 
 def _ahead(pelvis: np.ndarray) -> Tensor:
-    """2 p_{t-1} - p_{t-2} - p_t of each frame, (T, 3) [m]; zero where two earlier frames are missing."""
+    """Return 2 p_{t-1} - p_{t-2} - p_t of each frame, (T, 3) [m]; zero where two earlier frames are missing."""
     ahead = np.zeros_like(pelvis)
     ahead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
     return torch.as_tensor(ahead, dtype=torch.float32)

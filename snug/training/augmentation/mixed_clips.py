@@ -1,4 +1,4 @@
-"""New training motions from old ones: limbs of different clips put together, mirrored, and turned a little.
+"""Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
 
 Self-supervision needs no simulation, so a training set is not bound to what was recorded. Fourteen clips show
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
@@ -21,8 +21,9 @@ import numpy as np
 from snug.body.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
 from snug.motion.motion import Motion, arm_clearance, mirror_motion
 from snug.recipes.recipe import DEFAULT, Recipe
+from snug.training.augmentation.swinging_clips import make_swinging_motion
 
-PARTS: tuple[tuple[str, ...], ...] = (
+BODY_PARTS: tuple[tuple[str, ...], ...] = (
     ("pelvis",),
     ("left_hip", "left_knee", "left_ankle", "left_foot"),
     ("right_hip", "right_knee", "right_ankle", "right_foot"),
@@ -30,122 +31,136 @@ PARTS: tuple[tuple[str, ...], ...] = (
     ("left_collar", "left_shoulder", "left_elbow", "left_wrist", "left_hand"),
     ("right_collar", "right_shoulder", "right_elbow", "right_wrist", "right_hand"),
 )
-SCALE = dict.fromkeys((1, 2, 3), (0.6, 1.3))  # of legs and spine; an arm swung further might enter the torso
+PART_SCALES = dict.fromkeys(
+    (1, 2, 3), (0.6, 1.3)
+)  # of legs and spine; an arm swung further might enter the torso
 # Degrees between upper arm and spine where an arm of a clip comes nearest. The lower end is where recorded
 # arms are spread to (snug.motion.motion.ARMS_CLEAR): nearer, a sleeve is pinched and no shape is good.
-HANGING = (25.0, 50.0)
+ARM_DEGREES = (25.0, 50.0)
 # Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the spine
 # of a bow has it, thighs enter the belly, and no hem between them is free.
-LAP = 60.0
-LIFT = 90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
+HIP_DEGREES = 60.0
+LIFT_DEGREES = 90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
 # Turn of each joint, relative to the recipe's; the collar bone turns little, the shoulder most.
-TURNED = {
+TURN_SHARES = {
     "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
     "left_shoulder": 2.0, "right_shoulder": 2.0, "left_collar": 0.4, "right_collar": 0.4, "neck": 1.0,
     "head": 1.0,
 }  # fmt: skip
-RATE = (0.2, 1.0)  # Hz, of the slow turns and lifts
-FRAMES = 60  # of a mixed clip
-MOST_MIXED = 20_000  # frames: each keeps its body and its anchors
+TURN_HERTZ = (0.2, 1.0)  # Hz, of the slow turns and lifts
+CLIP_FRAMES = 60  # of a mixed clip
+MAX_AUGMENTED_FRAMES = 20_000  # frames: each keeps its body and its anchors
 SHARED_SEED = 0  # of clips that are simulated: once, whatever the seed of the training
-MOST_ANCHORS = 2e9  # bytes, of those of mixed frames
-ANCHORS = 24  # bytes of a frame's for each vertex: six samples, four bytes each
+MAX_ANCHOR_BYTES = 2e9  # bytes, of those of mixed frames
+ANCHOR_BYTES = 24  # bytes of a frame's for each vertex: six samples, four bytes each
 HIPS, SIDEWAYS = (JOINT["left_hip"], JOINT["right_hip"]), np.array([1.0, 0.0, 0.0])
 SHOULDERS, FRONT = (JOINT["left_shoulder"], JOINT["right_shoulder"]), np.array([0.0, 0.0, 1.0])
-SHAPES = 1  # stream of random numbers beside that of the clips
-OPENINGS = 5  # leave less than a degree missing, almost always
+SHAPE_STREAM = 1  # stream of random numbers beside that of the clips
+HIP_ROUNDS = 5  # leave less than a degree missing, almost always
 
 
-def mixed_for(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: int) -> list[Motion]:
-    """The clips that a recipe asks for beside those motions, for a garment of so many vertices."""
-    given = sum(motion.frames for motion in motions)
-    frames = min(round(recipe.mixed * given), MOST_MIXED, int(MOST_ANCHORS / (ANCHORS * vertices)))
-    return mixed_motions(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
+def augment(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: int) -> list[Motion]:
+    """Return the clips that a recipe adds to the motions, for a garment of that number of vertices."""
+    original = sum(motion.frames for motion in motions)
+    frames = min(
+        round(recipe.mixed * original),
+        MAX_AUGMENTED_FRAMES,
+        int(MAX_ANCHOR_BYTES / (ANCHOR_BYTES * vertices)),
+    )
+    return make_mixed_clips(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
 
 
-def shared_clips(
+def make_shared_clips(
     motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
 ) -> list[Motion]:
-    """Clips to simulate for trainings of all seeds: `share` frames for each given one, mixed as the default
-    recipe does. Fewer are the first of more. swinging: those of each share, and pieces of the given motions,
-    as one snug.training.augmentation.swinging_clips.
-    """
-    from snug.training.augmentation.swinging_clips import swinging_motion
+    """Return clips to simulate for the trainings of all seeds, mixed as the default recipe does.
 
-    clips = mixed_for(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    Args:
+        motions: the original training motions.
+        share: augmented frames for each original one. The clips of a smaller share are the first of a larger.
+        vertices: number of the garment's vertices.
+        swinging: join the clips of each share, and pieces of the original motions, to one motion
+            (snug.training.augmentation.swinging_clips).
+    """
+    clips = augment(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
     if not swinging:
         return clips
-    given = sum(motion.frames for motion in motions)
-    ends = [round(part * given / FRAMES) for part in range(share + 1)]
+    original = sum(motion.frames for motion in motions)
+    ends = [round(part * original / CLIP_FRAMES) for part in range(share + 1)]
     parts = [clips[first:end] for first, end in pairwise(ends)]
     return [
-        swinging_motion(part, f"swinging_{number}", seed=number, given=motions)
+        make_swinging_motion(part, f"swinging_{number}", seed=number, originals=motions)
         for number, part in enumerate(parts)
         if part
     ]
 
 
-def shapes_of_mixed(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:
-    """Shape numbers (count, coefficients) of the bodies of mixed clips, where each has its own: those of the
-    recipe's share from its U(-r, r), the others zero.
+def draw_clip_shapes(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:
+    """Draw the shape numbers (count, coefficients) of the bodies of mixed clips.
+
+    The recipe's share of the clips has numbers from its U(-r, r), the others zero.
     """
-    random = np.random.default_rng([seed, SHAPES])
+    random = np.random.default_rng([seed, SHAPE_STREAM])
     drawn = recipe.shape_range * random.uniform(-1.0, 1.0, (count, coefficients))
     drawn[random.random(count) >= recipe.shape_share] = 0.0
     return drawn
 
 
-def mixed_motions(
+def make_mixed_clips(
     motions: Sequence[Motion], frames: int, *, turn: float, lifted: float, seed: int
 ) -> list[Motion]:
-    """About `frames` frames of mixed clips, named mixed_0, mixed_1, ...; deterministic for a seed.
+    """Make about `frames` frames of mixed clips, named mixed_0, mixed_1, ...; deterministic for a seed.
 
-    turn: standard deviation of the added turns, per axis [rad]; half of it stays, half comes and goes.
-    lifted: share of the thighs that are lifted.
+    Args:
+        motions: parts of the body are taken from these.
+        frames: in all clips together.
+        turn: standard deviation of the added turns, per axis [rad]; half of it stays, half comes and goes.
+        lifted: share of the thighs that are lifted.
+        seed: of all random choices.
     """
     random = np.random.default_rng(seed)
-    count = max(1, round(frames / FRAMES)) if frames > 0 else 0
+    count = max(1, round(frames / CLIP_FRAMES)) if frames > 0 else 0
     return [_mixed(motions, random, turn, lifted, f"mixed_{number}") for number in range(count)]
 
 
 def _mixed(
     motions: Sequence[Motion], random: np.random.Generator, turn: float, lifted: float, name: str
 ) -> Motion:
-    poses = np.zeros((FRAMES, len(JOINT), 3))
-    translations = np.zeros((FRAMES, 3))
+    poses = np.zeros((CLIP_FRAMES, len(JOINT), 3))
+    translations = np.zeros((CLIP_FRAMES, 3))
     fps = motions[0].fps
-    for number, part in enumerate(PARTS):
+    for number, part in enumerate(BODY_PARTS):
         source = motions[int(random.integers(len(motions)))]
         if random.random() < 0.5:
             source = mirror_motion(source)
-        start = random.integers(max(1, source.frames - FRAMES + 1))
+        start = random.integers(max(1, source.frames - CLIP_FRAMES + 1))
         # A clip that is too short rests at its end.
-        taken = np.minimum(np.arange(start, start + FRAMES), source.frames - 1)
-        scale = random.uniform(*SCALE.get(number, (1.0, 1.0)))
+        taken = np.minimum(np.arange(start, start + CLIP_FRAMES), source.frames - 1)
+        scale = random.uniform(*PART_SCALES.get(number, (1.0, 1.0)))
         joints = [JOINT[joint] for joint in part]
         poses[:, joints] = scale * source.poses[taken][:, joints]
         if number == 0:
             translations = source.translations[taken]
-    seconds = np.arange(FRAMES)[:, None] / fps
-    for joint, share in TURNED.items():
+    seconds = np.arange(CLIP_FRAMES)[:, None] / fps
+    for joint, share in TURN_SHARES.items():
         stays, swings = random.normal(0.0, share * turn, (2, 3))
-        phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
+        phase = 2 * np.pi * (random.uniform(*TURN_HERTZ) * seconds + random.random())
         added = rotation_matrices(stays + swings * np.sin(phase))
         poses[:, JOINT[joint]] = axis_angles(rotation_matrices(poses[:, JOINT[joint]]) @ added)
     for hip in HIPS:
-        height = random.uniform(0.0, np.deg2rad(LIFT)) * (random.random() < lifted)
-        phase = 2 * np.pi * (random.uniform(*RATE) * seconds + random.random())
+        height = random.uniform(0.0, np.deg2rad(LIFT_DEGREES)) * (random.random() < lifted)
+        phase = 2 * np.pi * (random.uniform(*TURN_HERTZ) * seconds + random.random())
         forward = rotation_matrices(-0.5 * height * (1 + np.sin(phase)) * SIDEWAYS)
         poses[:, hip] = axis_angles(forward @ rotation_matrices(poses[:, hip]))
-    mixed = opened_hips(Motion(name, poses, translations, fps=fps, kind="mixed"))
-    return hung_arms(mixed, np.deg2rad(random.uniform(*HANGING, 2)))
+    mixed = open_hips(Motion(name, poses, translations, fps=fps, kind="mixed"))
+    return hang_arms(mixed, np.deg2rad(random.uniform(*ARM_DEGREES, 2)))
 
 
-def hung_arms(motion: Motion, nearest: np.ndarray) -> Motion:
-    """Each shoulder turned about the chest's front axis, by one angle in all frames, until its upper arm
-    comes as near to the downward spine as `nearest` says: (2,) [rad], left and right.
+def hang_arms(motion: Motion, nearest: np.ndarray) -> Motion:
+    """Turn each shoulder about the chest's front axis, by one angle in all frames.
 
-    An arm held forward, which is not square to that axis, is moved less.
+    Afterwards the smallest angle between upper arm and downward spine is `nearest`, (2,) [rad], left and
+    right. An arm held forward, which is not square to that axis, is moved less.
     """
     poses = motion.poses.copy()
     outward = (nearest - arm_clearance(motion).min(axis=0)) * [1.0, -1.0]
@@ -157,9 +172,9 @@ def hung_arms(motion: Motion, nearest: np.ndarray) -> Motion:
 
 
 def lap_clearance(motion: Motion) -> np.ndarray:
-    """Angle between each thigh and the upward spine: small when the thigh lies on the belly.
+    """Return the angle between each thigh and the upward spine, (T, 2) [rad], left and right.
 
-    -> (T, 2) [rad], left and right.
+    It is small when the thigh lies on the belly.
     """
     joints = joint_positions(motion.poses, motion.translations)
     up = joints[:, JOINT["spine3"]] - joints[:, JOINT["spine1"]]
@@ -173,13 +188,13 @@ def lap_clearance(motion: Motion) -> np.ndarray:
     return np.arccos(np.clip(np.stack(cosines, axis=1), -1.0, 1.0))
 
 
-def opened_hips(motion: Motion) -> Motion:
-    """Each thigh turned back, in the frames where it is nearer to the spine than LAP, until it is not.
+def open_hips(motion: Motion) -> Motion:
+    """Turn each thigh back, in the frames where it is nearer to the spine than HIP_DEGREES.
 
     It turns about the axis through the hips, which a thigh to the side is not square to: hence repeatedly.
     """
-    for _ in range(OPENINGS):
-        missing = np.maximum(0.0, np.deg2rad(LAP) - lap_clearance(motion))
+    for _ in range(HIP_ROUNDS):
+        missing = np.maximum(0.0, np.deg2rad(HIP_DEGREES) - lap_clearance(motion))
         poses = motion.poses.copy()
         for hip, angles in zip(HIPS, missing.T):
             back = rotation_matrices(angles[:, None] * SIDEWAYS)

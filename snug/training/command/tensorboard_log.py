@@ -11,7 +11,7 @@ class TensorBoardError(ValueError):
 
 
 class TensorBoardLog:
-    """Writes into a folder; a resumed run adds a file, and TensorBoard joins them.
+    """Curves of one training, in a folder; a resumed run adds a file, and TensorBoard joins them.
 
     Raises TensorBoardError where TensorBoard is not installed.
     """
@@ -26,7 +26,7 @@ class TensorBoardLog:
         self._writer = SummaryWriter(str(folder))
 
     def write(self, row: Mapping[str, float]) -> None:
-        """One row: every number but the step, under its own name."""
+        """Write one row: every number but the step, under its own name."""
         step = int(row["step"])
         for name, value in row.items():
             if name != "step":
@@ -34,4 +34,5 @@ class TensorBoardLog:
         self._writer.flush()
 
     def close(self) -> None:
+        """End the file."""
         self._writer.close()

@@ -31,17 +31,17 @@ MARGIN = 4e-3  # [m]
 
 
 def spring_terms(cloth: Cloth) -> tuple[Energy, Energy, Energy]:
-    """Membrane, bending and gravity of PBNS for the rest state of `cloth`, whose own material is not used."""
+    """Return membrane, bending and gravity of PBNS for the rest state of `cloth`, whatever its material."""
     hinges = Material(bending_stiffness=2 * BENDING)
-    own = Cloth(cloth.rest_positions, cloth.faces, hinges, pins=cloth.pins, rest_uv=cloth.rest_uv)
-    gravity = Gravity(own)
+    springs = Cloth(cloth.rest_positions, cloth.faces, hinges, pins=cloth.pins, rest_uv=cloth.rest_uv)
+    gravity = Gravity(springs)
     uniform = AREAL_DENSITY * cloth.areas.sum() / cloth.vertex_count
     gravity.weights = np.full(cloth.vertex_count, uniform * GRAVITY)
-    return StretchSpring(own), BendHinge(own, scaling="none"), gravity
+    return StretchSpring(springs), BendHinge(springs, scaling="none"), gravity
 
 
 class SquaredContact(ContactPenalty):
-    """k max(eps - d, 0)^2 [J] of each vertex, in place of the cube; planes and samples are ContactPenalty's.
+    """Contact energy k max(eps - d, 0)^2 [J] of each vertex, with the planes and samples of ContactPenalty.
 
     For training alone: its second derivatives are those of automatic differentiation.
     """
@@ -57,7 +57,8 @@ class SquaredContact(ContactPenalty):
     def element_energy(
         self, u: Tensor, points: Tensor | None = None, normals: Tensor | None = None
     ) -> Tensor:
-        import torch
+        """Return the energy of each sample [J] from its vertex u (..., 1, 3) and its plane."""
+        import torch  # a simulation with this material runs without
 
         c = torch.as_tensor(self.points).to(u) if points is None else points
         n = torch.as_tensor(self.normals).to(u) if normals is None else normals
@@ -67,6 +68,7 @@ class SquaredContact(ContactPenalty):
     def value_and_gradient(
         self, x: np.ndarray, points: np.ndarray | None = None, normals: np.ndarray | None = None
     ) -> tuple[float, np.ndarray]:
+        """Return the energy [J] and its gradient (V, 3) [N]."""
         c = self.points if points is None else points
         n = self.normals if normals is None else normals
         depth = np.maximum(self.margin - np.einsum("vi,vi->v", n, x - c), 0.0)

@@ -1,4 +1,4 @@
-"""The loss: the very energies that the simulator minimises, summed without weights (paper, eq. 5 to 7).
+"""Physics loss: the energies that the simulator minimises, summed without weights (paper, eq. 5 to 7).
 
 For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
 
@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -47,14 +47,17 @@ from snug.training.device import CPU
 from snug.training.losses.pbns_material import SquaredContact, spring_terms
 
 STATIC = ("strain", "bending", "gravity")
-Planes = tuple[Any, Any] | BatchKernel
+FrameData = np.ndarray | Tensor
+Planes = tuple[FrameData, FrameData] | BatchKernel
+EnergyType = TypeVar("EnergyType", bound=Energy)
 
 MEMBRANES = {"stvk": StretchStVK, "springs": StretchSpring}
 
 
 def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
-    """The recipe's terms of single frames without contact, by name: those of its material, then any other
-    energy of the simulator that it names.
+    """Return the recipe's terms of single frames without contact, by name.
+
+    Those of its material come first, then any other energy of the simulator that it names.
     """
     of_material = dict(zip(STATIC, _terms_of_material(cloth, recipe)))
     terms = {name: of_material[name] for name in STATIC if name in recipe.terms}
@@ -62,7 +65,7 @@ def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
 
 
 def _terms_of_material(cloth: Cloth, recipe: Recipe) -> Sequence[Energy]:
-    """What the terms STATIC are."""
+    """Return the energies of the terms STATIC."""
     if recipe.material == "pbns":
         return spring_terms(cloth)
     membrane = MEMBRANES[recipe.material](cloth)
@@ -70,7 +73,7 @@ def _terms_of_material(cloth: Cloth, recipe: Recipe) -> Sequence[Energy]:
 
 
 def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
-    """The recipe's contact term; options it leaves open are the simulator's own."""
+    """Return the recipe's contact term; options it leaves open are the simulator's defaults."""
     if recipe.material == "pbns":
         return SquaredContact(cloth)
     options: dict[str, Any] = {"samples": recipe.contact_samples}
@@ -90,6 +93,7 @@ class ClosedForms(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, *kernels: BatchKernel) -> tuple[Tensor, ...]:
+        """Evaluate all kernels."""
         lanes = laid(x)
         gradient = np.zeros_like(lanes)
         values = tuple(unlaid(kernel(lanes, gradient), *x.shape[:2]) for kernel in kernels)
@@ -97,7 +101,8 @@ class ClosedForms(torch.autograd.Function):
         return values
 
     @staticmethod
-    def backward(ctx: Any, *above: Tensor) -> Any:
+    def backward(ctx: Any, *above: Tensor) -> tuple[Tensor | None, ...]:
+        """Return the gradient of the sum, times its factor."""
         factors = torch.stack(above)
         if (factors != factors.flatten()[0]).any():
             raise ValueError("kernels give the gradient of the sum of all energies of a batch: weigh none")
@@ -111,7 +116,8 @@ class ClosedForm(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx: Any, x: Tensor, energy: Any, *frame_data: np.ndarray) -> Tensor:
+    def forward(ctx: Any, x: Tensor, energy: Energy, *frame_data: np.ndarray) -> Tensor:
+        """Evaluate value and gradient of each configuration."""
         flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
         rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
         values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
@@ -122,13 +128,15 @@ class ClosedForm(torch.autograd.Function):
         return torch.from_numpy(values).reshape(x.shape[:-2])
 
     @staticmethod
-    def backward(ctx: Any, *above: Tensor) -> Any:
+    def backward(ctx: Any, *above: Tensor) -> tuple[Tensor | None, ...]:
+        """Return the gradients, times their factors."""
         return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
 
 
-def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Tensor:
-    """Energy of each configuration, (..., V, 3) -> (...) [J]: by kernel from frame data in numpy, or by its
-    definition from tensors.
+def evaluate(energy: Energy, x: Tensor, *frame_data: FrameData, kernels: bool = True) -> Tensor:
+    """Return the energy (...) [J] of each configuration (..., V, 3) [m].
+
+    By its kernel from frame data in numpy, or by its definition from tensors.
     """
     if kernels:
         return ClosedForm.apply(x, energy, *frame_data)
@@ -137,12 +145,12 @@ def summed(energy: Any, x: Tensor, *frame_data: Any, kernels: bool = True) -> Te
 
 def has_closed_form(energy: Energy) -> bool:
     """Return whether its gradient is known in closed form; automatic differentiation gives that of others."""
-    own_gradient = type(energy).value_and_gradient is not Energy.value_and_gradient
-    return has_kernel(energy, "training_batch") or own_gradient
+    closed_form = type(energy).value_and_gradient is not Energy.value_and_gradient
+    return has_kernel(energy, "training_batch") or closed_form
 
 
-def on_device(energy: Any, device: torch.device) -> Any:
-    """The same energy with its arrays as tensors on a device: evaluating its definition copies nothing."""
+def on_device(energy: EnergyType, device: torch.device) -> EnergyType:
+    """Return the energy with its arrays as tensors on a device, so that its definition copies nothing."""
     twin = copy.copy(energy)
     for name, value in vars(energy).items():
         if isinstance(value, np.ndarray):
@@ -152,10 +160,14 @@ def on_device(energy: Any, device: torch.device) -> Any:
 
 
 class PhysicsLoss:
-    """Energies of sub-sequences, by term. dt: seconds between frames [s].
+    """Energies of sub-sequences, by term.
 
-    kernels: by closed forms on a CPU (in numpy and numba) where there are any, else by the definitions on
-    `device`.
+    Args:
+        cloth: rest state of the garment.
+        recipe: names the terms and their options.
+        dt: time between frames [s].
+        device: where the definitions run.
+        kernels: use closed forms on a CPU (in numpy and numba) where there are any, else the definitions.
     """
 
     def __init__(
@@ -181,22 +193,23 @@ class PhysicsLoss:
                 warn_slow_path("training", "batch kernel", slow, instead)
 
     def __call__(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Tensor]:
-        """Joules of each window and frame, term -> (N, T).
+        """Return the energy of each window and frame, term -> (N, T) [J].
 
-        x: (N, T, V, 3) [m], each frame relative to its own pelvis p. ahead: (N, T, 3) [m],
-        2 p_{t-1} - p_{t-2} - p_t: where the pelvis would be if it kept its velocity, seen from where it is.
-        planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors; or a
-        kernel in lanes that knows its planes.
+        Args:
+            x: (N, T, V, 3) [m], each frame relative to its own pelvis p.
+            ahead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m]: where the pelvis would be if it kept its
+                velocity, relative to where it is.
+            planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors;
+                or a kernel in lanes that knows its planes; None leaves contact out.
         """
         closed: dict[str, Tensor] = {}
         if self.kernels and x.dtype == torch.float32:
             kernels = self._kernels(x, ahead, planes)
-            energies: Any = ClosedForms
-            closed = dict(zip(kernels, energies.apply(x, *kernels.values()) if kernels else ()))
+            closed = dict(zip(kernels, ClosedForms.apply(x, *kernels.values()) if kernels else ()))
         terms = {}
         for name, energy in self.static.items():
             kernels_too = self.kernels and has_closed_form(energy)
-            terms[name] = closed[name] if name in closed else summed(energy, x, kernels=kernels_too)
+            terms[name] = closed[name] if name in closed else evaluate(energy, x, kernels=kernels_too)
         if "inertia" in self.terms and x.shape[1] >= 3:
             terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead)
         if "collision" in self.terms and planes is not None:
@@ -204,7 +217,7 @@ class PhysicsLoss:
                 terms["collision"] = closed["collision"]
             else:
                 assert isinstance(planes, tuple)
-                terms["collision"] = summed(self._contact, x, *planes, kernels=self.kernels)
+                terms["collision"] = evaluate(self._contact, x, *planes, kernels=self.kernels)
         return terms
 
     def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:

@@ -20,7 +20,7 @@ from benchmarks.training import Simulated
 from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
 from snug.recipes.recipe import DEFAULT
-from snug.training.augmentation.mixed_clips import FRAMES, mixed_for, shared_clips
+from snug.training.augmentation.mixed_clips import CLIP_FRAMES, augment, make_shared_clips
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, training
 from tests.benchmarks.tasks.test_cell_tasks import plan_of
 from tests.snug.training.dressing import swaying, tube_dress
@@ -57,12 +57,12 @@ def quickly(monkeypatch):
 
 
 def test_fewer_shared_clips_are_the_first_of_more_and_those_of_snugs_seed_0():
-    three, one = (shared_clips([MOTION], share, vertices=150) for share in (3, 1))
-    assert [len(three), len(one)] == [round(3 * 90 / FRAMES), round(90 / FRAMES)]
-    own = mixed_for([MOTION], dataclasses.replace(DEFAULT, mixed=3.0), vertices=150, seed=0)
+    three, one = (make_shared_clips([MOTION], share, vertices=150) for share in (3, 1))
+    assert [len(three), len(one)] == [round(3 * 90 / CLIP_FRAMES), round(90 / CLIP_FRAMES)]
+    own = augment([MOTION], dataclasses.replace(DEFAULT, mixed=3.0), vertices=150, seed=0)
     assert all(np.array_equal(a.poses, b.poses) for a, b in zip(one, three))
     assert all(np.array_equal(a.poses, b.poses) for a, b in zip(own, three, strict=True))
-    assert shared_clips([MOTION], 0, vertices=150) == []
+    assert make_shared_clips([MOTION], 0, vertices=150) == []
 
 
 def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, quickly):
@@ -81,7 +81,7 @@ def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, qu
     odd |= {"mixed_0": ended, "mixed_2": refused, "mixed_3": halved}
     assets = assets_of(tube_dress(), MOTION)
     outcomes = [clips_of(part).run(context(tmp_path, assets), {}) for part in range(4)]
-    assert asked == [clip.name for clip in shared_clips([MOTION], 4, vertices=150)]
+    assert asked == [clip.name for clip in make_shared_clips([MOTION], 4, vertices=150)]
     assert [o.result["clips"] for o in outcomes] == [["mixed_1"], [], [], ["mixed_4", "mixed_5"]]
     left_out = {name: why for o in outcomes for name, why in o.result["left_out"].items()}
     assert left_out == {"mixed_0": "stalled: stuck", "mixed_2": "no room", "mixed_3": "converged: "}
@@ -93,7 +93,7 @@ def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, qu
 
 def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
     assets = assets_of(tube_dress(), MOTION)
-    clip, *_ = shared_clips([MOTION], 1, vertices=150)
+    clip, *_ = make_shared_clips([MOTION], 1, vertices=150)
     outcome = clips_of(0, "lbfgs-5").run(context(tmp_path, assets), {})
     scene = dressed_scene(clip.name).build(assets_of(tube_dress(), clip))
     own = simulate(
@@ -101,7 +101,7 @@ def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
         start=scene.start, method="lbfgs", max_iterations=5, finish=False,
     )  # fmt: skip
     found = read_arrays(tmp_path / outcome.files[0])[clip.name]
-    assert np.array_equal(found, own.positions.astype(np.float32)) and len(found) == FRAMES
+    assert np.array_equal(found, own.positions.astype(np.float32)) and len(found) == CLIP_FRAMES
 
 
 def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkeypatch):
@@ -129,7 +129,7 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
     done = ground_truth.Outcome(result={"whole": True}, files=(path.name,))
     task = dataclasses.replace(training("supervised", MOTION.name, steps=1), clips=tuple(clips))
     result = task.run(context(tmp_path, assets), {("data", MOTION.name): done, **clips}).result
-    assert result["frames"] == 90 + 2 * FRAMES
+    assert result["frames"] == 90 + 2 * CLIP_FRAMES
     assert result["clips_left_out"] == 1 and result["left_out"] == []
     lost = task.run(context(tmp_path, assets), {("data", MOTION.name): done}).result
     assert lost["frames"] == 90

@@ -15,7 +15,7 @@ from snug.kernels.lanes import laid, unlaid
 from snug.recipes.named import PAPER, PBNS_SPRINGS, RECIPES
 from snug.recipes.recipe import DEFAULT, Recipe
 from snug.training.contact.cache import EXACT, PARTS, ContactCache, Patch, quantised
-from snug.training.losses.physics_loss import PhysicsLoss, make_contact, static_terms, summed
+from snug.training.losses.physics_loss import PhysicsLoss, evaluate, make_contact, static_terms
 from tests.snug.training.dressing import swaying, tube_dress
 
 DT = 1 / 30
@@ -44,7 +44,7 @@ def test_closed_form_backward_is_the_derivative_of_the_definition(term, dtype):
     planes = (points, normals) if term == "collision" else ()
     fast, slow = x.clone().requires_grad_(), x.double().requires_grad_()
     weight = torch.tensor([[1.0, -2.0, 0.5]])  # each configuration has its own factor from above
-    value = summed(made, fast, *(p.astype(np.float32) if dtype == torch.float32 else p for p in planes))
+    value = evaluate(made, fast, *(p.astype(np.float32) if dtype == torch.float32 else p for p in planes))
     (value * weight).sum().backward()
     exact = made.energy(slow, *map(torch.as_tensor, planes)).sum(-1)
     (exact * weight).sum().backward()

@@ -14,8 +14,14 @@ from snug.networks.motion_features import HISTORY, RATED_JOINTS, motion_history,
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import DYNAMIC
-from snug.training.augmentation.mixed_clips import mixed_motions, shared_clips
-from snug.training.augmentation.swinging_clips import BETWEEN, FASTEST, HELD, SPEEDS, swinging_motion
+from snug.training.augmentation.mixed_clips import make_mixed_clips, make_shared_clips
+from snug.training.augmentation.swinging_clips import (
+    HELD_FRAMES,
+    MAX_DEGREE_HERTZ,
+    SPEEDS,
+    TRANSITION_FRAMES,
+    make_swinging_motion,
+)
 from snug.training.losses.simulated_past import NEARNESS, SimulatedPast
 from snug.training.losses.vertex_targets import TargetError
 from snug.training.optimisation_step import Trainer
@@ -145,17 +151,17 @@ def test_without_inertia_no_past_is_asked_for():
 
 def test_swinging_motions_turn_stop_and_go_on_without_a_jump():
     given = [swaying(80), swaying(70, name="other", degrees=15.0)]
-    clips = mixed_motions(given, 600, turn=0.1, lifted=0.5, seed=0)
-    motion = swinging_motion(clips, "swing", seed=3)
-    again = swinging_motion(clips, "swing", seed=3)
+    clips = make_mixed_clips(given, 600, turn=0.1, lifted=0.5, seed=0)
+    motion = make_swinging_motion(clips, "swing", seed=3)
+    again = make_swinging_motion(clips, "swing", seed=3)
     np.testing.assert_array_equal(motion.poses, again.poses)
-    assert not np.array_equal(motion.poses[:20], swinging_motion(clips, "swing", seed=4).poses[:20])
+    assert not np.array_equal(motion.poses[:20], make_swinging_motion(clips, "swing", seed=4).poses[:20])
     speeds = joint_speeds(motion)
     held = (speeds == 0.0).all(1)
     lengths = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], held, [0]]))))[::2]
-    assert len(lengths) >= len(clips) // 2 and 10 < lengths.max() <= HELD
+    assert len(lengths) >= len(clips) // 2 and 10 < lengths.max() <= HELD_FRAMES
     # A stop is one; the way on from it is a motion of half a second, however far the next pose is.
-    assert np.rad2deg(speeds.max()) < 2 * 180 * 30 / BETWEEN
+    assert np.rad2deg(speeds.max()) < 2 * 180 * 30 / TRANSITION_FRAMES
     steps = np.linalg.norm(np.diff(motion.translations, axis=0), axis=1)
     fastest = max(np.linalg.norm(np.diff(c.translations, axis=0), axis=1).max() for c in clips)
     assert steps.max() < SPEEDS[1] * fastest + 0.02
@@ -165,8 +171,8 @@ def test_swinging_motions_turn_stop_and_go_on_without_a_jump():
 def test_no_body_turns_about_between_two_swinging_clips():
     still = Motion("still", np.zeros((60, 24, 3)), np.zeros((60, 3)))
     clips = [turn_about_vertical(still, angle) for angle in (0.0, np.pi, 0.5, -2.5, 1.5)]
-    pelvis = motion_rates(swinging_motion(clips, "swing", seed=1))[:, 7]  # [rad/s] about y
-    assert np.abs(pelvis).max() < 1.01 * np.deg2rad(2 * np.pi * FASTEST)
+    pelvis = motion_rates(make_swinging_motion(clips, "swing", seed=1))[:, 7]  # [rad/s] about y
+    assert np.abs(pelvis).max() < 1.01 * np.deg2rad(2 * np.pi * MAX_DEGREE_HERTZ)
 
 
 def test_half_of_the_swinging_clips_are_pieces_of_given_motions_and_none_where_none_is_given():
@@ -176,23 +182,25 @@ def test_half_of_the_swinging_clips_are_pieces_of_given_motions_and_none_where_n
     given = [Motion("given", poses, np.zeros((90, 3)))]
 
     def bent(side, **options):
-        elbow = swinging_motion(clips, "swing", seed=2, **options).poses[:, JOINT[f"{side}_elbow"], 1]
+        elbow = make_swinging_motion(clips, "swing", seed=2, **options).poses[:, JOINT[f"{side}_elbow"], 1]
         return float((np.abs(elbow) > 0.999).mean())
 
     assert bent("left") == bent("right") == 0.0
-    assert bent("left", given=given) > 0.1 < bent("right", given=given)  # mirrored half of the time
-    ways = BETWEEN / 80
-    assert 0.35 < bent("left", given=given) + bent("right", given=given) + 0.5 * ways < 0.65
+    assert bent("left", originals=given) > 0.1 < bent("right", originals=given)  # mirrored half of the time
+    ways = TRANSITION_FRAMES / 80
+    assert 0.35 < bent("left", originals=given) + bent("right", originals=given) + 0.5 * ways < 0.65
 
 
 def test_swinging_clips_of_a_share_are_those_of_mixed_clips_and_the_first_of_more():
     given = [swaying(80), swaying(70, name="other")]
-    three, one = (shared_clips(given, share, vertices=150, swinging=True) for share in (3, 1))
+    three, one = (make_shared_clips(given, share, vertices=150, swinging=True) for share in (3, 1))
     assert [m.name for m in three] == ["swinging_0", "swinging_1", "swinging_2"]
     np.testing.assert_array_equal(one[0].poses, three[0].poses)
     assert 1.0 < sum(m.frames for m in three) / (3 * 150) < 2.0
-    assert shared_clips(given[:1], 0, vertices=150, swinging=True) == []
-    assert len(shared_clips([swaying(10)], 8, vertices=150, swinging=True)) >= 1  # of few frames some parts
+    assert make_shared_clips(given[:1], 0, vertices=150, swinging=True) == []
+    assert (
+        len(make_shared_clips([swaying(10)], 8, vertices=150, swinging=True)) >= 1
+    )  # of few frames some parts
 
 
 def test_a_pretraining_brings_the_network_to_the_simulated_offsets():

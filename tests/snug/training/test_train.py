@@ -20,7 +20,7 @@ from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipes.named import PAPER, SUPERVISED
 from snug.recipes.recipe import DEFAULT, Recipe, RecipeError
-from snug.training.augmentation.mixed_clips import hung_arms, lap_clearance, mixed_for, mixed_motions
+from snug.training.augmentation.mixed_clips import augment, hang_arms, lap_clearance, make_mixed_clips
 from snug.training.losses.vertex_targets import TargetError, vertex_loss
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network, untrained_model
@@ -204,7 +204,7 @@ def test_each_mixed_clip_has_a_body_of_its_own_and_given_motions_the_mean_one():
         recipe=replace(SHAPED, mixed=60.0, shape_share=0.5),
     ).data.shapes
     assert 8 <= (half == 0.0).all(1)[1:].sum() <= 22 and len(half) == 31
-    clips = mixed_for([swaying(30)], SHAPED, vertices=dressed.vertices, seed=0)
+    clips = augment([swaying(30)], SHAPED, vertices=dressed.vertices, seed=0)
     windows = np.array([4, np.flatnonzero(mine.starts == mine.first[3] + 7)[0]])
     batch = mine.batch(windows)
     for row, (motion, betas, first) in enumerate([(swaying(30), None, 4), (clips[2], drawn[2], 7)]):
@@ -296,10 +296,10 @@ def test_mirror_swaps_the_sides():
 
 def test_mixed_motions_are_continuous_and_repeat():
     clips = [make_motion(name) for name in ("walk", "squat", "arm_raise")]
-    mixed = mixed_motions(clips, 300, turn=0.1, lifted=0.25, seed=3)
-    again = mixed_motions(clips, 300, turn=0.1, lifted=0.25, seed=3)
+    mixed = make_mixed_clips(clips, 300, turn=0.1, lifted=0.25, seed=3)
+    again = make_mixed_clips(clips, 300, turn=0.1, lifted=0.25, seed=3)
     assert len(mixed) == 5 and all((a.poses == b.poses).all() for a, b in zip(mixed, again))
-    assert mixed_motions(clips, 0, turn=0.1, lifted=0.25, seed=3) == []
+    assert make_mixed_clips(clips, 0, turn=0.1, lifted=0.25, seed=3) == []
     from snug.motion.motion import joint_speeds
 
     fastest = max(joint_speeds(clip).max() for clip in clips)
@@ -308,7 +308,7 @@ def test_mixed_motions_are_continuous_and_repeat():
 
 def test_mixed_arms_hang_each_at_a_distance_of_its_own_clear_of_the_torso():
     clips = [make_motion(name) for name in ("walk", "squat", "jumping_jack")]
-    mixed = mixed_motions(clips, 3000, turn=0.1, lifted=0.25, seed=3)
+    mixed = make_mixed_clips(clips, 3000, turn=0.1, lifted=0.25, seed=3)
     nearest = np.rad2deg([arm_clearance(clip).min(axis=0) for clip in mixed])
     assert nearest.min() > 24.0
     low, high = np.percentile(nearest, (10, 90))
@@ -320,13 +320,13 @@ def test_mixed_arms_hang_each_at_a_distance_of_its_own_clear_of_the_torso():
 def test_arms_hang_as_near_as_told(left, right):
     poses = np.zeros((1, 24, 3))
     poses[:, [JOINT["left_shoulder"], JOINT["right_shoulder"]], 2] = [-0.9, 0.4]
-    hung = hung_arms(Motion("hanging", poses, np.zeros((1, 3))), np.deg2rad([left, right]))
+    hung = hang_arms(Motion("hanging", poses, np.zeros((1, 3))), np.deg2rad([left, right]))
     assert np.rad2deg(arm_clearance(hung)) == pytest.approx(np.array([[left, right]]), abs=0.1)
 
 
 def test_mixed_thighs_stay_off_the_belly():
     clips = [make_motion(name) for name in ("squat", "bow")]  # together: a squat's legs under a bowed spine
-    mixed = mixed_motions(clips, 3000, turn=0.1, lifted=1.0, seed=3)
+    mixed = make_mixed_clips(clips, 3000, turn=0.1, lifted=1.0, seed=3)
     nearest = [np.rad2deg(lap_clearance(clip).min()) for clip in [*clips, *mixed]]
     assert min(nearest) > 55.0 and max(nearest) > 70.0  # 3 where nothing opens the hips
 
@@ -335,7 +335,7 @@ def test_mixed_thighs_are_lifted_as_high_as_hips_bend():
     standing = Motion("standing", np.zeros((60, 24, 3)), np.zeros((60, 3)))
 
     def lifts(lifted):
-        mixed = mixed_motions([standing], 6000, turn=0.0, lifted=lifted, seed=3)
+        mixed = make_mixed_clips([standing], 6000, turn=0.0, lifted=lifted, seed=3)
         hips = [JOINT["left_hip"], JOINT["right_hip"]]
         forward = [-np.rad2deg(clip.poses[:, hips, 0]) for clip in mixed]
         assert np.min(forward) > -1e-9
@@ -352,7 +352,7 @@ def test_mixed_legs_come_from_clips_of_their_own():
     poses = standing.poses.copy()
     poses[:, [JOINT["left_hip"], JOINT["right_hip"]], 0] = -1.0
     clips = [standing, replace(standing, name="sitting", poses=poses)]
-    mixed = mixed_motions(clips, 1200, turn=0.0, lifted=0.0, seed=1)
+    mixed = make_mixed_clips(clips, 1200, turn=0.0, lifted=0.0, seed=1)
     lifted = np.array([clip.poses[0, [JOINT["left_hip"], JOINT["right_hip"]], 0] < -0.5 for clip in mixed])
     for legs in ([True, False], [False, True], [True, True], [False, False]):
         assert (lifted == legs).all(1).any(), legs
@@ -361,9 +361,9 @@ def test_mixed_legs_come_from_clips_of_their_own():
 def test_mixed_frames_are_as_many_as_asked_for_and_as_memory_holds():
     clips = [make_motion("walk")]  # of 120 frames
     recipe = replace(DEFAULT, mixed=3.0)
-    counts = {v: len(mixed_for(clips, recipe, vertices=v, seed=0)) for v in (1000, 500_000, 2_000_000)}
+    counts = {v: len(augment(clips, recipe, vertices=v, seed=0)) for v in (1000, 500_000, 2_000_000)}
     assert counts == {1000: 6, 500_000: 3, 2_000_000: 1}
-    assert len(mixed_for(clips, replace(DEFAULT, mixed=500.0), vertices=1000, seed=0)) == 333  # 20,000 frames
+    assert len(augment(clips, replace(DEFAULT, mixed=500.0), vertices=1000, seed=0)) == 333  # 20,000 frames
 
 
 def test_mixed_motions_join_the_training_set():

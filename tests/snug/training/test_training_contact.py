@@ -12,7 +12,7 @@ from reference_sim.contact.anchor_walk import triangle_adjacency
 from snug.body.skeleton import JOINT
 from snug.body.skinning import skin
 from snug.recipes.recipe import DEFAULT
-from snug.training.augmentation.mixed_clips import mixed_for
+from snug.training.augmentation.mixed_clips import augment
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.planes import FIRST_NEAR, FIRST_PROPAGATED, MARKED, NEAR, PROPAGATED
 from snug.training.optimisation_step import Trainer
@@ -129,7 +129,7 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
     trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=recipe, kernels=kernels)
     contact, data, body = trainer.contact, trainer.data, trainer.dressed.body
     assert contact is not None and data.shapes is not None and (contact._kept is not None) == kernels
-    clips = [*MOTIONS, *mixed_for(MOTIONS, recipe, vertices=trainer.dressed.vertices, seed=0)]
+    clips = [*MOTIONS, *augment(MOTIONS, recipe, vertices=trainer.dressed.vertices, seed=0)]
     for place in (1, 2, 3):
         motion, own, first = clips[place], data.shapes[place], data.first[place]
         batch = data.at(first + np.array([[3, 4, 5]]))
