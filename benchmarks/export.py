@@ -31,7 +31,7 @@ exit status: 0 written; 2 the scene is not known or cannot be made, or the folde
 
 
 def make_export_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command."""
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Write a scene as plain files: rest mesh, weights, material, motion, posed body, start.",
@@ -47,7 +47,7 @@ def make_export_parser() -> argparse.ArgumentParser:
 
 @command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     options = make_export_parser().parse_args(words)

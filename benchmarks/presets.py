@@ -1,4 +1,4 @@
-"""How much of everything a run takes: three frozen sizes, from a smoke test to the paper's scale."""
+"""The sizes of a run: three frozen presets, from a smoke test to the paper's scale."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Dependence:
-    """Of the scenes that vary mesh and time step: meshes [vertices asked for], the one at which time steps
-    vary, time steps a frame, frames, and frames of settling.
+    """Sizes of the scenes that vary mesh and time step.
+
+    meshes: numbers of vertices; middle: that at which time steps vary. substeps: time steps a frame.
     """
 
     meshes: tuple[int, ...]
@@ -23,7 +24,7 @@ class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
     frames: at most so many frames of each motion, at 30 per second; clip_frames: of its liveliest part;
-    warm_up_frames: at the beginning of a dressed scene, simulated and not judged, before those of a clip;
+    warm_up_frames: at the beginning of a dressed scene, simulated and not evaluated, before those of a clip;
     loop_frames: of the walk in a loop.
     steps: optimiser steps per kind of network, or per training. further: whether the
     ablations and further baselines of a suite take part without being named. settle_frames: frames from the
@@ -59,7 +60,7 @@ class Preset:
     smallest: bool = False
 
     def steps_of(self, training: str, kind: str) -> int:
-        """Optimiser steps of a training (benchmarks.methods.catalogue.trainings), by its kind; 0 for an untrained network."""
+        """Return the optimiser steps of a training by its name, else its kind; 0 for an untrained network."""
         return self.steps.get(training, self.steps.get(kind, 0))
 
 
@@ -157,7 +158,11 @@ PRESETS = (
 
 
 def find_preset(name: str) -> Preset:
-    """The preset of that name. Raises ValueError naming the choices."""
+    """Return the preset of that name. Raises ValueError naming the choices.
+
+    >>> find_preset("smoke").garment_vertices
+    350
+    """
     for preset in PRESETS:
         if preset.name == name:
             return preset

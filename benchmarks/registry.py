@@ -1,6 +1,4 @@
-"""What the visible tuples of scenes, methods and metrics have in common: each name stands once, and names a
-module that is loaded when it is needed.
-"""
+"""Visible tuples of scenes, methods and metrics: each name stands once, each module is loaded when needed."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from typing import Protocol, TypeVar
 
 
 class Named(Protocol):
-    """What has a name."""
+    """An entry with a name."""
 
     @property
     def name(self) -> str:
@@ -29,23 +27,23 @@ class DeclarationError(ValueError):
 
 
 def by_name(what: str, entries: Iterable[Entry]) -> dict[str, Entry]:
-    """Name -> entry, in their order. Raises DeclarationError where two have one name."""
-    found: dict[str, Entry] = {}
+    """Return name -> entry, in their order. Raises DeclarationError where two have one name."""
+    known: dict[str, Entry] = {}
     for entry in entries:
-        if entry.name in found:
+        if entry.name in known:
             homes = (
-                getattr(e, "declared_in", "") or "the project itself" for e in (found[entry.name], entry)
+                getattr(e, "declared_in", "") or "the project itself" for e in (known[entry.name], entry)
             )
             raise DeclarationError(
                 f"{what} '{entry.name}' is declared twice, by {' and by '.join(homes)}: "
                 "give each a name of its own"
             )
-        found[entry.name] = entry
-    return found
+        known[entry.name] = entry
+    return known
 
 
 def load(module: str) -> ModuleType:
-    """The module of that dotted name, or of that file: an absolute path that ends with ".py".
+    """Import the module of that dotted name, or of that file: an absolute path that ends with ".py".
 
     A file is imported by its stem. Its folder is put behind all others from which modules are imported, so
     that it finds what lies beside it, and nothing of ours is hidden. Raises DeclarationError where its stem
@@ -62,8 +60,10 @@ def load(module: str) -> ModuleType:
 
 
 def demand_that_it_is(name: str, path: Path) -> None:
-    """Raises DeclarationError unless the module of that name is imported from that file."""
+    """Raise DeclarationError unless the module of that name is imported from that file."""
     spec = importlib.util.find_spec(name) if name.replace(".", "_").isidentifier() else None
     if not (spec and spec.origin and Path(spec.origin).is_file() and path.samefile(spec.origin)):
-        known = f"Python knows {name} as {spec.origin or 'another'}" if spec else "no module has such a name"
-        raise DeclarationError(f"{path}: {known}: give the file another name")
+        otherwise = (
+            f"Python knows {name} as {spec.origin or 'another'}" if spec else "no module has such a name"
+        )
+        raise DeclarationError(f"{path}: {otherwise}: give the file another name")

@@ -19,7 +19,7 @@ from benchmarks.tasks.task import RunStopped
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     try:
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> int:
-    """Run the plan, or say what would be run; returns the exit status."""
+    """Run the plan, or print what would be run; return the exit status."""
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     from benchmarks.runner.lock import HeldError, held

@@ -1,4 +1,4 @@
-"""python -m benchmarks.score: judge a roll-out that another program has written, in a scene of this project.
+"""python -m benchmarks.score: evaluate a roll-out of another program in a scene of this project.
 
 A thin command: the roll-out is a method of an ordinary run, beside the simulation of the same scene.
 """
@@ -7,34 +7,19 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import re
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
 
-from benchmarks.cell import Cell
-from benchmarks.external.roll_out_option import (
-    CHARACTERS,
-    PLACE,
-    RollOutError,
-    RollOutOption,
-    Stated,
-    checked_ms,
-)
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import add_scene_options, scene_fields, split
+from benchmarks.plan.options import add_scene_options
 from benchmarks.plan.plan import Plan
-from benchmarks.plan.request import Request
+from benchmarks.plan.plan_roll_out import plan_roll_out
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from reference_sim.command.command_line import Parser
 
 PROGRAM = "benchmarks.score"
-SOLVED_AGAIN = "speed"  # the suite in which steps are solved again: gaps and one-step errors
-NO_REFERENCE = "left out by --no-reference: curvature error and histogram, distances, dynamics, relative gap"
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
   python -m benchmarks.score mine.npz --scene tshirt/kick -o scored
@@ -53,7 +38,7 @@ exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cann
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command."""
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Energies, gap to the minimum of each step, curvature, depth, conservation, dynamics of "
@@ -84,11 +69,12 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     try:
-        plan = plan_of(make_parser().parse_args(words), words)
+        command = shlex.join(["python", "-m", PROGRAM, *words])
+        plan = plan_roll_out(make_parser().parse_args(words), command)
     except (ValueError, OSError) as error:  # as in benchmarks.run
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -99,56 +85,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def plan_of(options: argparse.Namespace, words: Sequence[str]) -> Plan:
-    """Return the plan of the roll-out and of the simulation in one scene. Raises ValueError, one line."""
-    stated = Stated(options.units, options.up, options.fps, options.match_vertices)
-    stem = Path(options.roll_out.rstrip("/").replace(PLACE, "")).stem
-    name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-.") or "roll-out"
-    option = RollOutOption(name, options.roll_out, stated, checked_ms(options.declared_ms))
-    fields, scenes = scene_fields(options), split([options.scene or ""])
-    if options.rest_mesh:
-        from benchmarks.scenes.from_roll_out import declared  # loads the simulator
-
-        scene = declared(option, options.rest_mesh)
-        scenes, fields = (scene.name,), fields | {"further_scenes": (scene,), "suites": (SOLVED_AGAIN,)}
-        # The rate that the user has stated of the file is now that of the scene.
-        option = replace(option, stated=replace(stated, fps=None))
-    request = Request(
-        command=shlex.join(["python", "-m", PROGRAM, *words]),
-        scenes=scenes,
-        methods=("simulation",),
-        one_scene=True,
-        roll_outs=(option,),
-        folder=Path(options.out) if options.out else None,
-        **fields,
-    )
-    plan = make_plan(request)
-    cells = tuple(_solved_again(_reference(cell, options)) for cell in plan.cells)
-    return replace(plan, cells=cells, suites=tuple(dict.fromkeys((*plan.suites, SOLVED_AGAIN))))
-
-
-def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
-    """Return the simulation's cell, or the one that takes its place; others as they are."""
-    if cell.entry.role != "reference":
-        return cell
-    if options.no_reference:
-        return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
-    if options.reference is None:
-        return cell
-    from benchmarks.methods.outside.stored_roll_out import entry_of  # loads numpy
-
-    stored = RollOutOption("reference", options.reference, Stated(), role="reference")
-    entry = entry_of(stored, cell.scene.name)
-    if entry is None:
-        raise RollOutError(f"--reference {stored.path_for(cell.scene.name)}: no such file")
-    return replace(cell, entry=replace(entry, label="Reference, from a file"))
-
-
-def _solved_again(cell: Cell) -> Cell:
-    """Return the cell in the suite, too, in which steps are solved again."""
-    return replace(cell, suites=tuple(dict.fromkeys((*cell.suites, SOLVED_AGAIN))))
-
-
 SHOWN = (
     ("energy/total", "total", "J"),
     ("energy/strain", "strain", "J"),
@@ -157,20 +93,20 @@ SHOWN = (
     ("gap/energy", "gap", "J"),
     ("curvature/mean", "curvature", "1/m"),
     ("curvature/error", "curvature error", "1/m"),
-    ("penetration/vertices", "below the skin", "%"),
+    ("penetration/vertices", "penetration", "%"),
     ("distance/rms", "distance", "mm"),
 )
 
 
 def summary(plan: Plan) -> str:
-    """One line of what came out, and where the rest is."""
+    """Return one line of results, and where the rest is."""
     folder, name = RunFolder(plan.folder), plan.cells[-1].method
     rows = [row for row in folder.read_rows() if row.method == name]
     values = {row.metric: row.value for row in rows if row.value is not None}
     shown = [f"{word} {values[metric]:.4g} {unit}" for metric, word, unit in SHOWN if metric in values]
     bad = next((f"{row.status}: {row.reason}" for row in rows if row.status != "ok"), "")
-    found = ", ".join(filter(None, (bad, *shown)))
-    return f"{name} in {plan.scenes[0].name}: {found}; {folder.report_path}"
+    results = ", ".join(filter(None, (bad, *shown)))
+    return f"{name} in {plan.scenes[0].name}: {results}; {folder.report_path}"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What all dressed scenes share: one body, the garments tailored to it, and the motions."""
+"""Assets that all dressed scenes share: one body, the garments tailored to it, and the motions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Assets:
-    """A body, what it may wear and the motions, all by name; each motion at most `preset.frames` long.
+    """A body, its garments and the motions, all by name; each motion at most `preset.frames` long.
 
     clips: motion -> frames of its liveliest part. bodies: motion or clip -> posed body (T,B,3) [m], where
     ready made.
@@ -32,11 +32,11 @@ class Assets:
     bodies: dict[str, np.ndarray] = field(default_factory=dict)
 
     def named(self, names: Iterable[str]) -> list[Motion]:
-        """The motions of those names, in that order."""
+        """Return the motions of those names, in that order."""
         return [self.motions[name] for name in names]
 
     def motion(self, name: str, part: str) -> Motion:
-        """The whole motion of that name, or its clip, named "<motion>@clip"."""
+        """Return the whole motion of that name, or its clip, named "<motion>@clip"."""
         whole = self.motions[name]
         if part != "clip":
             return whole
@@ -44,18 +44,18 @@ class Assets:
         return replace(whole.cut(frames.start, frames.stop), name=f"{name}@clip")
 
     def before(self, name: str, part: str) -> Motion | None:
-        """What comes before that part of the motion; None where it begins with the motion."""
+        """Return the motion before that part; None where the part begins with the motion."""
         start = self.clips[name].start if part == "clip" else 0
         return self.motions[name].cut(0, start) if start else None
 
     def only(self, motion: str) -> Assets:
-        """The same with this motion alone: little to hand to another process."""
+        """Return the assets with this motion alone: little to hand to another process."""
         names = {motion} & self.motions.keys()
-        own = {name: self.motions[name] for name in names}
-        return replace(self, motions=own, clips={name: self.clips[name] for name in names}, bodies={})
+        motions = {name: self.motions[name] for name in names}
+        return replace(self, motions=motions, clips={name: self.clips[name] for name in names}, bodies={})
 
     def posed_body(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
-        """The body (T,B,3) [m] of that shape, or of the mean one, in that motion."""
+        """Return the body (T,B,3) [m] of that shape, or of the mean one, in that motion."""
         ready = self.bodies.get(motion.name)
         return self.body.vertices(motion.poses, motion.translations, betas) if ready is None else ready
 
@@ -78,7 +78,7 @@ def open_assets(
     Raises:
         ValueError: a garment that cannot be tailored to this body.
     """
-    from benchmarks.assets.liveliest_part import clip
+    from benchmarks.assets.liveliest_part import liveliest_part
     from snug.garments.templates import find_template
 
     inputs = inputs or Inputs()
@@ -90,12 +90,15 @@ def open_assets(
         for name in garments
     }
     whole = [motion.cut(0, preset.frames) for motion in motions]
-    clips = {motion.name: clip(wearer, motion, preset.clip_frames, preset.warm_up_frames) for motion in whole}
+    clips = {
+        motion.name: liveliest_part(wearer, motion, preset.clip_frames, preset.warm_up_frames)
+        for motion in whole
+    }
     return Assets(wearer, tailored, {motion.name: motion for motion in whole}, clips)
 
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:
-    """Motions of the embedded library."""
+    """Make motions of the embedded library."""
     from snug.motion.library import make_motion
 
     return [make_motion(name) for name in names]

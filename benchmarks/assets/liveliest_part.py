@@ -1,8 +1,8 @@
-"""The liveliest part of a motion: what suite speed looks at, where whole motions would take hours.
+"""The liveliest part of a motion, for suite speed: whole motions would take hours.
 
 A clip is the run of frames in which the joints are fastest on average, and the frames before it that are
-simulated and not judged. It begins in the midst of the motion, with the cloth as it is there: simulated from
-the motion's own start, see benchmarks.scenes.dressed_body.
+simulated and not evaluated. It begins in the midst of the motion, with the cloth as it is there: simulated
+from the motion's own start, see benchmarks.scenes.dressed_body.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
 
 
-def clip(body: Body, motion: Motion, frames: int, warm_up: int = 0) -> range:
-    """The liveliest `frames` frames of the motion and `warm_up` before them; all of a motion too short."""
+def liveliest_part(body: Body, motion: Motion, frames: int, warm_up: int = 0) -> range:
+    """Return the liveliest `frames` frames and `warm_up` before them; all of a motion too short."""
     import numpy as np
 
     speed = joint_speeds(body, motion)
@@ -29,7 +29,7 @@ def clip(body: Body, motion: Motion, frames: int, warm_up: int = 0) -> range:
 
 
 def joint_speeds(body: Body, motion: Motion) -> np.ndarray:
-    """Mean speed of the joints between two frames, (T - 1,) [m/s]."""
+    """Return the mean speed of the joints between two frames, (T - 1,) [m/s]."""
     import numpy as np
 
     transforms = body.transforms(motion.poses, motion.translations)

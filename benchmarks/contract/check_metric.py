@@ -1,4 +1,4 @@
-"""Does a module of metrics keep the contract of benchmarks.metric? On two roll-outs of one scene."""
+"""Check of a module of metrics: whether it keeps the contract of benchmarks.metric, on two roll-outs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHIFT = 1e-3  # [m] by which the second roll-out is off
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CheckMetrics(Task):
-    """A module measures the simulation, and the same moved by a little; what is wrong is in the result."""
+    """Measure the simulation and the same moved by a little; the findings are in the result."""
 
     kind = "check"
     stage = "check"
@@ -29,11 +29,12 @@ class CheckMetrics(Task):
     scene: Scene
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Check, and return the findings as the result."""
         findings = Findings(self.home)
-        findings.look(lambda found: self._check(found, context))
+        findings.look(lambda: self._check(findings, context))
         return Outcome(result={"wrong": findings.wrong, "notes": findings.notes})
 
-    def _check(self, found: Findings, context: Context) -> None:
+    def _check(self, findings: Findings, context: Context) -> None:
         import numpy as np
 
         from benchmarks.metric import RollOut, SceneRollOuts
@@ -53,59 +54,61 @@ class CheckMetrics(Task):
         module, names = load(self.home), set[str]()
         for roll_out in group.roll_outs:
             kept = roll_out.positions.copy()
-            names |= self._measure(found, module, roll_out)
-            found.demand(
+            names |= self._measure(findings, module, roll_out)
+            findings.demand(
                 np.array_equal(roll_out.positions, kept),
                 "alters the positions of a roll-out: copy what you change; other metrics read it too",
             )
         silent = [metric.name for metric in module.METRICS if not _declares(metric.name, names)]
         if silent:
-            found.notes.append(f"{self.scene.name} gives no {', '.join(silent)}")
+            findings.notes.append(f"{self.scene.name} gives no {', '.join(silent)}")
 
-    def _measure(self, found: Findings, module: ModuleType, roll_out: Any) -> set[str]:
-        """The names of what it has measured."""
+    def _measure(self, findings: Findings, module: ModuleType, roll_out: Any) -> set[str]:
+        """Measure a roll-out twice, and return the names of its values."""
         import numpy as np
 
         on = f"of {roll_out.entry.name}"
-        with found.call(f"measure() {on}", ": leave out of the dictionary what does not apply"):
+        with findings.call(f"measure() {on}", ": leave out of the dictionary what does not apply"):
             values, again = (module.measure(roll_out) if hasattr(module, "measure") else {} for _ in range(2))
         if hasattr(module, "compare") and roll_out.reference is not None:
-            with found.call(f"compare() {on}"):
+            with findings.call(f"compare() {on}"):
                 compared = module.compare(roll_out, roll_out.reference)
                 values, again = values | compared, again | module.compare(roll_out, roll_out.reference)
         for name, value in values.items():
             number = value[0] if isinstance(value, tuple) else value
-            found.demand(
+            findings.demand(
                 any(_declares(metric.name, {name}) for metric in module.METRICS),
                 f"measures {name}, which METRICS does not declare",
             )
             fine = isinstance(number, int | float) and not isinstance(number, bool)
-            if not found.demand(fine, f"{name} {on} is a {type(number).__name__}: give a float"):
+            if not findings.demand(fine, f"{name} {on} is a {type(number).__name__}: give a float"):
                 continue
-            found.demand(math.isfinite(number), f"{name} {on} is {number}: leave out what does not apply")
-            found.demand(
+            findings.demand(math.isfinite(number), f"{name} {on} is {number}: leave out what does not apply")
+            findings.demand(
                 again.get(name) == value, f"{name} {on} is {value}, then {again.get(name)}: fix its seed"
             )
         if hasattr(module, "series"):
-            with found.call(f"series() {on}"):
+            with findings.call(f"series() {on}"):
                 curves = module.series(roll_out)
-            due = roll_out.positions.shape[:2]
+            shape = roll_out.positions.shape[:2]
             for name, curve in curves.items():
-                found.demand(
-                    np.shape(curve) in (due[:1], due),
-                    f"series() gives {name} {np.shape(curve)}: one number a frame is {due[:1]}, one a frame "
-                    f"and vertex {due}",
+                findings.demand(
+                    np.shape(curve) in (shape[:1], shape),
+                    f"series() gives {name} {np.shape(curve)}: expected one number a frame "
+                    f"{shape[:1]}, or one a frame and vertex {shape}",
                 )
         if hasattr(module, "judge"):
-            with found.call(f"judge() {on}"):
-                said = module.judge(roll_out, values)
-            found.demand(
-                said is None or (isinstance(said, tuple) and len(said) == 2 and said[0] in STATUSES),
-                f"judge() gives {said!r}: None, or a status ({', '.join(STATUSES)}) and a reason are due",
+            with findings.call(f"judge() {on}"):
+                judgement = module.judge(roll_out, values)
+            findings.demand(
+                judgement is None
+                or (isinstance(judgement, tuple) and len(judgement) == 2 and judgement[0] in STATUSES),
+                f"judge() gives {judgement!r}: expected None, or a status ({', '.join(STATUSES)}) "
+                "and a reason",
             )
         return set(values)
 
 
 def _declares(metric: str, names: set[str]) -> bool:
-    """Whether one of the names is the metric, or fits its pattern "family/*"."""
+    """Return whether one of the names is the metric, or fits its pattern "family/*"."""
     return any(name == metric or (metric.endswith("/*") and name.startswith(metric[:-1])) for name in names)

@@ -1,4 +1,4 @@
-"""Does a scene keep the contract of benchmarks.scene, and do the energies that come with it their own?"""
+"""Check of a scene: whether it keeps the contract of benchmarks.scene, and its energies their own."""
 
 from __future__ import annotations
 
@@ -28,90 +28,96 @@ DIRECTIONS = 3  # along which derivatives are compared
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CheckScene(Task):
-    """Built twice, its parts looked at, and simulated; what is wrong is in the result."""
+    """Build a scene twice, look at its parts, and simulate it; the findings are in the result."""
 
     kind = "check"
     stage = "check"
     scene: Scene
 
     def assets(self, assets: Assets | None) -> Assets | None:
+        """Return the assets with the motion of the scene alone."""
         return assets.only(self.scene.motion) if assets is not None and self.scene.dressed else None
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Check, and return the findings as the result."""
         findings = Findings(self.scene.declared_in or self.scene.module)
-        findings.look(lambda found: self._check(found, context))
+        findings.look(lambda: self._check(findings, context))
         return Outcome(result={"wrong": findings.wrong, "notes": findings.notes})
 
-    def _check(self, found: Findings, context: Context) -> None:
-        with found.call("build()", ": it is called as build(scene, assets, **sizes and options)"):
+    def _check(self, findings: Findings, context: Context) -> None:
+        with findings.call("build()", ": it is called as build(scene, assets, **sizes and options)"):
             scene, again = (self.scene.build(context.assets) for _ in range(2))
-        if not found.demand(
+        if not findings.demand(
             isinstance(scene, BuiltScene), f"build() gives a {type(scene).__name__}: return a BuiltScene"
         ):
             return
-        self._check_parts(found, scene)
-        if found.wrong:
+        self._check_parts(findings, scene)
+        if findings.wrong:
             return
-        with found.call("settle()"):
+        with findings.call("settle()"):
             before = fingerprints(scene)
             other = altered(before, again)
-        found.demand(
+        findings.demand(
             not other, f"is built otherwise the second time: {other}: fix the seed of all that is random"
         )
-        own = [e for e in scene.energies if not type(e).__module__.startswith("reference_sim.")]
-        for energy in own:
-            with found.call(f"energy {energy.name}"):
-                check_derivatives(found, energy, scene)
-        if found.wrong:
+        users = [e for e in scene.energies if not type(e).__module__.startswith("reference_sim.")]
+        for energy in users:
+            with findings.call(f"energy {energy.name}"):
+                check_derivatives(findings, energy, scene)
+        if findings.wrong:
             return
-        with found.call("its simulation"):
+        with findings.call("its simulation"):
             simulation = find_method("simulation").make(models=context.folder.models, seed=0)
             simulation.prepare(scene)
             trajectory = simulation.run()
         if trajectory.status != "converged":
-            found.notes.append(f"its simulation ends as {trajectory.status}: {trajectory.reason}")
+            findings.notes.append(f"its simulation ends as {trajectory.status}: {trajectory.reason}")
 
-    def _check_parts(self, found: Findings, scene: BuiltScene) -> None:
+    def _check_parts(self, findings: Findings, scene: BuiltScene) -> None:
         import numpy as np
 
         declared, vertices = self.scene, scene.cloth.vertex_count
-        found.demand(scene.name == declared.name, f"is built as '{scene.name}': give name=scene.name")
-        found.demand(
+        findings.demand(scene.name == declared.name, f"is built as '{scene.name}': give name=scene.name")
+        findings.demand(
             0.0 < scene.dt < np.inf, f"has a time step of {scene.dt} s: give a positive number of seconds"
         )
-        found.demand(scene.frames >= FEWEST, f"has {scene.frames} frames: at least {FEWEST} are needed")
-        found.demand(bool(scene.energies), "declares no energies: without one there is nothing to minimise")
+        findings.demand(scene.frames >= FEWEST, f"has {scene.frames} frames: at least {FEWEST} are needed")
+        findings.demand(
+            bool(scene.energies), "declares no energies: without one there is nothing to minimise"
+        )
         for energy in scene.energies:
-            found.demand(
+            findings.demand(
                 energy.cloth is scene.cloth, f"energy {energy.name} is made of another cloth: use the scene's"
             )
-        found.demand(
+        findings.demand(
             (scene.obstacle is not None) == (declared.obstacle or declared.dressed),
             "builds an obstacle and declares none, or the reverse: say obstacle=True where it has one",
         )
-        found.demand(
+        findings.demand(
             (scene.dressed is not None) == declared.dressed,
             "is built dressed and names no garment, or the reverse: say garment= and motion= where it is",
         )
-        with found.call("settle()"):
+        with findings.call("settle()"):
             start = np.asarray(scene.settle(), dtype=np.float64)
-        found.demand(
+        findings.demand(
             start.shape in ((vertices, 3), (2, vertices, 3)) and bool(np.isfinite(start).all()),
             f"settle() gives {start.shape}: finite positions {(vertices, 3)} [m], or these and velocities",
         )
         for frame in (0, scene.frames - 1) if scene.pin_positions is not None else ():
-            with found.call(f"pin_positions({frame})"):
+            with findings.call(f"pin_positions({frame})"):
                 place = np.shape(scene.pin_positions(frame)) if scene.pin_positions else ()
             pins = (len(scene.cloth.pins), 3)
-            found.demand(
+            findings.demand(
                 place == pins, f"pin_positions({frame}) gives {place}: one place for each pin is {pins}"
             )
         if scene.exact is not None:
-            due = (scene.frames, vertices, 3)
-            found.demand(np.shape(scene.exact) == due, f"exact is {np.shape(scene.exact)}, {due} are due")
+            shape = (scene.frames, vertices, 3)
+            findings.demand(
+                np.shape(scene.exact) == shape, f"exact is {np.shape(scene.exact)}, expected {shape}"
+            )
 
 
-def check_derivatives(found: Findings, energy: Energy, scene: BuiltScene) -> None:
+def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> None:
     """Gradient and Hessian against central differences of value and gradient."""
     import numpy as np
 
@@ -124,25 +130,25 @@ def check_derivatives(found: Findings, energy: Energy, scene: BuiltScene) -> Non
     energy.prepare(Step(scene.start, scene.start_velocity, x, scene.dt, scene.obstacle, 1))
     value, gradient = energy.value_and_gradient(x)
     what = f"energy {energy.name}: its"
-    if not found.demand(
+    if not findings.demand(
         bool(np.isfinite(value)) and np.shape(gradient) == x.shape and bool(np.isfinite(gradient).all()),
-        f"{what} value {value} and gradient {np.shape(gradient)}: a finite number and {x.shape} are due",
+        f"{what} value {value} and gradient {np.shape(gradient)}: expected a finite number and {x.shape}",
     ):
         return
     moved = np.abs(gradient).max(axis=1) > 0.0  # elsewhere any direction says the same
     for _ in range(DIRECTIONS):
         direction = random.standard_normal(x.shape) * (moved[:, None] if moved.any() else 1.0)
         ahead, behind = (energy.value_and_gradient(x + sign * STEP * direction) for sign in (1.0, -1.0))
-        slope, told = (ahead[0] - behind[0]) / (2.0 * STEP), float((gradient * direction).sum())
-        found.demand(
-            bool(abs(slope - told) <= CLOSE * np.linalg.norm(gradient) + ROUND_OFF * abs(value) / STEP),
-            f"{what} gradient is not the derivative of its value: {told:.6g} N along a direction, "
+        slope, stated = (ahead[0] - behind[0]) / (2.0 * STEP), float((gradient * direction).sum())
+        findings.demand(
+            bool(abs(slope - stated) <= CLOSE * np.linalg.norm(gradient) + ROUND_OFF * abs(value) / STEP),
+            f"{what} gradient is not the derivative of its value: {stated:.6g} N along a direction, "
             f"differences say {slope:.6g} N",
         )
     turned = (ahead[1] - behind[1]) / (2.0 * STEP)
     product = _times_hessian(energy, x, direction)
     off, most = float(np.abs(turned - product).max()), float(np.abs(turned).max())
-    found.demand(
+    findings.demand(
         off <= CLOSE * max(most, float(np.abs(product).max())) + ROUND_OFF * np.abs(gradient).max() / STEP,
         f"{what} Hessian is not the derivative of its gradient: off by {off:.3g} of {most:.3g} N/m; leave it "
         "to automatic differentiation, or mend it",
@@ -150,7 +156,7 @@ def check_derivatives(found: Findings, energy: Energy, scene: BuiltScene) -> Non
 
 
 def _times_hessian(energy: Energy, x: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(V, 3) [N]."""
+    """Return the Hessian times a direction (V, 3) [N]."""
     import numpy as np
 
     if energy.dynamic:

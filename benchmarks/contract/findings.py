@@ -1,4 +1,4 @@
-"""What is found wrong, with its remedy; and what a check reads before and after, to see what has changed."""
+"""Findings of a check, each with its remedy; digests that tell whether a scene was altered."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.fingerprint.digest import digest
+from benchmarks.process.errors import one_line
 
 if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
 
 
 class Broken(Exception):
-    """What was called has raised: there is nothing further to look at. The message is the finding."""
+    """The user's code has raised, so that nothing further can be looked at; the message is the finding."""
 
 
 @dataclass
@@ -29,38 +30,37 @@ class Findings:
     notes: list[str] = field(default_factory=list)
 
     def demand(self, fine: bool, otherwise: str) -> bool:
-        """Keep what is wrong; gives `fine`."""
+        """Note `otherwise` as wrong unless fine; return `fine`."""
         if not fine:
             self.wrong.append(otherwise)
         return fine
 
     @contextmanager
     def call(self, what: str, remedy: str = "") -> Iterator[None]:
-        """Around a call of the user's code. Raises Broken where that raises, with its file and line."""
+        """Guard a call of the user's code. Raises Broken where that raises, with its file and line."""
         try:
             yield
         except Exception as error:
             where = raised_at(error, self.home)
-            said = " ".join(f"{type(error).__name__}: {error}".split())
-            raise Broken(f"{what} raises {said}{f' ({where})' if where else ''}{remedy}") from None
+            raise Broken(f"{what} raises {one_line(error)}{f' ({where})' if where else ''}{remedy}") from None
 
-    def look(self, check: Callable[[Findings], None]) -> None:
-        """Do a check, until it has broken."""
+    def look(self, check: Callable[[], None]) -> None:
+        """Run a check, until the user's code raises."""
         try:
-            check(self)
+            check()
         except Broken as broken:
             self.wrong.append(str(broken))
 
 
 def raised_at(error: BaseException, home: str) -> str:
-    """File and line, of the user's own code, where something was raised; empty where it was elsewhere."""
+    """Return file and line of the user's code where something was raised; empty where it was elsewhere."""
     code = code_of(home)
-    own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in code]
-    return f"{own[-1].filename}: line {own[-1].lineno}" if own else ""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in code]
+    return f"{frames[-1].filename}: line {frames[-1].lineno}" if frames else ""
 
 
 def fingerprints(scene: BuiltScene) -> dict[str, str]:
-    """Name -> digest of what a scene holds and nobody may alter."""
+    """Return name -> digest of the arrays of a scene, which nobody may alter."""
     import numpy as np
 
     cloth, worn, obstacle = scene.cloth, scene.dressed, scene.obstacle
@@ -81,13 +81,13 @@ def fingerprints(scene: BuiltScene) -> dict[str, str]:
 
 
 def altered(before: dict[str, str], scene: BuiltScene) -> str:
-    """The names of what is not as it was, in one text."""
+    """Return the names of the arrays that have changed, in one text."""
     now = fingerprints(scene)
     return ", ".join(name for name in before if now.get(name) != before[name])
 
 
 class Connections:
-    """Watches to which hosts this process connects, from now on."""
+    """Hosts to which this process connects from now on."""
 
     def __init__(self) -> None:
         self.hosts: list[str] = []

@@ -1,4 +1,4 @@
-"""Building a data set: its sequences are tasks of the runner, one for each motion, and nothing besides."""
+"""Build a data set: its sequences are tasks of the runner, one for each motion."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ LONGEST = 1_000_000  # frames of a sequence
 def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
     """Simulate what the folder lacks. Raises ValueError, one line, before anything is written."""
     plan, entry = plan_sequences(options, words)
-    _there(plan.folder)  # a folder of other things is refused before any work
+    _existing(plan.folder)  # a folder of other things is refused before any work
     garment = plan.motions.first_garment
     motions = plan.inputs.motions.values()
     assets = open_assets(plan.preset, motions, [garment], inputs=plan.inputs)
     settings = settings_of(assets.body, assets.garments[garment]) | {
         "frames_per_second": _rate(motions), "method": entry.name, "settle_frames": plan.preset.settle_frames,
     }  # fmt: skip
-    tasks = tasks_of(plan, entry)
+    tasks = sequence_tasks(plan, entry)
     with held(plan.folder):
-        before = _there(plan.folder)  # read where nobody else writes it
+        before = _existing(plan.folder)  # read where nobody else writes it
         if before:
             before.check(settings)
         commands = tuple(dict.fromkeys((*(before.commands if before else ()), plan.command)))
@@ -65,11 +65,11 @@ def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
         try:
             runner.run(executor_of(plan, folder, assets), NoLog())
         finally:
-            found = DataSet(plan.folder, settings, _lines(tasks, runner.known(), kept), commands)
-            found.write()
+            data = DataSet(plan.folder, settings, _lines(tasks, runner.known(), kept), commands)
+            data.write()
     if runner.reused:
         print(f"{len(runner.reused)} sequences were there", file=sys.stderr)
-    return found
+    return data
 
 
 def plan_sequences(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, Any]:
@@ -146,8 +146,8 @@ def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str,
     return {motion.name: motion for motion in cut}
 
 
-def tasks_of(plan: Plan, entry: Any) -> list[SimulateSequence]:
-    """One for each motion. On what machine they run decides nothing."""
+def sequence_tasks(plan: Plan, entry: Any) -> list[SimulateSequence]:
+    """Return one task for each motion; the machine is no input of it."""
     schedule, garment, tasks = Schedule(plan), plan.motions.first_garment, []
     for name, motion in plan.inputs.motions.items():
         task = schedule.data(name, garment, entry)
@@ -161,8 +161,8 @@ def tasks_of(plan: Plan, entry: Any) -> list[SimulateSequence]:
     return tasks
 
 
-def _there(folder: Path) -> DataSet | None:
-    """The data set to go on with. Raises ValueError for a folder that holds other things."""
+def _existing(folder: Path) -> DataSet | None:
+    """Return the data set to continue. Raises ValueError for a folder that holds other things."""
     if folder.is_dir() and any(folder.iterdir()):
         if not (folder / INDEX).exists():
             raise PlanError(f"--out {folder}: is not empty and holds no data set; name a new folder")
@@ -180,7 +180,7 @@ def _rate(motions: Any) -> float:
 def _lines(
     tasks: Sequence[SimulateSequence], outcomes: Any, kept: Sequence[SimulatedSequence]
 ) -> tuple[SimulatedSequence, ...]:
-    """The index: what was there, and of each task what came of it; in the order of the first asking."""
+    """Return the index: existing lines, and the outcome of each task, in the order of the first request."""
     lines = {line.name: line for line in kept}
     for task in tasks:
         name, outcome = task.scene.motion, outcomes.get(task.id)
@@ -191,13 +191,13 @@ def _lines(
 
 
 def _line(name: str, outcome: Outcome) -> SimulatedSequence:
-    told = {name: outcome.origin[name] for name in ("hardware", "commit")}
-    told |= {"reason": outcome.reason, "seconds": round(outcome.seconds, 3)}
+    facts = {name: outcome.origin[name] for name in ("hardware", "commit")}
+    facts |= {"reason": outcome.reason, "seconds": round(outcome.seconds, 3)}
     if outcome.failed or not outcome.files:
-        return SimulatedSequence(name, status=outcome.status, **told)
+        return SimulatedSequence(name, status=outcome.status, **facts)
     trajectory, motion, vertices = outcome.files
     result = outcome.result
     return SimulatedSequence(
         name, trajectory, motion, vertices, outcome.digests, result["frames"], result["status"],
-        usable=result["whole"], **told | {"reason": result["reason"]},
+        usable=result["whole"], **facts | {"reason": result["reason"]},
     )  # fmt: skip

@@ -41,7 +41,7 @@ SUFFIXES = (".vtkhdf", ".hdf", ".npz", ".pkl", ".pickle", ".pc2", ".pc16", *MESH
 
 @dataclass(frozen=True, eq=False)
 class StoredRollOut:
-    """What a file holds, in its own unit, axes and order; positions are finite or not, as they are.
+    """The contents of a file, in its own unit, axes and order; positions need not be finite.
 
     positions: (T,V,3) float64. dtype: of the numbers in the file. faces: (F,3). fps [1/s]. obstacle: (T,B,3).
     obstacle_faces: (G,3). quasi_static: (T,V,3). converged: (T,) whether each frame claims to be. None: the
@@ -109,9 +109,9 @@ def _read(path: str, state: object) -> StoredRollOut:
         raise RollOutError(named) from None
 
 
-def _checked(found: Mapping[str, Any]) -> StoredRollOut:
-    """The arrays with their shapes compared. Raises ValueError, without the file's name."""
-    positions = found.get("positions")
+def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:
+    """Return the arrays, their shapes compared. Raises ValueError, without the file's name."""
+    positions = arrays.get("positions")
     if positions is None:
         raise ValueError("holds no positions (T,V,3): name them 'positions' in an npz, 'pred' in a pickle")
     positions = np.asarray(positions)
@@ -119,23 +119,23 @@ def _checked(found: Mapping[str, Any]) -> StoredRollOut:
     known = {"positions": _floats("positions", positions)}
     frames, vertices = known["positions"].shape[:2]
     for name, count in (("faces", vertices), ("obstacle_faces", None)):
-        if found.get(name) is not None:
-            known[name] = _triangles(name, np.asarray(found[name]), count)
+        if arrays.get(name) is not None:
+            known[name] = _triangles(name, np.asarray(arrays[name]), count)
     for name in ("obstacle", "quasi_static"):
-        if found.get(name) is not None:
-            known[name] = _floats(name, np.asarray(found[name]))
+        if arrays.get(name) is not None:
+            known[name] = _floats(name, np.asarray(arrays[name]))
             if len(known[name]) != frames:
                 raise ValueError(f"{name} has {len(known[name])} frames, positions {frames}")
     if "quasi_static" in known and known["quasi_static"].shape != known["positions"].shape:
         raise ValueError(f"quasi_static is {known['quasi_static'].shape}, positions {(frames, vertices, 3)}")
     if "obstacle" in known and "obstacle_faces" in known:
         _triangles("obstacle_faces", known["obstacle_faces"], known["obstacle"].shape[1])
-    fps = found.get("fps")
+    fps = arrays.get("fps")
     if fps is not None:
         fps = float(np.asarray(fps, dtype=np.float64).item())
         if not (np.isfinite(fps) and 0.0 < fps < 1e6):
             raise ValueError(f"states {fps} frames per second")
-    return StoredRollOut(dtype=dtype, fps=fps, converged=found.get("converged"), **known)
+    return StoredRollOut(dtype=dtype, fps=fps, converged=arrays.get("converged"), **known)
 
 
 def _floats(name: str, array: np.ndarray) -> np.ndarray:
@@ -198,7 +198,7 @@ def _trajectory(path: str) -> dict[str, Any]:
 
 
 def _check_hdf(path: str) -> None:
-    """A data set that declares more than its packed bytes can hold is not read. Raises ValueError."""
+    """Raise ValueError for a data set that declares more than its packed bytes can hold."""
     import h5py
 
     def check(name: str, item: Any) -> None:

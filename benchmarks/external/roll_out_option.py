@@ -21,8 +21,8 @@ class RollOutError(ValueError):
 
 
 @dataclass(frozen=True)
-class Stated:
-    """What the user says of a roll-out: unit, up axis, frames per second, whether to match vertices."""
+class FileConventions:
+    """Unit, up axis and frames per second of a roll-out's file, and whether to match its vertices."""
 
     units: str = "m"
     up: str = "y"
@@ -45,7 +45,7 @@ class RollOutOption:
 
     name: str
     path: str
-    stated: Stated
+    stated: FileConventions
     declared_ms: float | None = None
     role: str = "external"
 
@@ -55,35 +55,40 @@ class RollOutOption:
 
     @property
     def places(self) -> bool:
-        """Whether it has a file for each of several scenes."""
+        """True where there is a file for each of several scenes."""
         return PLACE in self.path
 
     def path_for(self, scene: str) -> str:
+        """Return the path of the roll-out in a scene."""
         return self.path.replace(PLACE, scene.replace("/", "-"))
 
 
-def parse(text: str) -> RollOutOption:
-    """NAME=FILE[,key=value...]. Raises RollOutError."""
-    given, *words = text.split(",")
+def parse_roll_out(text: str) -> RollOutOption:
+    """Parse NAME=FILE[,key=value...]. Raises RollOutError.
+
+    >>> parse_roll_out("mine=out.npz,units=cm,ms=2.2").declared_ms
+    2.2
+    """
+    given, *pairs = text.split(",")
     name, equals, path = (part.strip() for part in given.partition("="))
     if not (name and equals and path):
         raise RollOutError(f"--rollout {text}: give NAME=FILE, with ,units=cm and the like behind it")
-    said: dict[str, Any] = {}
-    for word in words:
-        key, _, value = (part.strip() for part in word.partition("="))
+    fields: dict[str, Any] = {}
+    for pair in pairs:
+        key, _, value = (part.strip() for part in pair.partition("="))
         if key not in _WORDS:
             raise RollOutError(f"--rollout {text}: unknown word '{key}'; there are {', '.join(_WORDS)}")
         field, convert = _WORDS[key]
         try:
-            said[field] = convert(value)
+            fields[field] = convert(value)
         except ValueError:
             raise RollOutError(f"--rollout {text}: {key}={value} is no number") from None
-    declared = said.pop("declared_ms", None)
-    return RollOutOption(name, path, Stated(**said), checked_ms(declared))
+    declared = fields.pop("declared_ms", None)
+    return RollOutOption(name, path, FileConventions(**fields), check_declared_ms(declared))
 
 
-def checked_ms(value: float | None) -> float | None:
-    """[ms] a frame. Raises RollOutError where it is no time."""
+def check_declared_ms(value: float | None) -> float | None:
+    """Return a declared time [ms] a frame. Raises RollOutError where it is no time."""
     if value is not None and not 0.0 < value < 1e9:
         raise RollOutError(f"declared time {value} ms: give a positive number of milliseconds a frame")
     return value

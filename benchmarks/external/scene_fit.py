@@ -1,4 +1,4 @@
-"""Does a stored roll-out belong to the scene? Unit, axes, order of vertices, frame rate, place are compared.
+"""Fit of a stored roll-out to a scene: unit, axes, order of vertices, frame rate and place are compared.
 
 What does not fit is refused with the remedy and never guessed: a roll-out in centimetres would otherwise get
 numbers, and nobody would see that they mean nothing.
@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.external.roll_out_files import StoredRollOut
-from benchmarks.external.roll_out_option import RollOutError, Stated
-from benchmarks.external.vertex_correspondence import faces_alike, nearest_order, same_topology
+from benchmarks.external.roll_out_option import FileConventions, RollOutError
+from benchmarks.external.vertex_correspondence import nearest_order, same_faces, same_topology
 from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 
 if TYPE_CHECKING:
@@ -27,9 +27,21 @@ LONG = 3.0  # times as long as at rest, edges in the mean: then they join vertic
 ALIKE = 1e-6  # of a frame rate
 
 
-def fitted(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[StoredRollOut, tuple[str, ...]]:
-    """The roll-out in metres, y up, in the order of the scene's vertices, a frame for each of the scene's;
-    and what was done to it, in words. Raises RollOutError with the remedy, without the file's name.
+def fit_to_scene(
+    stored: StoredRollOut, scene: BuiltScene, stated: FileConventions
+) -> tuple[StoredRollOut, tuple[str, ...]]:
+    """Return the roll-out as the scene has it: metres, y up, its order of vertices, one position a frame.
+
+    Args:
+        stored: the roll-out as read.
+        scene: the scene that it is said to belong to.
+        stated: unit, axis and rate of the file, and whether to match vertices.
+
+    Returns:
+        The roll-out, and each change that was made, in words.
+
+    Raises:
+        RollOutError: with the remedy, without the file's name.
     """
     count, cloth = stored.positions.shape[1], scene.cloth
     if count != cloth.vertex_count:
@@ -39,25 +51,25 @@ def fitted(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[St
         )
     if not np.isfinite(stored.positions[0]).all():
         raise RollOutError("its first frame, the scene's start, is not finite")
-    expected, done = expected_positions(scene), []
+    expected, changes = expected_positions(scene), list[str]()
     in_metres = replace(stored, positions=to_metres_y_up(stored.positions, units=stated.units, up=stated.up))
     _check_axes(stored, expected[0], stated)
     if stored.quasi_static is not None:
         held = to_metres_y_up(stored.quasi_static, units=stated.units, up=stated.up)
         in_metres = replace(in_metres, quasi_static=held)
-    order, words = _order(in_metres, scene, expected[0], stated)
+    order, change = _order(in_metres, scene, expected[0], stated)
     if order is not None:
         in_metres = _reordered(in_metres, order)
-        done.append(words)
-    timed, words = _retimed(in_metres, scene, stated)
-    if words:
-        done.append(words)
+        changes.append(change)
+    timed, change = _retimed(in_metres, scene, stated)
+    if change:
+        changes.append(change)
     _check_place(timed.positions, expected)
-    return timed, tuple(done)
+    return timed, tuple(changes)
 
 
 def expected_positions(scene: BuiltScene) -> np.ndarray:
-    """(T,V,3) [m] the garment carried by the body's joints; without a body the start alone, (1,V,3)."""
+    """Return the garment carried by the body's joints (T,V,3) [m]; without a body the start, (1,V,3)."""
     if scene.dressed is None:
         return scene.start[None]
     worn = scene.dressed
@@ -74,8 +86,8 @@ def expected_positions(scene: BuiltScene) -> np.ndarray:
 # --- unit, axes and place ----------------------------------------------------------------------------------
 
 
-def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: Stated) -> None:
-    """Among all units and up axes the stated ones are those with which the first frame fits best."""
+def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: FileConventions) -> None:
+    """Raise RollOutError unless the first frame fits best with the stated unit and up axis."""
     first, size = stored.positions[0], _diagonal(expected)
     alike = [units for units in METRES if 1 / SIZES < METRES[units] * _diagonal(first) / size < SIZES]
     if not alike:
@@ -93,7 +105,7 @@ def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: Stated) -> 
     here = apart.get(given, np.inf)
     if best != given and apart[best] < BETTER * here and (given[0] not in alike or apart[best] < NEAR * size):
         pairs = zip(("units", "up"), best, given)
-        remedy = [f"--{name} {value}" for name, value, said in pairs if value != said]
+        remedy = [f"--{name} {value}" for name, value, stated_value in pairs if value != stated_value]
         raise RollOutError(
             f"its first frame fits the scene's cloth in {best[0]}, {best[1]} up, {apart[best]:.2g} m off, "
             f"and not in {stated.units}, {stated.up} up: give {' '.join(remedy)}"
@@ -106,8 +118,9 @@ def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: Stated) -> 
 
 
 def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
-    """The cloth's centre stays with the body that carries it, in most of the frames: a roll-out that explodes
-    in the end is a result, one of another motion is none.
+    """Raise RollOutError unless the cloth's centre stays with the body in most of the frames.
+
+    A roll-out that explodes in the end is a result, one of another motion is none.
     """
     frames = min(len(positions), len(expected))
     if frames < 2:
@@ -124,15 +137,15 @@ def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
 
 
 def _cloud_distance(points: np.ndarray, others: np.ndarray) -> float:
-    """Mean distance [m] to the nearest point of the other set, both ways: blind to the order."""
+    """Return the mean distance [m] to the nearest point of the other set, both ways: blind to the order."""
     from scipy.spatial import cKDTree
 
-    there, back = cKDTree(others).query(points)[0], cKDTree(points).query(others)[0]
-    return float(there.mean() + back.mean()) / 2.0
+    forth, back = cKDTree(others).query(points)[0], cKDTree(points).query(others)[0]
+    return float(forth.mean() + back.mean()) / 2.0
 
 
 def _diagonal(points: np.ndarray) -> float:
-    """Of the bounding box [m]."""
+    """Return the diagonal of the bounding box [m]."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
@@ -140,13 +153,13 @@ def _diagonal(points: np.ndarray) -> float:
 
 
 def _order(
-    stored: StoredRollOut, scene: BuiltScene, expected: np.ndarray, stated: Stated
+    stored: StoredRollOut, scene: BuiltScene, expected: np.ndarray, stated: FileConventions
 ) -> tuple[np.ndarray | None, str]:
-    """Which vertex of the file is each of the scene's, (V,), and how it was found; None: the same."""
+    """Return the file's vertex for each of the scene's (V,), and how it was matched; None: the same order."""
     ours, first = scene.cloth.faces, stored.positions[0]
     remedy = "; give --match-vertices" if not stated.match_vertices else ""
     if stored.faces is not None:
-        if faces_alike(stored.faces, ours):
+        if same_faces(stored.faces, ours):
             return None, ""
         if not stated.match_vertices:
             raise RollOutError(
@@ -188,49 +201,49 @@ def _lengths(positions: np.ndarray, scene: BuiltScene) -> np.ndarray:
 
 
 def _stretch(positions: np.ndarray, scene: BuiltScene) -> float:
-    """Mean length of edges over that at rest."""
+    """Return the mean length of edges over that at rest."""
     return float(_lengths(positions, scene).mean() / _lengths(scene.cloth.rest_positions, scene).mean())
 
 
 # --- frame rate --------------------------------------------------------------------------------------------
 
 
-def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: Stated) -> tuple[StoredRollOut, str]:
-    """A frame for each of the scene's, linear in time between the file's; and how it was done."""
+def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: FileConventions) -> tuple[StoredRollOut, str]:
+    """Return a frame for each of the scene's, linear in time between the file's, and the change in words."""
     rate = 1.0 / scene.dt
-    said, there = stored.fps, len(stored.positions)
-    if stated.fps is None and said is not None and abs(said - rate) > ALIKE * rate:
+    stated_rate, frames = stored.fps, len(stored.positions)
+    if stated.fps is None and stated_rate is not None and abs(stated_rate - rate) > ALIKE * rate:
         raise RollOutError(
-            f"states {said:g} frames a second, the scene has {rate:g}: give --fps {said:g} to re-time it"
+            f"states {stated_rate:g} frames a second, the scene has {rate:g}: give --fps {stated_rate:g} to "
+            "re-time it"
         )
-    own = rate if stated.fps is None else stated.fps
-    due = scene.frames
-    places = np.arange(due) * own / rate
+    file_rate = rate if stated.fps is None else stated.fps
+    places = np.arange(scene.frames) * file_rate / rate
     places = np.where(np.abs(places - np.round(places)) < 1e-6, np.round(places), places)
-    spare = there - 1 - places[-1]  # frames of the file behind the scene's last; up to one of the scene's
-    if spare < 0.0 or spare > (0.0 if own == rate else max(own / rate, 1.0)):
-        times = (there - 1) / own
-        hint = _rate_hint(there, due, rate) if stated.fps is None else ""
+    spare = frames - 1 - places[-1]  # frames of the file behind the scene's last; up to one of the scene's
+    if spare < 0.0 or spare > (0.0 if file_rate == rate else max(file_rate / rate, 1.0)):
+        seconds = (frames - 1) / file_rate
+        hint = _rate_hint(frames, scene.frames, rate) if stated.fps is None else ""
         raise RollOutError(
-            f"has {there} frames, {times:.3g} s at {own:g} a second; the scene has {due} with its start, "
-            f"{(due - 1) / rate:.3g} s{hint}"
+            f"has {frames} frames, {seconds:.3g} s at {file_rate:g} a second; the scene has "
+            f"{scene.frames} with its start, {(scene.frames - 1) / rate:.3g} s{hint}"
         )
-    if own == rate:
+    if file_rate == rate:
         return stored, ""
-    low = np.minimum(np.floor(places).astype(int), there - 1)
-    high, share = np.minimum(low + 1, there - 1), (places - low)[:, None, None]
+    low = np.minimum(np.floor(places).astype(int), frames - 1)
+    high, share = np.minimum(low + 1, frames - 1), (places - low)[:, None, None]
 
     def at(positions: np.ndarray) -> np.ndarray:
         return np.where(share > 0.0, (1.0 - share) * positions[low] + share * positions[high], positions[low])
 
     held = None if stored.quasi_static is None else at(stored.quasi_static)
     how = "every frame of the scene is one of the file" if not share.any() else "linear in between"
-    words = f"re-timed from {own:g} to {rate:g} frames a second, {how}"
-    return replace(stored, positions=at(stored.positions), quasi_static=held, converged=None), words
+    change = f"re-timed from {file_rate:g} to {rate:g} frames a second, {how}"
+    return replace(stored, positions=at(stored.positions), quasi_static=held, converged=None), change
 
 
-def _rate_hint(there: int, due: int, rate: float) -> str:
-    ratio = (there - 1) / max(due - 1, 1)
-    near: Mapping[float, float] = {own: abs(ratio - own / rate) for own in (15, 24, 25, 50, 60, 90, 100, 120)}
-    guess = min(near, key=lambda own: near[own])
+def _rate_hint(frames: int, expected: int, rate: float) -> str:
+    ratio = (frames - 1) / max(expected - 1, 1)
+    near: Mapping[float, float] = {fps: abs(ratio - fps / rate) for fps in (15, 24, 25, 50, 60, 90, 100, 120)}
+    guess = min(near, key=lambda fps: near[fps])
     return f": if it has {guess} a second, give --fps {guess}" if near[guess] < 0.05 * guess / rate else ""

@@ -1,4 +1,4 @@
-"""Which vertex of one triangle mesh is which of another: by topology, or by position."""
+"""Correspondence of the vertices of two triangle meshes: by topology, or by position."""
 
 from __future__ import annotations
 
@@ -10,8 +10,12 @@ TRIED = 24  # places of a first triangle; a mesh with as many symmetries as tria
 ROUNDS = 12  # of the refinement of colours: what lies so many edges around a vertex tells it from others
 
 
-def faces_alike(theirs: Index, ours: Index) -> bool:
-    """Whether two lists of triangles (F,3) join the same vertices, whatever their order and winding."""
+def same_faces(theirs: Index, ours: Index) -> bool:
+    """Return whether two lists of triangles (F,3) join the same vertices, in any order and winding.
+
+    >>> same_faces(np.array([[0, 1, 2]]), np.array([[1, 0, 2]]))
+    True
+    """
     return theirs.shape == ours.shape and np.array_equal(_canonical(theirs), _canonical(ours))
 
 
@@ -20,8 +24,9 @@ def _canonical(faces: Index) -> Index:
 
 
 def nearest_order(theirs: np.ndarray, ours: np.ndarray, *, reach: float) -> Index | None:
-    """For each of our points (V,3) the nearest of theirs (V,3), (V,); None where two have the same or one is
-    farther than `reach` [m].
+    """Return the nearest of their points (V,3) for each of ours (V,3): indices (V,).
+
+    None where two of ours have the same, or one is farther than `reach` [m].
     """
     from scipy.spatial import cKDTree
 
@@ -33,7 +38,7 @@ def nearest_order(theirs: np.ndarray, ours: np.ndarray, *, reach: float) -> Inde
 def same_topology(
     theirs: Index, ours: Index, their_points: np.ndarray, our_points: np.ndarray
 ) -> Index | None:
-    """For each of our vertices the one of theirs that stands in the same place of the mesh, (V,).
+    """Return for each of our vertices the one of theirs in the same place of the mesh: indices (V,).
 
     theirs, ours: (F,3), each with one winding. Of several ways, as in a symmetric mesh, that with the least
     distances between their_points and our_points (V,3). None where the meshes are not the same, or where an
@@ -48,19 +53,19 @@ def same_topology(
     colours = _colours(theirs, len(their_points)), _colours(ours, len(our_points))
     if not np.array_equal(np.sort(colours[0]), np.sort(colours[1])):
         return None
-    found = [
+    orders = [
         order
         for winding in (theirs, theirs[:, ::-1])
         if (order := _laid_on(winding, ours, *colours, their_points, our_points)) is not None
     ]
-    return min(found, key=lambda order: _cost(their_points[order], our_points), default=None)
+    return min(orders, key=lambda order: _cost(their_points[order], our_points), default=None)
 
 
 def _laid_on(
     theirs: Index, ours: Index, their_colours: Index, our_colours: Index, their_points: np.ndarray,
     our_points: np.ndarray,
 ) -> Index | None:  # fmt: skip
-    """The order by triangles of that winding, part by part of our mesh; None where there is none."""
+    """Return the order by triangles of that winding, part by part of our mesh; None where there is none."""
     their_side, our_side, colours = _third(theirs), _third(ours), (their_colours, our_colours)
     if their_side is None or our_side is None:
         return None
@@ -92,7 +97,7 @@ def _places(
     seed: Index, theirs: Index, their_colours: Index, our_colours: Index, their_points: np.ndarray,
     our_points: np.ndarray,
 ) -> Index:  # fmt: skip
-    """Their triangles, turned, whose colours are those of the triangle `seed` of ours; the TRIED nearest."""
+    """Return their triangles, turned, of the colours of our triangle `seed`: the TRIED nearest."""
     turned = np.concatenate([np.roll(theirs, turn, axis=1) for turn in range(3)])
     alike = turned[(their_colours[turned] == our_colours[seed]).all(axis=1)]
     away = ((their_points[alike] - our_points[seed]) ** 2).sum(axis=(1, 2))
@@ -102,8 +107,9 @@ def _places(
 def _followed(
     seed: Index, place: Index, theirs: dict, ours: dict, their_colours: Index, our_colours: Index
 ) -> dict[int, int] | None:
-    """Our vertex -> theirs, of all that hangs together with `seed` where that lies on `place`; None where two
-    triangles contradict each other.
+    """Return our vertex -> theirs, of all that hangs together with `seed` where that lies on `place`.
+
+    None where two triangles contradict each other.
     """
     way = {int(a): int(b) for a, b in zip(seed, place)}
     if len(set(way.values())) < 3:
@@ -130,18 +136,18 @@ def _followed(
 
 
 def _third(faces: Index) -> dict[tuple[int, int], int] | None:
-    """Directed edge -> the third corner of its triangle; None where two triangles have one."""
-    found: dict[tuple[int, int], int] = {}
+    """Return directed edge -> the third corner of its triangle; None where two triangles share one."""
+    corners: dict[tuple[int, int], int] = {}
     for a, b, c in faces.tolist():
         for edge, tip in (((a, b), c), ((b, c), a), ((c, a), b)):
-            if edge in found:
+            if edge in corners:
                 return None
-            found[edge] = tip
-    return found
+            corners[edge] = tip
+    return corners
 
 
 def _colours(faces: Index, vertices: int) -> Index:
-    """(V,) equal where the mesh around two vertices looks alike, as far as ROUNDS edges tell."""
+    """Return colours (V,), equal where the mesh within ROUNDS edges of two vertices is alike."""
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     both = np.concatenate([edges, edges[:, ::-1]])
     colour = np.bincount(faces.ravel(), minlength=vertices).astype(np.uint64)
@@ -154,7 +160,10 @@ def _colours(faces: Index, vertices: int) -> Index:
 
 
 def _mixed(values: Index) -> Index:
-    """A hash of whole numbers, the same everywhere (splitmix64, Steele, Lea and Flood 2014)."""
+    """Return a hash of whole numbers, the same everywhere.
+
+    Source: splitmix64 (Steele, Lea and Flood 2014).
+    """
     with np.errstate(over="ignore"):
         x = values + np.uint64(0x9E3779B97F4A7C15)
         x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

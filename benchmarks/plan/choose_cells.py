@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -15,6 +15,7 @@ from benchmarks.performance.microbenchmark import SUITE, Microbenchmark
 from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.motion_split import nearest
 from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.roll_out_cells import roll_out_cells
 from benchmarks.plan.suites import SUITE_NAMES, SUITES, Extent, Suite
 from benchmarks.presets import PRESETS, Preset
 from benchmarks.registry import DeclarationError, by_name
@@ -33,7 +34,7 @@ UNTRAINED = "networks are trained for a second garment where its scenes are name
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
-    """What cells are chosen by: names and patterns, and all that they may name.
+    """Names and patterns by which cells are chosen, and all that they may name.
 
     full: whether suites are named. scenes, methods: names or patterns; empty means all that the suites list.
     user_scenes, user_methods: entries that are not the project's, named among these. roll_outs: stored ones,
@@ -70,7 +71,7 @@ class Selection:
 
     @cached_property
     def declared_methods(self) -> dict[str, MethodEntry]:
-        """The same of methods."""
+        """Name -> method, of all that could be asked for."""
         return by_name("method", (*METHODS, *self.user_methods))
 
     @property
@@ -92,39 +93,39 @@ def choose_cells(
     declared, methods = selection.declared_scenes, selection.declared_methods
     _check_words("scene", selection.scenes, [*declared, *(entry.name for entry in MEASURED)])
     _check_words("method", selection.methods, list(methods))
-    found: dict[tuple[str, str, int], Cell] = {}
+    chosen: dict[tuple[str, str, int], Cell] = {}
     for suite, scene, entry in _pairs(selection):
         method = entry.name
         for seed in selection.seeds if entry.seeded else (0,):
             key = (scene, method, seed)
-            before = found[key].suites if key in found else ()
-            found[key] = Cell(declared[scene].at(selection.preset), entry, seed, (*before, suite))
+            before = chosen[key].suites if key in chosen else ()
+            chosen[key] = Cell(declared[scene].at(selection.preset), entry, seed, (*before, suite))
     cases, microbenchmarks = tuple(_cases(selection)), tuple(_microbenchmarks(selection))
     if selection.one_scene:  # some have the name of a scene
         cases, microbenchmarks = (), ()
-    if not (found or cases or microbenchmarks):
+    if not (chosen or cases or microbenchmarks):
         raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
-    if selection.one_scene and len({scene for scene, _, _ in found}) != 1:
+    if selection.one_scene and len({scene for scene, _, _ in chosen}) != 1:
         raise PlanError(f"{', '.join(selection.scenes)}: name one scene; see python -m benchmarks.run --list")
-    stored = _stored_cells(selection.roll_outs, tuple(found.values()))
+    stored = roll_out_cells(selection.roll_outs, tuple(chosen.values()))
     # The reference first: an error against it can be said as soon as another cell is done.
     order = {name: place for place, name in enumerate(methods)}
     places = {name: place for place, name in enumerate(declared)}
     last = len(order)
     cells = sorted(
-        (*found.values(), *stored),
+        (*chosen.values(), *stored),
         key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
     )
     scenes = {cell.scene.name: cell.scene for cell in cells}
     settled = (*SCENES, *further_scenes(selection.motions.first_garment))  # those that any run may start from
     known = {scene.name: scene for scene in settled} | scenes
-    for own in (scene for scene in scenes.values() if scene.declared_in):
-        _check_words_of(own, known, selection.motions)
+    for scene in (scene for scene in scenes.values() if scene.declared_in):
+        _check_user_scene(scene, known, selection.motions)
     return tuple(cells), cases, microbenchmarks
 
 
-def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) -> None:
-    """Raises PlanError for what a user's scene names and nobody knows."""
+def _check_user_scene(scene: Scene, known: Mapping[str, Scene], motions: Motions) -> None:
+    """Raise PlanError for a start or a motion that a user's scene names and nobody knows."""
     chain, last = {scene.name}, scene
     while last.start_of:
         before = known.get(last.start_of)
@@ -137,7 +138,7 @@ def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) 
         chain.add(before.name)
         last = before
     if scene.dressed:
-        from snug.motion.library import LIBRARY
+        from snug.motion.library import LIBRARY  # loads numpy
 
         if scene.motion not in (names := [*motions.files, *LIBRARY]):
             raise PlanError(
@@ -146,37 +147,8 @@ def _check_words_of(scene: Scene, known: Mapping[str, Scene], motions: Motions) 
             )
 
 
-def _stored_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) -> list[Cell]:
-    """The stored roll-outs in the scenes of these cells, and in their suites. Raises PlanError, and
-    RollOutError for a file that cannot be read.
-    """
-    if not roll_outs:
-        return []
-    from benchmarks.methods.outside.stored_roll_out import entry_of
-
-    scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
-    suites = {name: tuple(dict.fromkeys(s for c in cells if c.scene.name == name for s in c.suites))
-              for name in scenes}  # fmt: skip
-    taken = {entry.name for entry in METHODS} | {cell.method for cell in cells}
-    found: list[Cell] = []
-    for option in roll_outs:
-        if option.name in taken:
-            raise PlanError(f"--rollout {option.name}: a method has that name; give another")
-        taken.add(option.name)
-        if len(scenes) != 1 and not option.places:
-            raise PlanError(
-                f"--rollout {option.name}={option.path}: is of one scene, and {len(scenes)} are asked for: "
-                "name it with --scenes, or put {scene} into the path"
-            )
-        own = [(scene, entry) for scene in scenes.values() if (entry := entry_of(option, scene.name))]
-        if not own:
-            raise PlanError(f"--rollout {option.name}={option.path}: no file for {', '.join(scenes)}")
-        found += [Cell(scene, entry, 0, suites[scene.name]) for scene, entry in own]
-    return found
-
-
 def _pairs(selection: Selection) -> Iterator[tuple[str, str, MethodEntry]]:
-    """(suite, scene, method), suite by suite; a method that is left out of a scene says why.
+    """Yield (suite, scene, method), suite by suite; a method that is left out of a scene says why.
 
     A scene that no suite lists is met where it is named: a body in a whole motion in garments, all else in
     speed. A method that no suite lists takes part in each suite where its whole name is given.
@@ -206,10 +178,10 @@ def _pairs(selection: Selection) -> Iterator[tuple[str, str, MethodEntry]]:
 
 
 def _cases(selection: Selection) -> Iterator[Case]:
-    """Those of the suites; the smallest preset runs those marked, unless they are named, and a run that names
-    no suite those that are not long.
+    """Yield the cases of the suites; none where methods are named without the simulation.
 
-    Naming methods without the simulation leaves them out.
+    The smallest preset runs those marked, unless they are named, and a run that names no suite those that
+    are not long.
     """
     if named(METHOD, selection.methods):
         for case in CASES:
@@ -220,7 +192,7 @@ def _cases(selection: Selection) -> Iterator[Case]:
 
 
 def _microbenchmarks(selection: Selection) -> Iterator[Microbenchmark]:
-    """Those of the scenes and methods named; the smallest preset runs those marked, unless they are named."""
+    """Yield the microbenchmarks named; the smallest preset runs those marked, unless they are named."""
     for benchmark in MICROBENCHMARKS if SUITE in selection.suites else ():
         small = benchmark.smoke or selection.scenes or not selection.preset.smallest
         wanted = (
@@ -231,18 +203,24 @@ def _microbenchmarks(selection: Selection) -> Iterator[Microbenchmark]:
 
 
 def named(name: str, patterns: Sequence[str]) -> bool:
-    """Whether some pattern means that name; without patterns all are meant."""
+    """Return whether some pattern means that name; without patterns all are meant.
+
+    >>> named("tshirt/kick", ["tshirt/*"]), named("flag", []), named("flag", ["tshirt/*"])
+    (True, True, False)
+    """
     return not patterns or name in patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def default_suites(method: str, preset: Preset) -> list[str]:
-    """The suites in which a method takes part at that preset without being named."""
+    """Return the suites in which a method takes part at that preset without being named."""
     return [suite.name for suite in SUITES if method in suite.methods(Extent(preset, Motions()))]
 
 
 def _unlisted_scenes(selection: Selection) -> dict[str, str]:
-    """Scenes that no suite lists -> the suite that takes them: those called by their whole names, and by a
-    pattern that no listed scene has, as 'trousers/*', the motions of the split.
+    """Return scenes that no suite lists -> the suite that takes them.
+
+    They are called by their whole names, or by a pattern that no listed scene has, as 'trousers/*', which
+    means the motions of the split.
     """
     motions = selection.motions
     everything = Extent(selection.preset, motions, full=True, further=True)
@@ -264,7 +242,7 @@ def _unlisted_scenes(selection: Selection) -> dict[str, str]:
 
 
 def _listed_methods() -> set[str]:
-    """Every method that some suite lists at some preset."""
+    """Return every method that some suite lists at some preset."""
     extents = [Extent(preset, Motions(), full=True) for preset in PRESETS]
 
     def of_suite(suite: Suite) -> set[str]:
@@ -277,21 +255,19 @@ def _listed_methods() -> set[str]:
     return set().union(*map(of_suite, SUITES))
 
 
-def choose_suites(words: Iterable[str]) -> tuple[str, ...]:
-    """The suites named, "all" meaning each; without words those of a default run. Raises PlanError."""
-    words = list(words)
-    for word in words:
-        if word not in (*SUITE_NAMES, "all"):
+def choose_suites(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the suites named, "all" meaning each; without names those of a default run. Raises PlanError."""
+    for name in names:
+        if name not in (*SUITE_NAMES, "all"):
             known = ", ".join((*SUITE_NAMES, "all"))
-            raise PlanError(f"--suite: unknown suite '{word}'; choose from {known}")
-    chosen = words or [suite.name for suite in SUITES if suite.default]
+            raise PlanError(f"--suite: unknown suite '{name}'; choose from {known}")
+    chosen = names or [suite.name for suite in SUITES if suite.default]
     return tuple(name for name in SUITE_NAMES if "all" in chosen or name in chosen)
 
 
-def names_no_motion(scenes: Sequence[str], own: Sequence[Scene] = ()) -> bool:
-    """Whether a choice of scenes, some of them a user's own, names scenes without a body, cases and
-    microbenchmarks alone; no motion is looked at then."""
-    known = {scene.name for scene in (*all_scenes((), ()).values(), *own) if not scene.dressed}
+def names_no_motion(scenes: Sequence[str], user_scenes: Sequence[Scene] = ()) -> bool:
+    """Return whether a choice names scenes without a body, cases and microbenchmarks alone."""
+    known = {scene.name for scene in (*all_scenes((), ()).values(), *user_scenes) if not scene.dressed}
     known |= {entry.name for entry in MEASURED}
     return bool(scenes) and known.issuperset(scenes)
 

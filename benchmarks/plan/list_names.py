@@ -17,7 +17,7 @@ from benchmarks.validation.registry import CASES
 
 
 def list_names() -> str:
-    """Suites, scenes, methods, motions and presets, one line each."""
+    """Return suites, scenes, methods, motions and presets, one line each."""
     from snug.motion.library import DYNAMIC_TEST, DYNAMIC_TRAIN, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
 
     swinging = dict.fromkeys(DYNAMIC_TEST, "test") | dict.fromkeys(DYNAMIC_VALIDATION, "validation")
@@ -55,11 +55,11 @@ def list_names() -> str:
 
 
 def _cases(suite: str) -> list[tuple[str, str]]:
-    """Of a suite; points of one map, which share a scene, in one line."""
-    found: dict[str, list[str]] = {}
+    """Return the cases of a suite; points of one map, which share a scene, in one line."""
+    by_scene: dict[str, list[str]] = {}
     for case in (case for case in CASES if case.suite == suite):
-        found.setdefault(f"{case.scene}/*" if case.scene else case.name, []).append(case.description)
-    return [(name, f"{len(d)} points, {d[0]} the first" if d[1:] else d[0]) for name, d in found.items()]
+        by_scene.setdefault(f"{case.scene}/*" if case.scene else case.name, []).append(case.description)
+    return [(name, f"{len(d)} points, {d[0]} the first" if d[1:] else d[0]) for name, d in by_scene.items()]
 
 
 def _where(method: MethodEntry) -> str:

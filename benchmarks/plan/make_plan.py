@@ -83,13 +83,13 @@ def make_plan(request: Request) -> Plan:
     )
 
 
-def choose_metrics(words: Sequence[str]) -> tuple[str, ...]:
+def choose_metrics(files: Sequence[str]) -> tuple[str, ...]:
     """Return the modules of metrics that are not the project's. Raises ValueError."""
-    if not words:
+    if not files:
         return ()
     from benchmarks.metrics import declared  # loads numpy
 
-    names, metrics = user_files.resolve(user_files.METRICS, words)
+    names, metrics = user_files.resolve(user_files.METRICS, files)
     for name in names:
         if name not in {metric.name for metric in metrics}:
             raise PlanError(f"--metrics {name}: is no file; those of the project are measured without it")

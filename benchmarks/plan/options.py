@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.external.roll_out_option import HELP as ROLL_OUT_HELP
-from benchmarks.external.roll_out_option import parse as parse_roll_out
+from benchmarks.external.roll_out_option import parse_roll_out
 from benchmarks.plan.plan import PlanError
 from benchmarks.plan.request import Request
 from benchmarks.presets import PRESETS, find_preset
@@ -71,9 +71,13 @@ def make_parser() -> argparse.ArgumentParser:
     add("--suite", action="append", default=[], metavar="NAME",
         help="garments, speed, validation, extremes, shapes, performance or all, in full; repeat or separate "
         "by commas (default: the quick subset of each but shapes and performance)")  # fmt: skip
-    own = "; a file (mine.py) means all that it declares"
+    file = "; a file (mine.py) means all that it declares"
     add(
-        "--scenes", action="append", default=[], metavar="NAME,...", help=f"only these; patterns allowed{own}"
+        "--scenes",
+        action="append",
+        default=[],
+        metavar="NAME,...",
+        help=f"only these; patterns allowed{file}",
     )
     add("--methods", action="append", default=[], metavar="NAME,...", help="only these; the same words")
     add("--metrics", action="append", default=[], metavar="FILE,...",

@@ -1,4 +1,4 @@
-"""What a run will do, decided and checked before anything is created. See benchmarks.plan.choose_cells."""
+"""The plan of a run: all that it will do, decided and checked before anything is created."""
 
 from __future__ import annotations
 
@@ -35,17 +35,18 @@ class PlanError(ValueError):
 class Network:
     """A network that some cell needs: its name, its seed, the garment it is for.
 
-    own: how it is trained, where benchmarks.methods.catalogue.trainings does not have it; declared_in: where that is said.
+    users_training: of a method in a user's file, which is declared_in.
     """
 
     name: str
     seed: int
     garment: str
-    own: Training | None = None
+    users_training: Training | None = None
     declared_in: str = ""
 
     @property
     def label(self) -> str:
+        """Name, seed and garment, for people."""
         return f"{self.name} seed {self.seed} ({self.garment})"
 
     @property
@@ -55,12 +56,12 @@ class Network:
 
     @property
     def training(self) -> Training | None:
-        """How it is trained; None: not at all."""
-        return self.own or TRAININGS.get(self.name)
+        """The training; None: an untrained network."""
+        return self.users_training or TRAININGS.get(self.name)
 
     @property
     def learns_from_simulation(self) -> bool:
-        """Whether it needs simulated motions to be trained."""
+        """True where it needs simulated motions to be trained."""
         return self.training is not None and self.training.simulated is not None
 
 
@@ -68,9 +69,9 @@ class Network:
 class Motions:
     """Names of the motions of a run by their roles.
 
-    files: those that came from a user's files. dynamic_*: the same for garments that swing. worn: the garments that do them; the first is that of a run
-    where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation";
-    chosen: whether the user has named those.
+    files: those that came from a user's files. dynamic_*: the same for garments that swing. worn: the
+    garments of the run; the first is that of a run where none is named. split: the role whose motions stand
+    in the suites' scenes, "test" or "validation"; chosen: whether the user has named those.
     """
 
     train: tuple[str, ...] = ()
@@ -95,7 +96,7 @@ class Motions:
         return self.dynamic_test if self.split == "test" else self.dynamic_validation
 
     def role_of(self, motion: str) -> str:
-        """Its role: "training", "validation", "test", or empty where it has none in this run."""
+        """Return its role: "training", "validation", "test", or empty where it has none in this run."""
         roles = {
             "test": (*self.test, *self.dynamic_test),
             "validation": (*self.validation, *self.dynamic_validation),
@@ -109,19 +110,19 @@ class Motions:
         return self.worn[0].garment
 
     def train_of(self, garment: str) -> tuple[str, ...]:
-        """Names of the motions that networks of a garment train on."""
+        """Return the names of the motions that networks of a garment train on."""
         return self.dynamic_train if of_garment(garment, self.worn).dynamic else self.train
 
     def validation_of(self, garment: str) -> tuple[str, ...]:
-        """Names of a garment's validation motions."""
+        """Return the names of a garment's validation motions."""
         return self.dynamic_validation if of_garment(garment, self.worn).dynamic else self.validation
 
     def test_of(self, garment: str) -> tuple[str, ...]:
-        """Names of a garment's test motions."""
+        """Return the names of a garment's test motions."""
         return self.dynamic_test if of_garment(garment, self.worn).dynamic else self.test
 
     def measured_of(self, garment: str) -> tuple[str, ...]:
-        """Names of a garment's motions of the split."""
+        """Return the names of a garment's motions of the split."""
         return self.test_of(garment) if self.split == "test" else self.validation_of(garment)
 
 
@@ -167,11 +168,11 @@ class Plan:
 
     @property
     def garments(self) -> tuple[str, ...]:
-        """What bodies wear in the scenes of the plan."""
+        """The garments of the plan's scenes, each once."""
         return tuple(dict.fromkeys(cell.scene.garment for cell in self.cells if cell.scene.dressed))
 
     def motions_of(self, garment: str) -> tuple[str, ...]:
-        """Names of a garment's motions of the split, and of what it does besides in the plan's scenes."""
+        """Return the names of a garment's motions of the split, and of others in the plan's scenes."""
         done = (scene.motion for scene in self.scenes if scene.garment == garment)
         return tuple(dict.fromkeys((*self.motions.measured_of(garment), *done)))
 
@@ -182,7 +183,7 @@ class Plan:
         return tuple(dict.fromkeys(network.garment for network in learning))
 
     def open_assets(self) -> Assets:
-        """Make body, garments and motions of the plan's scenes. Raises ValueError where one cannot be made."""
+        """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
         from benchmarks.assets.assets import embedded_motions, open_assets  # loads numpy
 
         names = [name for garment in self.garments for name in self.motions_of(garment)]
@@ -194,10 +195,11 @@ class Plan:
 
 
 def check_names(cells: Sequence[Cell]) -> None:
-    """Raises PlanError where a name makes no file, or the files of another: slashes become hyphens, and a
-    seed stands behind a hyphen.
+    """Raise PlanError where a name makes no file, or the files of another.
+
+    In names of files slashes become hyphens, and a seed stands behind a hyphen.
     """
-    there: dict[str, Cell] = {}
+    cell_of: dict[str, Cell] = {}
     for cell in cells:
         for what, name in (("scene", cell.scene.name), ("method", cell.method)):
             if len(name.encode()) > LONGEST_NAME:
@@ -206,17 +208,17 @@ def check_names(cells: Sequence[Cell]) -> None:
                 )
         if cell.method == "body" or cell.method.endswith("quasi-static"):
             raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
-        if (other := there.setdefault(cell.name, cell)) is not cell:
+        if (other := cell_of.setdefault(cell.name, cell)) is not cell:
             raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")
 
 
 def runs(cell: Cell) -> bool:
-    """Whether the cell is computed at all."""
+    """Return whether the cell is computed at all."""
     return cell.entry.skip(cell.scene) is None
 
 
 def network_of(cell: Cell) -> Network | None:
-    """The network that a cell needs, where it is computed at all."""
+    """Return the network that a cell needs, where it is computed at all."""
     entry = cell.entry
     if not entry.trained or not runs(cell):
         return None

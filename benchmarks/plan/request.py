@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What a command asks for; `benchmarks.plan.make_plan.make_plan` makes the plan of it.
+    """A request of a command; `benchmarks.plan.make_plan.make_plan` makes the plan of it.
 
     command: the command line, for run.json. preset: the sizes of everything.
     suites, scenes, methods, metrics: names, patterns, and paths of files that declare some; empty: all that

@@ -18,8 +18,9 @@ from benchmarks.scenes.variations import FEWEST as FEWEST_OUT_OF_DISTRIBUTION
 
 @dataclass(frozen=True)
 class Extent:
-    """How much of a suite is asked for. full: more than its quick subset; further: what doubles the work,
-    and all of the suite.
+    """Extent to which a suite is asked for.
+
+    full: more than its quick subset. further: all of the suite, and scenes that double the work.
     """
 
     preset: Preset
@@ -52,8 +53,9 @@ FEW_MOTIONS = 3
 
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """The first garment in each motion of the split, in the quick subset in FEW_MOTIONS of those that nobody
-    has named; at preset paper also what swings; others where named.
+    """Return scenes of the first garment in each motion of the split, and of garments that swing at paper.
+
+    The quick subset has FEW_MOTIONS of them, unless the user has named motions.
     """
     first, *others = extent.motions.worn
     count = None if extent.full or extent.motions.chosen else FEW_MOTIONS
@@ -88,7 +90,7 @@ CHEAP = ("snug+fast-lbfgs-1", "fast-lbfgs-10")  # solvers of some milliseconds, 
 
 
 def _clips(extent: Extent) -> list[str]:
-    """Small scenes and clips of dressed bodies; the quick subset is one of each.
+    """Return small scenes and clips of dressed bodies; the quick subset is one of each.
 
     Dressed bodies are clips, the liveliest part of a motion: here every solver goes through every frame. They
     are the first two motions of the split, and the first for garments that swing, also with a skirt.
@@ -103,7 +105,7 @@ def _clips(extent: Extent) -> list[str]:
 
 
 def _solvers(extent: Extent) -> list[str]:
-    """The reference, truncated solvers and everything learned; the quick subset has fewer slow ones."""
+    """Return the reference, truncated solvers and networks; the quick subset has fewer slow ones."""
     full, budgets = extent.full, extent.preset.iteration_budgets
     levels = {family: [scale * budget for budget in budgets] for family, scale in FAMILIES}
     some = budgets if full else budgets[::2]
@@ -119,8 +121,9 @@ def _solvers(extent: Extent) -> list[str]:
 
 
 def _dependence(extent: Extent) -> list[str]:
-    """Meshes and steps of the preset, of the T-shirt alone, not in the quick subset of preset quick; drapes
-    of up to 16,000 vertices where scenes are named, or at paper.
+    """Return meshes and steps of the preset, of the T-shirt alone, not in the quick subset of preset quick.
+
+    Drapes of up to 16,000 vertices are among them where scenes are named, or at paper.
     """
     tailored = extent.motions.first_garment == GARMENT_SCENES[0].garment
     wanted = extent.full or extent.preset.smallest
@@ -132,7 +135,7 @@ def _dependence(extent: Extent) -> list[str]:
 
 
 def _out_of_distribution(extent: Extent) -> list[str]:
-    """All; the quick subset is some of them, fewer at the smallest preset."""
+    """Return all of these scenes; the quick subset is some of them, fewer at the smallest preset."""
     if extent.preset.smallest and not extent.further:
         return list(FEWEST_OUT_OF_DISTRIBUTION)
     if extent.full:
@@ -146,7 +149,7 @@ SHAPED = "snug-shapes"
 
 
 def _shapes(extent: Extent) -> list[str]:
-    """One motion on other bodies: where the suite or scenes are named, or at paper."""
+    """Return one motion on other bodies: where the suite or scenes are named, or at paper."""
     motions = extent.motions.measured[:1] if extent.full else ()
     return [scene.name for motion in motions for scene in shapes(motion, extent.motions.first_garment)]
 
@@ -160,8 +163,8 @@ SUITES = (
             "simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns", *CHEAP,
         ],
         more_methods=(
-            *(entry.name for entry in FURTHER_METHODS), *AGAIN, "simulation-printed-bending", "lbfgs-5", "lbfgs-10",
-            "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
+            *(entry.name for entry in FURTHER_METHODS), *AGAIN, "simulation-printed-bending",
+            "lbfgs-5", "lbfgs-10", "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
         named_methods=(
             *OTHER_SPRINGS, *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),

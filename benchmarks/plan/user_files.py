@@ -36,6 +36,7 @@ class Kind:
 
     @property
     def entry(self) -> type:
+        """The class of the entries."""
         if self.word == "metrics":  # loads numpy: only for whoever has one
             from benchmarks.metric import Metric
 
@@ -101,7 +102,7 @@ def file_of(word: str) -> str:
 
 def entries_of(kind: Kind, home: str) -> list[Any]:
     """Return what a file declares of that kind. Raises DeclarationError."""
-    module = imported(home)
+    module = import_file(home)
     declared = getattr(module, kind.tuple_name, None)
     if not isinstance(declared, tuple | list) or not all(isinstance(entry, kind.entry) for entry in declared):
         raise DeclarationError(f"{home}: declares no {kind.tuple_name}, a tuple of {kind.entry.__name__}")
@@ -121,9 +122,9 @@ def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
         raise DeclarationError(f"{what}: use letters, digits and _ + - . / @ : in its name")
     folder = Path(find_module(home)).parent
     for field in ("files", "sizes", "metrics"):
-        words = getattr(entry, field, None) or ()
-        listed = isinstance(words, tuple | list) and all(isinstance(word, str) for word in words)
-        _demand(listed, f"{what}: {field}={words!r}: give a tuple of strings")
+        names = getattr(entry, field, None) or ()
+        listed = isinstance(names, tuple | list) and all(isinstance(name, str) for name in names)
+        _demand(listed, f"{what}: {field}={names!r}: give a tuple of strings")
     if measured := set(getattr(entry, "metrics", None) or ()):
         from benchmarks.metrics import MODULES, WHERE_NAMED  # loads numpy
 
@@ -139,16 +140,16 @@ def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
     files = tuple(str((folder / name).resolve()) for name in entry.files)
     for file in files:
         _demand(Path(file).is_file(), f"{what}: {file}: no such file")
-    own = entry.module or home
-    if own.endswith(".py"):
-        own = str((folder / own).resolve())
+    source = entry.module or home
+    if source.endswith(".py"):
+        source = str((folder / source).resolve())
     try:
-        find_module(own)
+        find_module(source)
     except DeclarationError as error:
         raise DeclarationError(f"{what}: {error}") from None
-    if own == home:
+    if source == home:
         _demand(callable(getattr(module, kind.function, None)), f"{home}: has no function {kind.function}")
-    return dataclasses.replace(entry, module=own, declared_in=home, files=files)
+    return dataclasses.replace(entry, module=source, declared_in=home, files=files)
 
 
 def _demand(fine: bool, otherwise: str) -> None:
@@ -156,7 +157,7 @@ def _demand(fine: bool, otherwise: str) -> None:
         raise DeclarationError(otherwise)
 
 
-def imported(home: str) -> ModuleType:
+def import_file(home: str) -> ModuleType:
     """Load the module of a file. Raises DeclarationError, with the line of the file at fault."""
     code = code_of(home)  # of syntax errors the line
     try:
@@ -164,8 +165,8 @@ def imported(home: str) -> ModuleType:
     except DeclarationError:
         raise
     except (Exception, SystemExit) as error:
-        own = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in code]
-        where = f"{own[-1].filename}: line {own[-1].lineno}" if own else home
+        frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in code]
+        where = f"{frames[-1].filename}: line {frames[-1].lineno}" if frames else home
         raise DeclarationError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from None
     for path in code:  # two folders may have a utils.py each
         if Path(path).is_absolute() and not path.endswith("/__init__.py"):

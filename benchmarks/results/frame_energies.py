@@ -29,7 +29,7 @@ ENERGY = "energy/"
 
 
 def write(folder: RunFolder, rows: Iterable[Row]) -> None:
-    """Write the file, whole or not at all, of all cells among the rows that take part; none where none does."""
+    """Write the file, whole or not at all, of all cells that take part; none where none does."""
     cells = dict.fromkeys(
         (row.scene, row.method, row.seed)
         for row in rows
@@ -37,19 +37,19 @@ def write(folder: RunFolder, rows: Iterable[Row]) -> None:
         if row.metric == "energy/total" and row.value is not None
     )
     curves = {cell: _curves(folder.curves_path(*cell)) for cell in cells}
-    terms = list(dict.fromkeys(name for found in curves.values() for name in found if name != SECONDS))
+    terms = list(dict.fromkeys(name for energies in curves.values() for name in energies if name != SECONDS))
     if not terms:
         folder.frame_energies_path.unlink(missing_ok=True)
         return
     text = io.StringIO()
     lines = csv.writer(text, lineterminator="\n")
     lines.writerow([*CELL, *terms])
-    for cell, found in curves.items():
-        for frame, seconds in enumerate(found.get(SECONDS, ())):
+    for cell, energies in curves.items():
+        for frame, seconds in enumerate(energies.get(SECONDS, ())):
             if math.isfinite(seconds):
-                values = [found[term][frame] if term in found else math.nan for term in terms]
-                said = [f"{value:.5g}" if math.isfinite(value) else "" for value in values]
-                lines.writerow([*cell, f"{seconds:.4f}", *said])
+                values = [energies[term][frame] if term in energies else math.nan for term in terms]
+                texts = [f"{value:.5g}" if math.isfinite(value) else "" for value in values]
+                lines.writerow([*cell, f"{seconds:.4f}", *texts])
     with replacing(folder.frame_energies_path) as temporary:
         temporary.write_text(text.getvalue(), encoding="utf-8")
 
@@ -76,9 +76,9 @@ def _curves(path: Path) -> dict[str, np.ndarray]:
 
     if not path.is_file():
         return {}
-    found = read_arrays(path)
-    kept = [name for name in found if name == SECONDS or name.startswith(ENERGY)]
-    return {name.removeprefix(ENERGY): found[name] for name in kept}
+    arrays = read_arrays(path)
+    kept = [name for name in arrays if name == SECONDS or name.startswith(ENERGY)]
+    return {name.removeprefix(ENERGY): arrays[name] for name in kept}
 
 
 def read(path: Path) -> tuple[list[str], list[list[str | int | float]]]:
@@ -87,10 +87,12 @@ def read(path: Path) -> tuple[list[str], list[list[str | int | float]]]:
         with path.open(newline="", encoding="utf-8") as stream:
             reader = csv.reader(stream)
             columns = next(reader, [])
-            own = tuple(columns[: len(CELL)]) == CELL and len(set(columns)) == len(columns)
-            if not own or len(columns) == len(CELL):
-                due = ",".join(CELL)
-                raise ResultsError(f"{path}: line 1: the columns should be {due} and energies, each once")
+            fits = tuple(columns[: len(CELL)]) == CELL and len(set(columns)) == len(columns)
+            if not fits or len(columns) == len(CELL):
+                expected = ",".join(CELL)
+                raise ResultsError(
+                    f"{path}: line 1: the columns should be {expected} and energies, each once"
+                )
             return columns, [_line(f"{path}: line {reader.line_num}", columns, cells) for cells in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({error})") from None
@@ -98,7 +100,7 @@ def read(path: Path) -> tuple[list[str], list[list[str | int | float]]]:
 
 def _line(where: str, columns: list[str], cells: list[str]) -> list[str | int | float]:
     if len(cells) != len(columns):
-        raise ResultsError(f"{where}: {len(columns)} cells are due")
+        raise ResultsError(f"{where}: {len(columns)} cells are expected")
     line: list[str | int | float] = [*cells[:2]]
     for name, cell in list(zip(columns, cells))[2:]:
         try:

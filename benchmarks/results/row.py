@@ -95,7 +95,7 @@ class Row:
 
     @property
     def passed(self) -> bool:
-        """Whether the row counts as fine: ok, or skipped with its reason."""
+        """True where the row counts as fine: ok, or skipped with its reason."""
         return self.status in ("ok", "skipped")
 
 
@@ -108,7 +108,7 @@ LONGEST_NAME = 150  # bytes: files are named after it
 
 
 def row_to_cells(row: Row) -> dict[str, str]:
-    """Return the text of each cell. Numbers keep all their digits, so that reading gives back the same row."""
+    """Return the text of each cell; numbers keep all their digits, so that reading gives the same row."""
     cells = {}
     for name in COLUMNS:
         value = getattr(row, name)

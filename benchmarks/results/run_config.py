@@ -37,9 +37,9 @@ def read_run_config(path: Path) -> dict[str, Any]:
 
 def _check(path: Path, config: Mapping[str, Any]) -> None:
     """Raise ResultsError for an entry of run.json that is not of the type that its readers take it for."""
-    for name, (fits, due) in _DUE.items():
+    for name, (fits, expected) in _EXPECTED.items():
         if config.get(name) is not None and not fits(config[name]):
-            raise ResultsError(f"{path}: '{name}' should be {due}")
+            raise ResultsError(f"{path}: '{name}' should be {expected}")
 
 
 def _is_text(value: Any) -> bool:
@@ -51,15 +51,15 @@ def _is_number(value: Any) -> bool:
 
 
 def _declares(*texts: str, point: str = "") -> Callable[[Any], bool]:
-    """Whether a value is name -> what is said of it, some of which are texts, and one two numbers."""
+    """Return a test: is a value name -> declaration, with these entries texts, and one a point?"""
 
     def fits(value: Any) -> bool:
-        said = value.values() if isinstance(value, dict) else [None]
+        declarations = value.values() if isinstance(value, dict) else [None]
         return all(
             isinstance(parts, dict)
             and all(_is_text(parts.get(name)) for name in texts)
             and (not parts.get(point) or _is_point(parts[point]))
-            for parts in said
+            for parts in declarations
         )
 
     return fits
@@ -80,7 +80,7 @@ def _is_looks(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(v, dict) and _is_text(v.get("rows")) for v in value)
 
 
-_DUE: dict[str, tuple[Callable[[Any], bool], str]] = {
+_EXPECTED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "metrics": (_declares("title", "definition", "table", "unit"), "metric -> what it declares"),
     "methods": (_declares("label"), "method -> what it declares"),
     "scenes": (_declares(), "scene -> what it declares"),

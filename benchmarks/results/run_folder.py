@@ -1,4 +1,4 @@
-"""The folder of a run: where each of its files lies, and how run.json and results.csv are read and written."""
+"""The folder of a run: the place of each of its files; run.json and results.csv read and written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from reference_sim.files.atomic_files import replacing
 
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
-    """Where the model of that kind and seed lies."""
+    """Return the path of the model of that kind and seed."""
     return models / f"{kind}-seed{seed}.safetensors"
 
 
@@ -28,82 +28,92 @@ class RunFolder:
 
     @property
     def config_path(self) -> Path:
+        """run.json: the configuration."""
         return self.path / "run.json"
 
     @property
     def rows_path(self) -> Path:
+        """results.csv: one measured number a line."""
         return self.path / "results.csv"
 
     @property
     def frame_energies_path(self) -> Path:
-        """See benchmarks.results.frame_energies."""
+        """frame_energies.csv, see benchmarks.results.frame_energies."""
         return self.path / "frame_energies.csv"
 
     @property
     def report_path(self) -> Path:
+        """The report as a PDF."""
         return self.path / "report.pdf"
 
     @property
     def page_path(self) -> Path:
+        """The report as an interactive page."""
         return self.path / "report.html"
 
     @property
     def tables(self) -> Path:
+        """Folder of tables."""
         return self.path / "tables"
 
     @property
     def figures(self) -> Path:
+        """Folder of figures."""
         return self.path / "figures"
 
     @property
     def models(self) -> Path:
+        """Folder of trained networks."""
         return self.path / "models"
 
     def models_of(self, garment: str) -> Path:
-        """Where networks of that garment lie: those of the T-shirt, the usual one, in `models` itself."""
+        """Return the folder of networks of that garment: of the T-shirt, the usual one, `models` itself."""
         return self.models if garment in ("", "tshirt") else self.models / garment
 
     @property
     def trajectories(self) -> Path:
+        """Folder of trajectories, and of arrays beside them."""
         return self.path / "trajectories"
 
     @property
     def cache(self) -> Path:
+        """Folder of the outcomes of tasks."""
         return self.path / "cache"
 
     def relative(self, path: Path) -> str:
-        """The name of a file inside the folder, as the cache keeps it."""
+        """Return the name of a file inside the folder, as the cache keeps it."""
         return path.relative_to(self.path).as_posix()
 
     def trajectory_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """trajectories/<scene>/<method>.vtkhdf; a slash, as in "tshirt/walk", becomes a hyphen."""
+        """Return trajectories/<scene>/<method>.vtkhdf; a slash, as in "tshirt/walk", becomes a hyphen."""
         suffix = "" if seed == 0 else f"-seed{seed}"
         return self.trajectories / scene.replace("/", "-") / f"{method.replace('/', '-')}{suffix}.vtkhdf"
 
     def quasi_static_path(self, scene: str, method: str = "", seed: int = 0) -> Path:
-        """A method's answer to each frame held still, beside its trajectory; without a method the
-        simulator's, which no cell of the scene writes or removes.
+        """Return the path of a method's quasi-static solution, beside its trajectory.
+
+        Without a method: the simulator's, which no cell of the scene writes or removes.
         """
         return self.trajectory_path(scene, f"{method}-quasi-static" if method else "quasi-static", seed)
 
     def curves_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """What was measured of each frame of a trajectory, beside it: name -> (T,) or (T,V)."""
+        """Return the path of metrics of each frame, beside the trajectory: name -> (T,) or (T,V)."""
         return self.trajectory_path(scene, method, seed).with_suffix(".npz")
 
     def clips_path(self, clips: str, method: str, part: int) -> Path:
-        """Simulated mixed clips: name -> vertices (T,V,3) [m]."""
+        """Return the path of simulated mixed clips: name -> vertices (T,V,3) [m]."""
         return self.trajectory_path(clips, f"{method}-{part}").with_suffix(".npz")
 
     def start_path(self, scene: str) -> Path:
-        """The settled start (V,3) [m] of a dressed scene."""
+        """Return the path of the settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")
 
     def rest_areas_path(self, scene: str) -> Path:
-        """Areas (F,) [m^2] at rest of the faces of a dressed scene's garment."""
+        """Return the path of rest areas (F,) [m^2] of the faces of a dressed scene's garment."""
         return self.trajectory_path(scene, "rest_areas").with_suffix(".npy")
 
     def body_path(self, scene: str) -> Path:
-        """The posed body (T,B,3) [m] of a dressed scene: a process that simulates then needs no torch."""
+        """Return the path of the posed body (T,B,3) [m] of a dressed scene: who reads it needs no torch."""
         return self.trajectory_path(scene, "body").with_suffix(".npy")
 
     def remove_parts(self) -> None:
@@ -120,7 +130,7 @@ class RunFolder:
         return read_run_config(self.config_path)
 
     def changed(self, config: dict[str, Any]) -> list[str]:
-        """Files of the run that are not as it wrote them; those that are gone are not named."""
+        """Return the files of the run that are not as it wrote them; those that are gone are not named."""
         paths = {name: self.path / name for name in config.get("digests") or ()}
         return [
             name
@@ -159,7 +169,7 @@ class RunFolder:
         for cells in reader:
             line = f"{self.rows_path}: line {reader.line_num}"
             if None in cells or None in cells.values():
-                raise ResultsError(f"{line}: {len(COLUMNS)} cells are due")
+                raise ResultsError(f"{line}: {len(COLUMNS)} cells are expected")
             try:
                 rows.append(cells_to_row(cells))
             except ResultsError as error:

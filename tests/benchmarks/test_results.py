@@ -203,7 +203,7 @@ HEAD = "scene,method,seed,seconds,strain,total\n"
         ("", "line 1: the columns should be scene,method,seed,seconds and energies"),
         ("scene,method,seed,seconds\n", "line 1: the columns"),
         (HEAD.replace("total", "strain"), "energies, each once"),
-        (HEAD + "kick,snug,0,0.1,1\n", "line 2: 6 cells are due"),
+        (HEAD + "kick,snug,0,0.1,1\n", "line 2: 6 cells are expected"),
         (
             HEAD + "kick,snug,0,0.1,1,2\nkick,snug,0,0.2,high,2\n",
             "line 3: column strain: 'high' is no number",

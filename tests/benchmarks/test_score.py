@@ -14,7 +14,7 @@ from scipy.linalg import expm
 from benchmarks import export, run, score
 from benchmarks.cell import Cell
 from benchmarks.external.exported_scene import write_scene
-from benchmarks.external.roll_out_option import RollOutOption, Stated
+from benchmarks.external.roll_out_option import FileConventions, RollOutOption
 from benchmarks.external.scene_files import write_obj
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.fingerprint.digest import digest
@@ -24,6 +24,7 @@ from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
+from benchmarks.plan.plan_roll_out import NO_REFERENCE
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
@@ -96,7 +97,7 @@ def test_without_a_reference_the_reason_is_said(made, tmp_path):
     assert score.main([file, *words, "--name", "mine"]) == 0
     rows = RunFolder(tmp_path / "out").read_rows()
     assert [(row.status, row.reason) for row in rows if row.role == "reference"] == [
-        ("skipped", score.NO_REFERENCE)
+        ("skipped", NO_REFERENCE)
     ]
     found = {row.metric for row in rows if row.role == "external"}
     assert {"energy/total", "gap/energy", "curvature/mean"} <= found
@@ -238,7 +239,7 @@ def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray
 
 def measured_of(scene, path: Path) -> dict:
     """Its rows beside the simulation's, a second opinion left out."""
-    entry = entry_of(RollOutOption("mine", str(path), Stated()), scene.name)
+    entry = entry_of(RollOutOption("mine", str(path), FileConventions()), scene.name)
     method = entry.make(models=Path(), seed=0)
     method.prepare(scene)
     return rows_beside(scene, entry, method.run(), method.quasi_static())

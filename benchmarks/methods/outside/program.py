@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.external.roll_out_option import Stated
+from benchmarks.external.roll_out_option import FileConventions
 from benchmarks.external.scene_files import write_for_program
 from benchmarks.method import MethodEntry
 from benchmarks.methods.outside.stored_roll_out import Stored
@@ -135,4 +135,4 @@ def _milliseconds(seconds: Any) -> float:
 
 def make(*, models: Path, seed: int, command: str, seconds: float) -> Program:
     """Make a fresh one; it has no model."""
-    return Program("", Stated(), command=command, seconds=seconds, seed=seed)
+    return Program("", FileConventions(), command=command, seconds=seconds, seed=seed)

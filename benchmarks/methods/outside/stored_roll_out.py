@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
-from benchmarks.external.roll_out_option import MODULE, RollOutError, RollOutOption, Stated
-from benchmarks.external.scene_fit import fitted
+from benchmarks.external.roll_out_option import MODULE, FileConventions, RollOutError, RollOutOption
+from benchmarks.external.scene_fit import fit_to_scene
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import Method, MethodEntry
 from benchmarks.scene import BuiltScene
@@ -22,13 +22,13 @@ class Stored(Method):
     """Positions of a file, once they have been shown to belong to the scene."""
 
     path: str
-    stated: Stated
+    stated: FileConventions
 
     def prepare(self, scene: BuiltScene) -> None:
         """Read the file and compare it with the scene. Raises RollOutError."""
         self.scene = scene
         try:
-            self.stored, self.done = fitted(read_roll_out(self.path), scene, self.stated)
+            self.stored, self.done = fit_to_scene(read_roll_out(self.path), scene, self.stated)
         except RollOutError as error:
             raise RollOutError(str(error) if self.path in str(error) else f"{self.path}: {error}") from None
 
@@ -58,7 +58,7 @@ class Stored(Method):
 
 def make(*, models: Path, seed: int, path: str, digest: str, **stated: object) -> Stored:
     """Make the roll-out of that file, without seed or model; digest: of its content, for the cache."""
-    return Stored(path, Stated(**stated))  # type: ignore[arg-type]
+    return Stored(path, FileConventions(**stated))  # type: ignore[arg-type]
 
 
 def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:

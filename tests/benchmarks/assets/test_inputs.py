@@ -12,9 +12,9 @@ import pytest
 from benchmarks.assets.inputs import InputError, read_inputs
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, request_of_run
+from benchmarks.plan.plan_roll_out import plan_roll_out
 from benchmarks.runner.execute_plan import check_roll_outs
 from benchmarks.score import make_parser as score_parser
-from benchmarks.score import plan_of
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
 
@@ -83,7 +83,9 @@ def test_each_file_of_a_run_is_opened_once_before_its_tasks(tmp_path, openings):
     words += ["--rollout", f"out={mine}/out.npz", "-o", str(tmp_path / "run")]
     plan = make_plan(request_of_run(make_parser().parse_args(words), words))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("benchmarks.methods.outside.stored_roll_out.fitted", lambda stored, *_: (stored, []))
+        patch.setattr(
+            "benchmarks.methods.outside.stored_roll_out.fit_to_scene", lambda stored, *_: (stored, [])
+        )
         assets = check_roll_outs(plan)
     assert assets is not None and assets.body is plan.inputs.wearer
     assert assets.garments["top"] is plan.inputs.garment.garment
@@ -99,7 +101,7 @@ def test_a_roll_out_that_brings_its_own_scene_is_opened_once(tmp_path, openings)
     (mine / "rest.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n")
     openings.clear()
     words = [f"{mine}/out.npz", "--rest-mesh", f"{mine}/rest.obj", "--no-reference"]
-    plan = plan_of(score_parser().parse_args([*words, "-o", str(tmp_path / "run")]), words)
+    plan = plan_roll_out(score_parser().parse_args([*words, "-o", str(tmp_path / "run")]), "")
     check_roll_outs(plan)
     assert openings == {"out.npz": 1, "rest.obj": 1}
 

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.external import roll_out_files as files
 from benchmarks.external.roll_out_files import read_roll_out
-from benchmarks.external.roll_out_option import RollOutError, RollOutOption, Stated, parse
+from benchmarks.external.roll_out_option import FileConventions, RollOutError, RollOutOption, parse_roll_out
 from benchmarks.external.vertex_correspondence import same_topology
 from benchmarks.meshes import torus
 from benchmarks.methods import find_method
@@ -68,7 +68,7 @@ def write(kind: str, folder: Path, positions: np.ndarray = X, faces: np.ndarray 
 
 def rows(path: str, **stated) -> dict:
     """Every number that is measured of the file, in suite speed."""
-    option = RollOutOption("mine", path, Stated(**stated))
+    option = RollOutOption("mine", path, FileConventions(**stated))
     entry = entry_of(option, SCENE.name)
     method = entry.make(models=Path(), seed=0)
     method.prepare(SCENE)
@@ -119,7 +119,7 @@ def test_half_an_obstacle_is_refused(kept, tmp_path):
     np.savez(tmp_path / "mine.npz", positions=X, faces=FACES, **{kept: held[kept]})
     gone = next(name for name in held if name != kept)
     with pytest.raises(RollOutError, match=rf"mine.npz: holds half a body: {gone} is absent"):
-        declared(RollOutOption("mine", str(tmp_path / "mine.npz"), Stated()), "rest.obj")
+        declared(RollOutOption("mine", str(tmp_path / "mine.npz"), FileConventions()), "rest.obj")
 
 
 def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
@@ -194,7 +194,7 @@ def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
     np.savez(path, positions=X[::2])
     with pytest.raises(RollOutError, match="has 4 frames"):
         rows(path)
-    method = Stored(path, Stated(fps=15.0))
+    method = Stored(path, FileConventions(fps=15.0))
     with pytest.raises(RollOutError, match="scene has 8"):
         method.prepare(SCENE)  # its last frame comes before the scene's
     np.savez(path, positions=np.concatenate([X[::2], 2 * X[-1:] - X[-2:-1]]))
@@ -289,8 +289,8 @@ def test_a_pickle_that_would_run_code_does_not(tmp_path):
 
 
 def test_an_option_says_everything_of_a_roll_out():
-    option = parse("mine=out/{scene}.pc2,units=cm,up=z,fps=60,match-vertices,ms=2.2")
-    assert option == RollOutOption("mine", "out/{scene}.pc2", Stated("cm", "z", 60.0, True), 2.2)
+    option = parse_roll_out("mine=out/{scene}.pc2,units=cm,up=z,fps=60,match-vertices,ms=2.2")
+    assert option == RollOutOption("mine", "out/{scene}.pc2", FileConventions("cm", "z", 60.0, True), 2.2)
     assert option.path_for("tshirt/kick") == "out/tshirt-kick.pc2"
     assert entry_of(option, "tshirt/kick") is None  # there is no file for that scene
 
@@ -303,5 +303,5 @@ def test_an_option_says_everything_of_a_roll_out():
 )  # fmt: skip
 def test_a_wrong_option_is_one_line(text, hint):
     with pytest.raises(RollOutError, match=hint) as refused:
-        parse(text)
+        parse_roll_out(text)
     assert "\n" not in str(refused.value)

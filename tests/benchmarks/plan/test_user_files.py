@@ -276,7 +276,7 @@ def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
     with pytest.raises(RecipeError, match=r"unknown energy 'levity'.*import the file of your own"):
         dataclasses.replace(DEFAULT, terms=("levity",))
     (tmp_path / "levity.py").write_text(SCENE_FILE + "class Levity(Lift):\n    name = 'levity'\n")
-    user_files.imported(str(tmp_path / "levity.py"))
+    user_files.import_file(str(tmp_path / "levity.py"))
     assert dataclasses.replace(DEFAULT, terms=("strain", "levity")).terms[1] == "levity"
 
 

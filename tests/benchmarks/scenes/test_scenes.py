@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.assets.inputs import read_inputs
-from benchmarks.assets.liveliest_part import clip, joint_speeds
+from benchmarks.assets.liveliest_part import joint_speeds, liveliest_part
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods import find_method
 from benchmarks.metrics.surface import body_shape
@@ -231,7 +231,7 @@ def test_validation_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
         "tshirt"
     )
     body, whole = Body.load(), make_motion("turning_stop")
-    frames = clip(body, whole, plan.preset.clip_frames)
+    frames = liveliest_part(body, whole, plan.preset.clip_frames)
     walk = whole.cut(frames.start, frames.stop)
     assert joint_speeds(body, walk).min() > 0.5  # [m/s] it is over before the stop
     pace = np.linalg.norm(np.ptp(walk.translations[:, [0, 2]], axis=0)) / walk.duration
@@ -278,16 +278,16 @@ def planned(*words):
 def test_a_clip_is_the_liveliest_part_and_what_is_not_judged_before_it():
     body, motion = Body.load(), make_motion("sudden_stop")
     speed = joint_speeds(body, motion)
-    judged = clip(body, motion, 20)
+    judged = liveliest_part(body, motion, 20)
     sums = [speed[k : k + 19].sum() for k in range(len(speed) - 18)]
     assert judged == range(np.argmax(sums), np.argmax(sums) + 20)
-    assert clip(body, motion, 20, 6) == range(judged.start - 6, judged.stop)
+    assert liveliest_part(body, motion, 20, 6) == range(judged.start - 6, judged.stop)
     # Where it is liveliest at once, the liveliest part that has so much before it.
     late = motion.cut(judged.start + 2, motion.frames)
-    frames = clip(body, late, 20, 6)
+    frames = liveliest_part(body, late, 20, 6)
     assert len(frames) == 26 and frames.start >= 0
-    assert clip(body, motion, 1000, 6) == range(motion.frames)
-    assert clip(body, motion, motion.frames - 2, 6) == range(motion.frames)
+    assert liveliest_part(body, motion, 1000, 6) == range(motion.frames)
+    assert liveliest_part(body, motion, motion.frames - 2, 6) == range(motion.frames)
 
 
 def test_a_clip_goes_on_where_the_whole_motion_is():

@@ -1,0 +1,145 @@
+"""From a user's files to findings: each entry is checked in tiny scenes, each in a process of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.cell import Cell
+from benchmarks.contract.check_method import CheckMethod
+from benchmarks.contract.check_metric import CheckMetrics
+from benchmarks.contract.check_scene import CheckScene
+from benchmarks.methods import find_method
+from benchmarks.plan import user_files
+from benchmarks.plan.plan import Motions, Plan
+from benchmarks.presets import find_preset
+from benchmarks.registry import DeclarationError
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.loop import NoLog, Runner
+from benchmarks.runner.schedule import Schedule
+from benchmarks.scenes import SCENES, find_scene, of_garment
+from benchmarks.tasks.task import Task
+
+SECONDS = 120.0
+BARE = ("hanging_sheet", "sheet_on_sphere", "flag")  # pins at rest, an obstacle, pins that move
+GARMENT, TRAIN, TEST = "tshirt", "arm_raise", "kick"
+SIZES: dict[str, Any] = {
+    "garment_vertices": 300, "frames": 8, "clip_frames": 8, "warm_up_frames": 2, "settle_frames": 4,
+    "sheet_cells": 4, "sheet_frames": 6, "cell_seconds": SECONDS,
+}  # fmt: skip
+
+
+def read_files(paths: Sequence[str]) -> dict[str, list[Any]]:
+    """Return word of a kind -> what these files declare. Raises DeclarationError."""
+    declared: dict[str, list[Any]] = {kind.word: [] for kind in user_files.KINDS}
+    for path in paths:
+        if not path.endswith(".py"):
+            raise DeclarationError(f"{path}: a file ends with .py")
+        file = user_files.file_of(path)
+        module = user_files.import_file(file)
+        kinds = [kind for kind in user_files.KINDS if hasattr(module, kind.tuple_name)]
+        if not kinds:
+            names = ", ".join(kind.tuple_name for kind in user_files.KINDS)
+            raise DeclarationError(f"{path}: declares none of {names}")
+        for kind in kinds:
+            declared[kind.word] += user_files.entries_of(kind, file)
+    return declared
+
+
+def check_files(
+    declared: dict[str, list[Any]], folder: Path, seconds: float = SECONDS
+) -> Iterator[tuple[str, bool]]:
+    """Check each entry in each scene.
+
+    Args:
+        declared: of `read_files`.
+        folder: is written into.
+        seconds: after which one method in one scene is ended.
+
+    Yields:
+        Lines for people, and whether the entry is fine there.
+    """
+    plan = plan_of(declared, folder)
+    for entry in declared["methods"]:
+        if not any(cell.entry is entry for cell in plan.cells):
+            why = next(filter(None, map(entry.skip, SCENES)), "no scene is meant for it")
+            yield f"{entry.name}: wrong\n  is skipped in every scene: {why}", False
+    run, assets = RunFolder(folder), None
+    if plan.garments:
+        motions = dict.fromkeys([TRAIN, *(scene.motion for scene in plan.scenes if scene.dressed)])
+        assets = open_assets(plan.preset, embedded_motions(motions), plan.garments)
+    schedule = Schedule(plan)
+    of_methods = dataclasses.replace(plan, cells=tuple(c for c in plan.cells if c.entry.declared_in))
+    before = [t for t in Schedule(of_methods).tasks() if t.stage in ("ground truth", "training")]
+    runner = Runner(before, Cache(run))
+    runner.run(LocalExecutor(run, assets, 1), NoLog())
+    executor = LocalExecutor(run, assets, 1)
+    try:
+        hung = set[str]()
+        for name, task in _tasks(declared, plan, schedule, seconds):
+            if name not in hung:
+                lines, fine, ended = _check_one(name, task, runner, executor)
+                hung |= {name} if ended else set()
+                yield lines, fine
+    finally:
+        executor.close()
+
+
+def plan_of(declared: dict[str, list[Any]], folder: Path) -> Plan:
+    """Return the plan of each method in all scenes that fit it, and of each scene with the simulation."""
+    preset = dataclasses.replace(find_preset("smoke"), **SIZES)
+    bare = [scene for scene in SCENES if scene.name in BARE]
+    worn = of_garment(GARMENT).scene(TEST)
+    simulations = [
+        Cell(scene.at(preset), find_method("simulation"), 0, ("speed",)) for scene in declared["scenes"]
+    ]
+    cells = [
+        Cell(scene.at(preset), entry, 0, ("speed",))
+        for entry in declared["methods"]
+        for scene in (*bare, worn)
+        if entry.meant_for(scene) and entry.skip(scene) is None
+    ]
+    return Plan(
+        preset=preset, suites=("speed",), cells=(*simulations, *cells), cases=(), seeds=(0,), device="cpu",
+        folder=folder, command="", motions=Motions((TRAIN,), (TEST,)),
+    )  # fmt: skip
+
+
+def _tasks(
+    declared: dict[str, list[Any]], plan: Plan, schedule: Schedule, seconds: float
+) -> Iterator[tuple[str, Task]]:
+    """Yield the name of each entry, and the task that checks it in a scene."""
+    fields: dict[str, Any] = {"inputs": {}, "modules": (), "deadline": seconds}
+    for cell in plan.cells:
+        needs = schedule.cell(cell).needs
+        if cell.entry.declared_in:
+            yield (
+                cell.method,
+                CheckMethod(
+                    name=cell.name, label=cell.scene.name, process=cell.name, cell=cell, needs=needs, **fields
+                ),
+            )
+        else:
+            name = cell.scene.name
+            yield name, CheckScene(name=name, label="", process=name, scene=cell.scene, **fields)
+    sheet = find_scene(BARE[0]).at(plan.preset)
+    for home in dict.fromkeys(metric.declared_in for metric in declared["metrics"]):
+        yield home, CheckMetrics(name=home, label=sheet.name, process=home, scene=sheet, home=home, **fields)
+
+
+def _check_one(name: str, task: Task, runner: Runner, executor: LocalExecutor) -> tuple[str, bool, bool]:
+    """Return lines on an entry, whether it is fine, and whether its process had to be ended."""
+    failed = next((runner.outcomes[id] for id in task.needs if runner.outcomes[id].failed), None)
+    outcome = failed or executor.alone(task, {})
+    executor.release(task.process)
+    wrong = [f"{outcome.status}: {outcome.reason}"] if outcome.failed else outcome.result["wrong"]
+    notes = [] if outcome.failed else outcome.result["notes"]
+    where = f"{name}{f' in {task.label}' if task.label else ''}"
+    lines = [f"{where}: {'wrong' if wrong else 'fine'}", *(f"  {line}" for line in wrong)]
+    lines += [f"  note: {line}" for line in notes]
+    return "\n".join(lines), not wrong, outcome.status == "timeout"
