@@ -1,11 +1,14 @@
-"""What the outcome of a task depends on beside its inputs: source, packages and data files that it can reach.
+"""What makes a stored result stale beside its inputs: the source, packages and data files that it depends on.
 
-All three are found from the syntax tree of the modules that a task names, imports inside functions included,
-so that a change in one method leaves the results of the others as they are. Comments, formatting and
-docstrings do not count.
+All three follow from the syntax trees of the modules that a task names, imports inside functions included, so
+that a change in one method leaves the results of the others as they are. Comments, formatting and docstrings
+do not count. Of a user's file that declares methods, scenes or metrics, the modules of its own package and
+those beside it count by their source too; other distributions count by their version.
 
-Of a user's file that declares methods, scenes or metrics, the modules of its own
-package and those beside it count by their source too. What other distributions install counts by its version.
+No library's import graph is exact enough. `from reference_sim.energies import StretchStVK` names a package
+that loads its modules on first use: grimp sees an edge to its `__init__` alone, so a change of the energy
+would go unnoticed. modulefinder takes `if TYPE_CHECKING: from snug...` for an import, so that every solver
+would depend on every network. grimp reads no file outside of a package, as a user's method may be.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order ma
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("reference_sim", "snug", "benchmarks")
 NO_DATA = (".py", ".pyi", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def software(*modules: str) -> dict[str, str]:
@@ -37,39 +41,61 @@ def software(*modules: str) -> dict[str, str]:
 
 
 def code_of(*modules: str) -> dict[str, str]:
-    """File -> digest of its code, of these modules and all of ours that they import, directly or not."""
-    found: set[str] = set()
-    for module in modules:
-        found |= _closure(find_module(module))
-    return {path: _source(path).digest for path in sorted(found)}
+    """Return file -> digest of its code, of these modules and all of ours that they import, directly or not.
+
+    >>> "benchmarks/registry.py" in code_of("benchmarks.fingerprint.dependencies")
+    True
+    """
+    paths = set().union(*(_closure(find_module(module)) for module in modules))
+    return {path: _source(path).digest for path in sorted(paths)}
 
 
 def find_module(module: str) -> str:
-    """The file of a module, ours or a user's, which may be named by its path. Raises DeclarationError."""
-    return module if module.endswith(".py") else _file_of(module) or _elsewhere(module)
+    """Return the file of a module, also of one named by its path. Raises DeclarationError."""
+    if module.endswith(".py"):
+        return module
+    if path := _file_of(module):
+        return path
+    spec = None
+    with suppress(ModuleNotFoundError):  # of its package
+        spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:
+        raise DeclarationError(f"no module {module}: see the entry that names it")
+    return spec.origin
 
 
 def packages_of(code: Iterable[str]) -> dict[str, str]:
-    """Package -> installed version, of all that these files import, or "absent"."""
+    """Return package -> installed version, or "absent", of all that these files import."""
     names = set().union(*(_source(path).packages for path in code))
     return {name: _version(name) for name in sorted(names)}
 
 
 def data_of(code: Iterable[str]) -> dict[str, str]:
-    """File -> digest, of what comes with the packages of ours that these files belong to and is no source."""
+    """Return file -> digest, of the data files in those packages of ours that these files belong to."""
     packages = {path.split("/")[0] for path in code} & set(LAYERS)
     return {name: file for package in sorted(packages) for name, file in _data_files(package).items()}
 
 
 @cache
+def place_of(path: str) -> tuple[str, list[str]]:
+    """Return the folder that a file is imported from, "" for the project's, and its package below it."""
+    if not Path(path).is_absolute():
+        return "", path.split("/")[:-1]
+    top = Path(path).parent
+    while (top / "__init__.py").is_file():
+        top = top.parent
+    return f"{top.as_posix()}/", list(Path(path).parent.relative_to(top).parts)
+
+
+# --- packages and data -------------------------------------------------------------------------------------
+
+
+@cache
 def _data_files(package: str) -> dict[str, str]:
-    found = sorted(path for path in (ROOT / package).rglob("*") if path.is_file())
-    kept = (path for path in found if path.suffix not in NO_DATA and not _hidden(path))
-    return {path.relative_to(ROOT).as_posix(): digest_of_file(path) for path in kept}
-
-
-def _hidden(path: Path) -> bool:
-    return any(part.startswith((".", "__")) for part in path.relative_to(ROOT).parts)
+    paths = sorted(path for path in (ROOT / package).rglob("*") if path.is_file())
+    names = {path: path.relative_to(ROOT) for path in paths if path.suffix not in NO_DATA}
+    visible = {path: n for path, n in names.items() if not any(p.startswith((".", "__")) for p in n.parts)}
+    return {name.as_posix(): digest_of_file(path) for path, name in visible.items()}
 
 
 @cache
@@ -79,19 +105,19 @@ def _distributions() -> dict[str, list[str]]:
 
 @cache
 def _version(package: str) -> str:
-    """Of the distributions that an import of this name loads."""
+    """Return names and versions of the distributions that an import of this name loads."""
     names = sorted(set(_distributions().get(package, ())))
     return ", ".join(f"{name} {metadata.version(name)}" for name in names) or "absent"
 
 
-def _elsewhere(module: str) -> str:
-    """The file of a module that is not ours: a method or a scene of a user. Raises DeclarationError."""
-    found = None
-    with suppress(ModuleNotFoundError):  # of its package
-        found = importlib.util.find_spec(module)
-    if found is None or found.origin is None:
-        raise DeclarationError(f"no module {module}: see the entry that names it")
-    return found.origin
+# --- source ------------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class _Source:
+    digest: str
+    files: tuple[str, ...]  # of ours that it imports
+    packages: frozenset[str]  # of others
 
 
 @cache
@@ -106,65 +132,46 @@ def _closure(root: str) -> frozenset[str]:
     return frozenset(seen)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Source:
-    digest: str
-    files: tuple[str, ...]  # of ours that it imports
-    packages: frozenset[str]  # of others
-
-
 @cache
 def _source(path: str) -> _Source:
-    try:
-        tree = ast.parse((ROOT / path).read_text(encoding=ENCODING))
-    except SyntaxError as error:
-        raise DeclarationError(f"{path}: line {error.lineno}: {error.msg}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise DeclarationError(f"{path}: cannot be read: {error}") from None
+    """Return what counts of a file, whose syntax tree is read for it."""
+    tree = _parse(path)
     top, package = place_of(path)
     imports = [pair for node in _running(tree) for pair in _imported(node, package)]
     roots = {base.split(".")[0] for base, _ in imports}
     tops = {root: _top_of(root, top, package) for root in roots}
-    found = tuple(dict.fromkeys(
+    files = dict.fromkeys(
         file
         for base, name in imports
         if (where := tops[base.split(".")[0]]) is not None
         for file in _files_behind(base, name, path, where)
-    ))  # fmt: skip
+    )
     for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list) and body and _is_text(body[0]):
-            body[0].value.value = ""  # a docstring
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            node.body[0].value.value = ""
     others = frozenset(roots - set(LAYERS) - sys.stdlib_module_names)
-    return _Source(digest(ast.dump(tree).encode()), found, others)
+    return _Source(digest(ast.dump(tree).encode()), tuple(files), others)
 
 
-@cache
-def place_of(path: str) -> tuple[str, list[str]]:
-    """The folder from which a file is imported, "" for that of the project; its package below that folder."""
-    if not Path(path).is_absolute():
-        return "", path.split("/")[:-1]
-    top = Path(path).parent
-    while (top / "__init__.py").is_file():
-        top = top.parent
-    return f"{top.as_posix()}/", list(Path(path).parent.relative_to(top).parts)
+def _parse(path: str) -> ast.Module:
+    try:
+        return ast.parse((ROOT / path).read_text(encoding=ENCODING))
+    except SyntaxError as error:
+        raise DeclarationError(f"{path}: line {error.lineno}: {error.msg}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise DeclarationError(f"{path}: cannot be read: {error}") from None
 
 
-def _top_of(root: str, top: str, package: list[str]) -> str | None:
-    """The folder in which the files of a top-level module lie whose source counts; None: it does not."""
-    if root in LAYERS:
-        return ""
-    installed = root in sys.stdlib_module_names or root in _distributions()
-    return top if top and (root in package[:1] or not installed) else None
-
-
-def _is_text(node: ast.AST) -> bool:
-    constant = node.value if isinstance(node, ast.Expr) else None
-    return isinstance(constant, ast.Constant) and isinstance(constant.value, str)
+def _running(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield all nodes but those for the type checker alone."""
+    for child in ast.iter_child_nodes(node):
+        if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
+            yield child
+            yield from _running(child)
 
 
 def _imported(node: ast.AST, package: list[str]) -> list[tuple[str, str]]:
-    """(module, name in it or empty) of everything that an import statement in that package names."""
+    """Return (module, name in it or empty) of everything that an import statement in that package names."""
     if isinstance(node, ast.Import):
         return [(alias.name, "") for alias in node.names]
     if isinstance(node, ast.ClassDef):
@@ -186,80 +193,71 @@ def _kernels_of(node: ast.ClassDef) -> Iterator[tuple[str, str, str]]:
             yield from (value.partition(":") for value in values if isinstance(value, str) and ":" in value)
 
 
-def _running(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes but those for the type checker alone."""
-    for child in ast.iter_child_nodes(node):
-        if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
-            yield child
-            yield from _running(child)
+def _top_of(root: str, top: str, package: list[str]) -> str | None:
+    """Return the folder of a top-level module whose source counts; None where it does not."""
+    if root in LAYERS:
+        return ""
+    installed = root in sys.stdlib_module_names or root in _distributions()
+    return top if top and (root in package[:1] or not installed) else None
 
 
 def _files_behind(base: str, name: str, importer: str, top: str) -> Iterator[str]:
-    """The files below the folder `top` that `from base import name` needs.
+    """Yield the files below the folder `top` that `from base import name` needs.
 
-    A package that has the name neither as a module nor in its own text gives it when it is first used. Then
-    the module counts that its stub names, else that of its modules which defines the name, else all of them.
+    A package that has the name neither as a module nor in its own text loads it on first use. Then the module
+    counts that its stub names, else that of its modules which defines the name, else all of them.
     """
     path, inner = _file_of(base, top), _file_of(f"{base}.{name}", top) if name else None
-    package = path is not None and path.endswith("/__init__.py") and bool(name)
-    if path is None or not package:
+    if path is None or not name or not path.endswith("/__init__.py"):
         yield from filter(None, [inner or path])
-        return
-    if name in _exported(path):
+    elif name in _exported(path):
         yield path
         yield from _files_behind(_exported(path)[name], name, importer, top)
-        return
-    if inner and (path == importer or name not in _bound(path)):
+    elif inner and (path == importer or name not in _names(path).bound):
         yield inner
-        return
-    yield path
-    if name not in _bound(path):
-        folder = (ROOT / path).parent
-        files = sorted(p for p in folder.rglob("*.py") if p.name != "__init__.py")
-        modules = [f"{path.rpartition('/')[0]}/{file.relative_to(folder).as_posix()}" for file in files]
-        yield from [module for module in modules if name in _defined(module)] or modules
+    else:
+        yield path
+        if name not in _names(path).bound:
+            folder = (ROOT / path).parent
+            files = sorted(p for p in folder.rglob("*.py") if p.name != "__init__.py")
+            modules = [f"{path.rpartition('/')[0]}/{file.relative_to(folder).as_posix()}" for file in files]
+            yield from [module for module in modules if name in _names(module).defined] or modules
 
 
 @cache
 def _exported(path: str) -> dict[str, str]:
     """Return name -> module of what the stub beside a package's `__init__.py` exports lazily."""
-    stub = (ROOT / path).with_suffix(".pyi")
-    if not stub.is_file():
+    if not (ROOT / path).with_suffix(".pyi").is_file():
         return {}
-    package = place_of(path)[1]
-    nodes = ast.parse(stub.read_text(encoding=ENCODING)).body
+    package, nodes = place_of(path)[1], _parse(f"{path}i").body
     return {name: module for node in nodes for module, name in _imported(node, package)}
 
 
-@cache
-def _bound(path: str) -> frozenset[str]:
-    """Names that the text of a file binds at its top level, by an import or by itself."""
-    imports = (node for node in _top_level(path) if isinstance(node, ast.ImportFrom | ast.Import))
-    names = (alias.asname or alias.name.split(".")[0] for node in imports for alias in node.names)
-    return _defined(path) | frozenset(names)
+@dataclasses.dataclass(frozen=True)
+class _Names:
+    """Names that the text of a file defines at its top level, and those that it binds, imports included."""
+
+    defined: frozenset[str]
+    bound: frozenset[str]
 
 
 @cache
-def _defined(path: str) -> frozenset[str]:
-    """Names that the text of a file defines at its top level."""
-    names: set[str] = set()
-    for node in _top_level(path):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            names.add(node.name)
+def _names(path: str) -> _Names:
+    defined, imported = set[str](), set[str]()
+    todo: list[ast.stmt] = list(_parse(path).body)
+    for node in todo:
+        if isinstance(node, ast.If | ast.Try):
+            if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
+                todo += node.body
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            defined.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             parts = (part for target in targets for part in ast.walk(target))
-            names |= {part.id for part in parts if isinstance(part, ast.Name)}
-    return frozenset(names)
-
-
-def _top_level(path: str) -> Iterator[ast.stmt]:
-    for node in ast.parse((ROOT / path).read_text(encoding=ENCODING)).body:
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            continue
-        yield node
-        if isinstance(node, ast.If | ast.Try):
-            yield from node.body
+            defined |= {part.id for part in parts if isinstance(part, ast.Name)}
+        elif isinstance(node, ast.ImportFrom | ast.Import):
+            imported |= {alias.asname or alias.name.split(".")[0] for alias in node.names}
+    return _Names(frozenset(defined), frozenset(defined | imported))
 
 
 @cache

@@ -58,7 +58,7 @@ def project(tmp_path, monkeypatch):
 
 
 def forget() -> None:
-    for name in ("_source", "_exported", "_bound", "_defined", "_file_of", "_closure", "_data_files"):
+    for name in ("_source", "_exported", "_names", "_file_of", "_closure", "_data_files"):
         getattr(source, name).cache_clear()
 
 
