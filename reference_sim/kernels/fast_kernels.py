@@ -88,7 +88,10 @@ def step_terms(potential: Potential, use: str, solver: str) -> StepTerms:
         ValueError: a term without a kernel for `solver`, or no inertia.
     """
     for term in terms_without_kernel(potential, use):
-        raise ValueError(f"{solver} has no kernel for the term {term.name!r}: use newton or lbfgs")
+        raise ValueError(
+            f"{solver} has no kernel for the term {term.name!r}: use newton or lbfgs, or declare one "
+            "(docs/extend.md, An energy)"
+        )
     inertia, weighing = ([e for e in potential.energies if has_kernel(e, part)] for part in OF_VERTICES)
     if len(inertia) != 1:
         raise ValueError(f"{solver} takes steps in time: the potential needs inertia, once")

@@ -22,7 +22,7 @@ PUBLISHED = ROOT / "reports" / "published"
 SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot be told": "cannot be told"}
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
-SHORT = ("A method", "A network from elsewhere", "A scene", "A metric")
+SHORT = ("A method", "An energy", "A network from elsewhere", "A scene", "A metric")
 LONG = (
     "How to add something",
     "A program",
@@ -79,8 +79,8 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
 @pytest.mark.parametrize("title", [*SHORT, *(pytest.param(title, marks=pytest.mark.slow) for title in LONG)])
 def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
     commands(user, title, tmp_path)
-    if title == "How to add something":
-        return  # a check leaves nothing
+    if title in ("How to add something", "An energy"):
+        return  # they leave no results
     rows = rows_of(tmp_path)
     assert rows and all(row["status"] == "ok" for row in rows)
     methods = {row["method"] for row in rows}

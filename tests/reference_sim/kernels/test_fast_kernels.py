@@ -1,0 +1,150 @@
+"""Fast kernels are found through the term that declares them, and a slow path is announced once."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from reference_sim import Cloth, Potential, energies
+from reference_sim.energies import (
+    MODULE_OF,
+    AreaBarrier,
+    BendHinge,
+    Gravity,
+    Inertia,
+    StretchSpring,
+    StretchStVK,
+)
+from reference_sim.kernels import fast_kernels
+from reference_sim.kernels.fast_kernels import (
+    OF_VERTICES,
+    USES,
+    SlowPathWarning,
+    fast_kernel,
+    has_kernel,
+    step_terms,
+    terms_without_kernel,
+)
+from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+from reference_sim.minimise.lbfgs import LBFGS
+from snug.recipes.recipe import Recipe
+from snug.training.losses.physics_loss import PhysicsLoss
+from tests.reference_sim.meshes import patch
+
+METHOD = Path(__file__).resolve().parents[3] / "docs" / "method.md"
+TERMS = {name: getattr(energies, name) for name in MODULE_OF if name not in ("Energy", "Step")}
+COLUMNS = (("float32_lanes",), ("vertex_block", "constraint"), ("training_batch",))  # of the table in docs
+
+
+class Softer(StretchStVK):
+    """A subclass that may compute anything."""
+
+
+class Same(StretchStVK):
+    kernels: ClassVar = StretchStVK.kernels
+
+
+class Misspelt(StretchStVK):
+    kernels: ClassVar = {"float32": "lanes"}
+
+
+@pytest.fixture
+def cloth() -> Cloth:
+    positions, faces = patch(0)
+    return Cloth(positions, faces, pins=[0])
+
+
+@pytest.fixture
+def told_anew():
+    """What earlier tests were told is told again."""
+    fast_kernels._warn_once.cache_clear()
+
+
+def test_every_declared_function_is_there_and_takes_the_term():
+    for term in TERMS.values():
+        for use in vars(term).get("kernels", {}):
+            assert use in USES
+            assert next(iter(inspect.signature(fast_kernels._function(term, use)).parameters)) == "term"
+
+
+def test_what_a_class_inherits_is_not_its_own(cloth):
+    assert has_kernel(Same(cloth), "float32_lanes") and not has_kernel(Softer(cloth), "float32_lanes")
+    assert fast_kernel(Softer(cloth), "training_batch") is None
+    potential = Potential([Softer(cloth), Gravity(cloth), Inertia(cloth, 0.1)])
+    assert terms_without_kernel(potential, "float32_lanes") == [potential.energies[0]]
+    with pytest.raises(ValueError, match="no kernel for the term 'strain'"):
+        CompiledLBFGS(potential, max_iterations=1)
+
+
+def test_an_unknown_use_is_named(cloth):
+    with pytest.raises(
+        ValueError, match=r"Misspelt\.kernels: unknown use 'float32', choose of vertex_inertia"
+    ):
+        has_kernel(Misspelt(cloth), "float32_lanes")
+
+
+def test_weights_of_all_terms_add_up(cloth):
+    two = [Gravity(cloth), Gravity(cloth, acceleration=1.0)]
+    terms = step_terms(Potential([*two, Inertia(cloth, 0.1)]), "float32_lanes", "test")
+    assert terms.weights == pytest.approx(10.81 * cloth.masses) and terms.elements == ()
+
+
+def test_a_slow_minimisation_is_announced_once(cloth, told_anew):
+    slow = Potential([StretchStVK(cloth), AreaBarrier(cloth), StretchSpring(cloth), Inertia(cloth, 0.1)])
+    with pytest.warns(SlowPathWarning, match="^LBFGS: no float32 kernel of AreaBarrier, StretchSpring: "):
+        LBFGS(slow)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        LBFGS(slow)
+        LBFGS(Potential([StretchStVK(cloth), AreaBarrier(cloth)]))  # at rest there is no fast way
+
+
+def test_a_slow_training_is_announced_once(cloth, told_anew):
+    springs = Recipe(material="springs")
+    with pytest.warns(SlowPathWarning, match="^training: no batch kernel of StretchSpring: "):
+        PhysicsLoss(cloth, springs, dt=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        PhysicsLoss(cloth, springs, dt=0.1)
+        PhysicsLoss(cloth, Recipe(), dt=0.1)
+        PhysicsLoss(cloth, replace(springs, terms=("bending", "area_barrier")), dt=0.1, kernels=False)
+
+
+@pytest.mark.parametrize("made", [StretchStVK, BendHinge])
+def test_a_kernel_is_that_of_its_own_term(cloth, made):
+    """Two terms of one class, of other constants, keep them apart."""
+    soft, stiff = made(cloth), made(cloth)
+    for name in ("lam", "mu", "stiffness"):
+        if hasattr(stiff, name):
+            setattr(stiff, name, 2 * getattr(stiff, name))
+    x = (1.1 * cloth.rest_positions + np.arange(3) * cloth.rest_positions[:, :1] ** 2).astype(np.float32)
+    lanes = np.repeat(x[None, ..., None], 16, axis=-1)
+    one, two = (fast_kernel(term, "training_batch")(lanes, np.zeros_like(lanes)) for term in (soft, stiff))
+    assert two == pytest.approx(2 * one) and (one > 0).all()
+
+
+def test_the_table_of_kernels_in_the_documents_is_that_of_the_code():
+    """Each row has the term, then the files of its kernels by solver, as the class declares them."""
+
+    def files(term: type, uses: tuple[str, ...]) -> set[str]:
+        declared = vars(term).get("kernels", {})
+        uses = uses if set(uses) & set(declared) or uses == ("training_batch",) else OF_VERTICES
+        module = term.__module__
+        named = [declared[use].rpartition(":")[0] or module for use in uses if use in declared]
+        return {name.removeprefix("reference_sim.energies.").replace(".", "/") + ".py" for name in named}
+
+    expected = {name: [files(term, uses) for uses in COLUMNS] for name, term in TERMS.items()}
+    expected = {name: columns for name, columns in expected.items() if any(columns)}
+    text = METHOD.read_text(encoding="utf-8").partition("| fast kernels of")[2].partition("\n\n")[0]
+    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", text, re.M)
+    table = {
+        name: [set(re.findall(r"`([\w/]+\.py)`", cell)) for cell in row.split("|")] for name, row in rows
+    }
+    assert table == expected
