@@ -54,6 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     files = [make_garment_file(path, options) for path in options.files]
     if options.picture and not options.picture.parent.is_dir():
         raise ValueError(f"--picture {options.picture}: no such folder")
+    # NumPy and more, which --help does not need.
     from snug.body.smpl_files import read_body
     from snug.garments.fit import DressForm
 

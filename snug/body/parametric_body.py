@@ -123,7 +123,7 @@ class Body:
 
         All that depends on the shape alone is computed once, here. Raises BodyError.
         """
-        from scipy.sparse import csr_array
+        from scipy.sparse import csr_array  # a body that is not posed needs none
 
         # sum_j w_ij T_j (p_i, 1) is one product: (w_ij p_ik) over (j, k), mostly zero, times T over (j, k).
         points = np.concatenate([self.shaped(betas), np.ones((len(self.template), 1))], axis=1)

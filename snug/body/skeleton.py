@@ -56,7 +56,7 @@ def rotation_matrices(axis_angles: np.ndarray) -> np.ndarray:
     >>> np.round(rotation_matrices(np.array([0.0, np.pi / 2, 0.0])) @ [1.0, 0.0, 0.0], 12) + 0.0
     array([ 0.,  0., -1.])
     """
-    from scipy.spatial.transform import Rotation
+    from scipy.spatial.transform import Rotation  # slow to load; names are listed without
 
     flat = np.asarray(axis_angles, dtype=float).reshape(-1, 3)
     return Rotation.from_rotvec(flat).as_matrix().reshape(*np.shape(axis_angles), 3)
@@ -69,7 +69,7 @@ def axis_angles(matrices: np.ndarray) -> np.ndarray:
     >>> np.round(axis_angles(rotation_matrices(np.array([0.1, 0.2, 0.3]))), 12)
     array([0.1, 0.2, 0.3])
     """
-    from scipy.spatial.transform import Rotation
+    from scipy.spatial.transform import Rotation  # slow to load; names are listed without
 
     flat = np.asarray(matrices, dtype=float).reshape(-1, 3, 3)
     return Rotation.from_matrix(flat).as_rotvec().reshape(np.shape(matrices)[:-1])

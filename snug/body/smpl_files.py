@@ -37,6 +37,8 @@ MOST_VERTICES = 100_000
 LONGEST_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
 T_POSE, A_POSE = np.radians(10.0), np.radians(60.0)  # angles up to which arms may hang down
 
+Arrays = dict[str, Any]  # of numpy, or sparse matrices, by the first of their names
+
 SYNONYMS = {
     "v_template": ("v_template", "vertices", "template"),
     "f": ("f", "faces"),
@@ -96,7 +98,7 @@ def _rest_arrays(path: Path) -> dict[str, Any]:
     return rest
 
 
-def _stored_arrays(path: Path) -> dict[str, Any]:
+def _stored_arrays(path: Path) -> Arrays:
     """Return the arrays of the file, by the first of their names. Raises BodyError."""
     names = [name for some in SYNONYMS.values() for name in some]
     try:
@@ -117,7 +119,7 @@ def _stored_arrays(path: Path) -> dict[str, Any]:
     }
 
 
-def _float(path: Path, stored: dict[str, Any], key: str, shape: tuple[int | None, ...]) -> np.ndarray:
+def _float(path: Path, stored: Arrays, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
     """Return a stored array of that shape (None: any length) as float64. Raises BodyError."""
     array = stored[key]
     fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
@@ -132,7 +134,7 @@ def _float(path: Path, stored: dict[str, Any], key: str, shape: tuple[int | None
     return dense
 
 
-def _skeleton(path: Path, stored: dict[str, Any], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _skeleton(path: Path, stored: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return weights (B, J), rows summing to one, and two matrices that make 24 joints of J.
 
     The first, (24, J), averages positions of joints; the second, (J, 24), adds up weights.
@@ -186,7 +188,7 @@ def _is_identity(turns: np.ndarray) -> bool:
 
 
 def _joints(
-    path: Path, stored: dict[str, Any], template: np.ndarray, directions: np.ndarray, joints: int
+    path: Path, stored: Arrays, template: np.ndarray, directions: np.ndarray, joints: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the joints (J, 3) and what a unit of each shape coefficient adds to them (J, 3, S)."""
     if "J_regressor" in stored:
@@ -206,7 +208,7 @@ def _joints(
     return _float(path, stored, "J_template", (joints, 3)), joint_directions
 
 
-def _correctives(path: Path, stored: dict[str, Any], count: int, joints: int) -> np.ndarray | None:
+def _correctives(path: Path, stored: Arrays, count: int, joints: int) -> np.ndarray | None:
     """Return the pose correctives of the joints that are kept.
 
     Folded fingers, jaw and eyes stay straight and need none.

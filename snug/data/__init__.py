@@ -1,1 +1,1 @@
-"""The baked body and the script that bakes it."""
+"""Data of the package: the baked body, see `snug.body.bake`, and its licence."""

@@ -121,7 +121,7 @@ def armhole_cut(
 
 def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, Index]:
     """Return the surface between the cuts as a dense mesh: points (N,3) [m], faces (M,3), outward."""
-    import pyvista
+    import pyvista  # VTK takes a second to load, and garments are often only named
 
     grid = pyvista.ImageData(
         dimensions=surface.values.shape,

@@ -109,80 +109,73 @@ def _ramp(value: Array, start: float, end: float) -> Array:
     return t * t * (3.0 - 2.0 * t)
 
 
-def _tube(support: Array, growth: Array, plane: Array, normals: Array) -> Array:
-    """Return the distance (L,P) of points (P,2) to sections `support` (L,K) grown by `growth` (L,)."""
-    height = plane @ normals.T  # (P,K)
-    return np.stack([(height - row).max(axis=1) - grown for row, grown in zip(support, growth, strict=True)])
+class _Sections:
+    """Convex sections of a body across the axes of a grid, nodes (nx,), (ny,), (nz,) [m]."""
+
+    def __init__(self, body: Body, nodes: Sequence[Array]) -> None:
+        self.body, self.nodes = body, nodes
+        self.points = np.asarray(body.template, dtype=np.float64)
+        angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        self.normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def support(self, edges: Index, axis: int) -> Array:
+        """Return the support function (L,K) of the sections of edges (E,2) at each node of an axis."""
+        return _fill_levels(_section_support(self.points, edges, self.nodes[axis], axis, self.normals))
+
+    def field(self, support: Array, growth: Array, axis: int) -> Array:
+        """Return the distance (nx,ny,nz) to sections `support` (L,K) grown by `growth` (L,)."""
+        plane = [nodes for k, nodes in enumerate(self.nodes) if k != axis]
+        height = np.stack(np.meshgrid(*plane, indexing="ij"), axis=-1).reshape(-1, 2) @ self.normals.T
+        levels = zip(support, growth, strict=True)
+        distance = np.stack([(height - row).max(axis=1) - grown for row, grown in levels])
+        return np.moveaxis(distance.reshape(-1, *map(len, plane)), 0, axis)
 
 
-def _torso(
-    body: Body, edges: Index, points: Array, nodes: Sequence[Array], levels: tuple[float, float, float],
-    ease: float, flare: float, clearance: float, normals: Array, narrowing: float,
-) -> Array:  # fmt: skip
-    """Return the field (nx,ny,nz) of hanging sections.
+def _torso(sections: _Sections, edges: Index, hang: float, growth: Array, narrowing: float) -> Array:
+    """Return the field (nx,ny,nz) of sections that hang from height `hang` [m], grown by (ny,) [m].
 
-    levels: heights [m] where they hang from, have their ease, and end. narrowing: how much [m/m] they may
-    come nearer again on the way down.
+    narrowing: how much [m/m] they may come nearer again on the way down.
     """
-    x, y, z = nodes
-    support = _fill_levels(_section_support(points, edges, y, 1, normals))
+    y = sections.nodes[1]
+    support = sections.support(edges, 1)
     mirrored = (DIRECTIONS // 2 - np.arange(DIRECTIONS)) % DIRECTIONS
-    support = np.maximum(
-        support, support[:, mirrored]
-    )  # a body that is not quite symmetric: both of its sides
-    hang, waist, hem = levels
+    support = np.maximum(support, support[:, mirrored])  # both sides of a body that is not quite symmetric
     below = np.flatnonzero(y <= hang)
     fall = narrowing * y[below, None]
     support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall
     smooth = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
     support[below] = np.maximum(smooth, support)[below]
-    growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
-    growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
-    plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
-    return np.maximum(field, (y - joint_position(body, "left_shoulder")[1])[None, :, None])
+    shoulder = joint_position(sections.body, "left_shoulder")[1]
+    return np.maximum(sections.field(support, growth, 1), (y - shoulder)[None, :, None])
 
 
-def _sleeve(
-    body: Body, edges: Index, points: Array, nodes: Sequence[Array], cuff: float, ease: float,
-    clearance: float, normals: Array,
-) -> Array:  # fmt: skip
+def _sleeve(sections: _Sections, edges: Index, cuff: float, ease: float, clearance: float) -> Array:
     """Return the field (nx,ny,nz) of the left sleeve."""
-    x, y, z = nodes
-    shoulder = joint_position(body, "left_shoulder")[0]
-    support = _fill_levels(_section_support(points, edges, x, 0, normals))
-    support = ndimage.gaussian_filter1d(support, 0.02 / SPACING, axis=0, mode="nearest")
+    x = sections.nodes[0]
+    shoulder = joint_position(sections.body, "left_shoulder")[0]
+    support = ndimage.gaussian_filter1d(sections.support(edges, 0), 0.02 / SPACING, axis=0, mode="nearest")
     growth = clearance + ease / (2 * np.pi) * _ramp(x, shoulder, cuff)
-    plane = np.stack(np.meshgrid(y, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    field = _tube(support, growth, plane, normals).reshape(len(x), len(y), len(z))
-    return np.maximum(field, (shoulder - x)[:, None, None])
+    return np.maximum(sections.field(support, growth, 0), (shoulder - x)[:, None, None])
 
 
-def _leg(
-    body: Body, edges: Index, points: Array, nodes: Sequence[Array], crotch: float, ease: float,
-    clearance: float, normals: Array,
-) -> Array:  # fmt: skip
+def _leg(sections: _Sections, edges: Index, crotch: float, ease: float, clearance: float) -> Array:
     """Return the field (nx,ny,nz) of the left leg of trousers."""
-    x, y, z = nodes
-    hip, knee = joint_position(body, "left_hip")[1], joint_position(body, "left_knee")[1]
-    support = _fill_levels(_section_support(points, edges, y, 1, normals))
-    support = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
+    y = sections.nodes[1]
+    hip, knee = (joint_position(sections.body, name)[1] for name in ("left_hip", "left_knee"))
+    support = ndimage.gaussian_filter1d(sections.support(edges, 1), 0.03 / SPACING, axis=0, mode="nearest")
     # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
-    above, inner = np.flatnonzero(y >= knee), normals[:, 0] < 0
+    above, inner = np.flatnonzero(y >= knee), sections.normals[:, 0] < 0
     support[np.ix_(above, inner)] = np.maximum.accumulate(support[np.ix_(above, inner)], axis=0)
     growth = clearance + ease / (2 * np.pi) * _ramp(-y, -crotch, -knee)
-    plane = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    field = _tube(support, growth, plane, normals).reshape(len(y), len(x), len(z)).transpose(1, 0, 2)
-    return np.maximum(field, (y - hip)[None, :, None])
+    return np.maximum(sections.field(support, growth, 1), (y - hip)[None, :, None])
 
 
 def legs_part(body: Body, room: float) -> float:
     """Return the height [m] below which trousers have two legs: `room` [m] from the thigh's skin to x = 0."""
     points = np.asarray(body.template, dtype=np.float64)
     edges = _edges(body, LEG_BONES)
-    levels = np.arange(
-        joint_position(body, "left_knee")[1], joint_position(body, "left_hip")[1], 0.5 * SPACING
-    )
+    knee, hip = (joint_position(body, name)[1] for name in ("left_knee", "left_hip"))
+    levels = np.arange(knee, hip, 0.5 * SPACING)
     inner = _fill_levels(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
     near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
     middle = skin_of(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, SPACING))
@@ -221,14 +214,14 @@ def build_surface(
     Raises:
         ValueError: a body too large for the grid.
     """
-    import igl
+    import igl  # not loaded where garments are only named
 
     points = np.asarray(body.template, dtype=np.float64)
     faces = np.asarray(body.faces, dtype=np.int64)
     torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
     torso, arm, leg = (skin_of(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
     hang = top if waistband else points[skin_of(body, ARM_BONES[:1]), 1].min()
-    levels = hang, joint_position(body, "pelvis" if waistband else "spine1")[1], hem
+    waist = joint_position(body, "pelvis" if waistband else "spine1")[1]
     margin = 0.04
     depth = points[torso | (leg if legs else arm), 2]
     reach = clearance + ease + flare + 2 * margin
@@ -240,24 +233,23 @@ def build_surface(
         size = " x ".join(f"{length:.3g}" for length in high - low)
         raise ValueError(f"half of it would be {size} m: give a body in metres, with its joints inside")
     nodes = [low[i] + SPACING * np.arange(counts[i]) for i in range(3)]
-    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
     grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
     # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what is
     # promised about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
-    hanging = _torso(body, torso_edges, points, nodes, levels, ease, flare, clearance, normals, TAPER * legs)
+    sections, y = _Sections(body, nodes), nodes[1]
+    growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
+    growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
+    hanging = _torso(sections, torso_edges, hang, growth, TAPER * legs)
     if cuff is not None:
-        sleeve = _sleeve(body, arm_edges, points, nodes, cuff, ease, clearance, normals)
+        sleeve = _sleeve(sections, arm_edges, cuff, ease, clearance)
         hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
     if legs:
         crotch = legs_part(body, clearance + ease / (2 * np.pi))
-        tube = _leg(body, leg_edges, points, nodes, crotch, ease, clearance, normals)
-        hanging = _smooth_minimum(
-            np.maximum(hanging, (crotch - nodes[1])[None, :, None]), tube, CROTCH_FILLET
-        )
+        leg_field = _leg(sections, leg_edges, crotch, ease, clearance)
+        above_crotch = np.maximum(hanging, (crotch - y)[None, :, None])
+        hanging = _smooth_minimum(above_crotch, leg_field, CROTCH_FILLET)
     values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree
     ghost = 3
     values = np.pad(values, ((ghost, 0), (0, 0), (0, 0)), mode="reflect")

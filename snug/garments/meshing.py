@@ -70,7 +70,7 @@ def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
 
     Raises ValueError if it cannot be met.
     """
-    import igl
+    import igl  # not loaded where garments are only named
 
     skin, skin_faces = np.asarray(body.template, dtype=np.float64), np.asarray(body.faces, dtype=np.int64)
     # Of a body that is not quite symmetric, both of its sides.

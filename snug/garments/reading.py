@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.mesh_files import METRES, Surface, read_mesh, to_metres_y_up
@@ -72,7 +74,7 @@ class Examination:
 
 
 def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
-    """Read and check a garment that was made for the unposed body.
+    r"""Read and check a garment that was made for the unposed body.
 
     Args:
         file: a mesh file, or such a file with its units, axis, rest shape and material.
@@ -87,7 +89,7 @@ def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
     >>> belt = ["v " + point.format(height) for height in (0.93, 0.97) for point in ring]
     >>> belt += [f"f {k + 1} {(k + 1) % 40 + 1} {(k + 1) % 40 + 41} {k + 41}" for k in range(40)]
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = Path(folder, "belt.obj").write_text("\\n".join(belt))
+    ...     _ = Path(folder, "belt.obj").write_text("\n".join(belt))
     ...     garment = read_garment(Path(folder, "belt.obj"), Body.load())
     >>> garment.name, garment.rest_positions.shape, list(garment.loops)
     ('belt', (80, 3), ['waist', 'hem'])
@@ -220,9 +222,7 @@ def _check_mesh(examination: Examination, surface: Surface, chart: Array | None)
 
 
 def _count_pieces(surface: Surface) -> int:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
+    """Return the number of connected pieces."""
     a, b = surface.faces[:, [0, 1]].T, surface.faces[:, [1, 2]].T
     ends = np.concatenate([a, b], axis=1)
     graph = coo_array((np.ones(ends.shape[1]), (ends[0], ends[1])), shape=(len(surface.positions),) * 2)

@@ -112,6 +112,7 @@ def relax(points: Array, faces: Index, held: NDArray[np.bool_], project: Project
 
 def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
     """Return a coarser mesh of about `count` vertices by centroidal clustering (pyacvd)."""
+    # VTK takes a second to load, and garments are often only named.
     import igl
     import pyacvd
     import pyvista

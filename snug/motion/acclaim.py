@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from snug.motion.motion import MotionError
 from snug.motion.raw_motion import check_frame_count, read_lines
@@ -153,8 +154,6 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
 
 def turns(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
     """Return M (T, 3, 3) of a bone: the product of its rotations (T, channels), the first applied first."""
-    from scipy.spatial.transform import Rotation
-
     rotation = Rotation.identity(len(values))
     for channel, angles in zip(channels, values.T):
         if channel in _ROTATIONS:

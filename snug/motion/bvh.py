@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from snug.motion.motion import MotionError
 from snug.motion.raw_motion import check_frame_count, read_lines
@@ -55,8 +56,6 @@ class Clip:
 
     def turns(self, joint: Joint) -> np.ndarray:
         """Return the rotation of a joint relative to its parent, (T, 3, 3)."""
-        from scipy.spatial.transform import Rotation
-
         rotation = Rotation.identity(len(self.frames))
         for column, channel in enumerate(joint.channels, joint.first):
             if channel.endswith("rotation"):

@@ -41,6 +41,7 @@ def make_motion(name: str) -> Motion:
     """
     if name not in LIBRARY:
         raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(LIBRARY)}")
+    # Its curves need SciPy; names are listed without.
     from snug.motion.clips.make_clip import FPS, make_clip
 
     clip = make_clip(name)

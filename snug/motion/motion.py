@@ -266,7 +266,7 @@ def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 def _up_and_turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return upward directions in the root's axes (T, 3), and quaternions (T, 21, 4) of the other joints."""
-    from scipy.spatial.transform import Rotation
+    from scipy.spatial.transform import Rotation  # slow to load; names are listed without
 
     turning = [JOINT[name] for name in JOINT_NAMES[1:] if not name.endswith("hand")]
     quaternions = Rotation.from_rotvec(poses[:, turning].reshape(-1, 3)).as_quat()

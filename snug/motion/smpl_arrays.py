@@ -11,6 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from reference_sim.files.array_file import ArrayFileError, array_names, read_array, read_arrays
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
@@ -173,8 +174,6 @@ def _from_matrices(path: Path, name: str, matrices: np.ndarray) -> np.ndarray:
 
 
 def _from_quaternions(path: Path, name: str, quaternions: np.ndarray) -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
     w = QUATERNIONS[name]
     whole = np.isfinite(quaternions).all(axis=2)
     quaternions = np.where(whole[..., None], quaternions, np.eye(4)[w])
