@@ -55,13 +55,13 @@ def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
     """
     from benchmarks.metrics.cost.microbenchmarks import METRICS
 
-    own: list[Metric] = []
+    metrics: list[Metric] = []
     for name, module in modules().items():
         if not hasattr(module, "METRICS"):
             raise DeclarationError(f"{MODULE_OF[name]} declares no METRICS, a tuple of Metric")
-        own += module.METRICS
+        metrics += module.METRICS
     others = [replace(metric, declared_in=home) for home in outside for metric in load(home).METRICS]
-    return by_name("metric", (*own, *METRICS, *others))
+    return by_name("metric", (*metrics, *METRICS, *others))
 
 
 def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:

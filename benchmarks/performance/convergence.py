@@ -73,7 +73,7 @@ def found_on(points: Sequence[Mapping[str, float]]) -> dict[str, float]:
         np.array([point[name] for point in points]) for name in ("step", "seconds", "validation")
     )
     pace = float(np.median(np.diff(seconds, prepend=0.0) / np.diff(steps, prepend=0.0)))
-    found = {
+    numbers = {
         "steps": int(steps[-1]),
         "training_step": 1e3 * pace,
         "training": float(seconds[-1]),
@@ -83,9 +83,9 @@ def found_on(points: Sequence[Mapping[str, float]]) -> dict[str, float]:
         "validation_best": float(np.nanmin(validation)),
     }
     for percent in CLOSE:
-        there = arrival(validation, percent / 100.0)
-        found |= {f"steps_to_{percent}": int(steps[there]), f"time_to_{percent}": float(seconds[there])}
-    return found | {"paper_training": PAPER_STEPS * pace / 3600}
+        place = arrival(validation, percent / 100.0)
+        numbers |= {f"steps_to_{percent}": int(steps[place]), f"time_to_{percent}": float(seconds[place])}
+    return numbers | {"paper_training": PAPER_STEPS * pace / 3600}
 
 
 def arrival(values: np.ndarray, share: float) -> int:

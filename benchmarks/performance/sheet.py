@@ -90,7 +90,7 @@ def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
     memory = peak_memory() - base
     iteration_seconds(regular_sheet(4), NEWTON, 1, 1)
     newton = iteration_seconds(cloth, NEWTON, frames, settings.repeats)
-    found = {
+    numbers = {
         "vertices": cloth.vertex_count,
         "iteration": 1e3 * newton,
         "iteration_per_vertex": 1e6 * newton / cloth.vertex_count,
@@ -98,9 +98,9 @@ def scaling(settings: Settings, *, side: int, frames: int) -> dict[str, float]:
     }
     ratio = cloth.vertex_count / smallest.vertex_count
     if ratio > 1:
-        found["lbfgs_slope"] = math.log(lbfgs / small) / math.log(ratio)
-        found["lbfgs_memory"] = 1e3 * memory / cloth.vertex_count
-    return found
+        numbers["lbfgs_slope"] = math.log(lbfgs / small) / math.log(ratio)
+        numbers["lbfgs_memory"] = 1e3 * memory / cloth.vertex_count
+    return numbers
 
 
 def iteration_seconds(cloth: Cloth, options: dict[str, Any], frames: int, repeats: int) -> float:

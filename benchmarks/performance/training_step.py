@@ -44,7 +44,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     blocks, parts = _timed(trainer, settings.repeats)
     used = (time.process_time() - used) / steps
     step = float(np.median(blocks))
-    found = {
+    numbers = {
         "vertices": dressed.vertices,
         "training_frames": trainer.data.frames,
         "step_frames": trainer.windows * trainer.data.window,
@@ -56,8 +56,8 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
         "paper_training": PAPER_STEPS * step / 3600,
     }
     if device.type == "cuda":
-        found["device_memory"] = torch.cuda.max_memory_allocated(device) / 1e6
-    return found
+        numbers["device_memory"] = torch.cuda.max_memory_allocated(device) / 1e6
+    return numbers
 
 
 def _timed(trainer: Trainer, blocks: int) -> tuple[list[float], dict[str, list[float]]]:

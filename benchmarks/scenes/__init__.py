@@ -80,7 +80,7 @@ class GarmentScenes:
     """
 
     garment: str
-    words: str
+    title: str
     dynamic: bool = False
 
     def scene(self, motion: str, part: str = "whole") -> Scene:
@@ -88,7 +88,7 @@ class GarmentScenes:
         of = " (its liveliest part)" if part == "clip" else ""
         return Scene(
             name=f"{self.garment}/{motion}" + ("@clip" if part == "clip" else ""),
-            description=f"a body in {self.words}: {motion}{of}",
+            description=f"a body in {self.title}: {motion}{of}",
             module="benchmarks.scenes.dressed_body",
             sizes=("settle_frames", "warm_up_frames"),
             garment=self.garment,

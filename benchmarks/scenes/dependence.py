@@ -27,6 +27,8 @@ def build(
     """Build the scene; `vertices` of the garment, by default the middle mesh, and `substeps` of a frame."""
     garment = find_template(scene.garment).tailor(assets.body, vertices=vertices or dependence.middle)
     motion = make_motion(scene.motion).cut(0, dependence.frames)
-    own = replace(assets, garments={scene.garment: garment}, motions={scene.motion: motion})
-    built = dressed_body.build(scene, own, settle_frames=dependence.settle_frames, warm_up_frames=WARM_UP)
+    tailored = replace(assets, garments={scene.garment: garment}, motions={scene.motion: motion})
+    built = dressed_body.build(
+        scene, tailored, settle_frames=dependence.settle_frames, warm_up_frames=WARM_UP
+    )
     return replace(built, substeps=substeps)

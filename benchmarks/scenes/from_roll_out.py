@@ -17,7 +17,7 @@ from reference_sim.files.mesh_files import METRES, to_metres_y_up
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
-FEWEST = 4  # frames: two are not judged, and a mean is of more than one
+MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 
 def declared(option: RollOutOption, rest_mesh: str) -> Scene:
@@ -49,8 +49,8 @@ def build(
     """Build the scene; it starts at rest in the file's first frame. Raises RollOutError."""
     stored = read_roll_out(path)
     positions = to_metres_y_up(stored.positions, units=units, up=up)
-    if len(positions) < FEWEST:
-        raise RollOutError(f"{path}: {len(positions)} frames; at least {FEWEST} are needed")
+    if len(positions) < MIN_FRAMES:
+        raise RollOutError(f"{path}: {len(positions)} frames; at least {MIN_FRAMES} are needed")
     try:
         rest = read_rest_mesh(rest_mesh)
         if len(rest.positions) != positions.shape[1]:

@@ -31,7 +31,7 @@ def build(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> BuiltScene:
         motion, early, late = looped(make_motion(scene.motion), loop_frames)
         kept = np.unique(np.concatenate([np.arange(0, loop_frames, EVERY), early, late]))
     else:
-        motion = there_and_back(assets.motion(scene.motion, "whole"))
+        motion = repeated_there_and_back(assets.motion(scene.motion, "whole"))
         early, late = np.arange(ENDS), np.arange(motion.frames - ENDS, motion.frames)
         kept = np.concatenate([early, late])
     garment = assets.garments[scene.garment]
@@ -49,7 +49,7 @@ def build(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> BuiltScene:
     )
 
 
-def there_and_back(motion: Motion) -> Motion:
+def repeated_there_and_back(motion: Motion) -> Motion:
     """Return the motion again and again, every second time backwards, for `FRAMES` frames or a few more.
 
     Its last hundred frames show the same as its first.

@@ -22,7 +22,7 @@ from snug.motion.motion import Motion, transition
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
 
-ORDINARY = 44  # frames of the walk that the others are compared with
+ORDINARY_FRAMES = 44  # frames of the walk that the others are compared with
 APPROACH = 12  # frames from the walk's first pose to another
 STILL = 10  # frames for which a pose is kept, or a walk goes on
 GLITCH = 12  # the frame that is wrong
@@ -75,7 +75,7 @@ def build(
 
 def ordinary(walk: Motion) -> Motion:
     """Return the first frames of the walk, as they are."""
-    return walk.cut(0, ORDINARY)
+    return walk.cut(0, ORDINARY_FRAMES)
 
 
 def faster(walk: Motion, times: int) -> Motion:

@@ -141,14 +141,14 @@ def _dependence(name: str, description: str, **options: int) -> Scene:
 DRAPES = tuple(
     Scene(
         name=f"dependence/drape/{family}/{count}",
-        description=f"a sheet of about {count} vertices draped over a sphere, {words}",
+        description=f"a sheet of about {count} vertices draped over a sphere, {title}",
         module="benchmarks.scenes.sheet_on_sphere",
         sizes=("sheet_frames",),
         options={"sheet_cells": round(count**0.5) - 1, "family": family},
         obstacle=True,
         metrics=("energy", "curvature", "mesh"),
     )
-    for family, words in (
+    for family, title in (
         ("union_jack", "alternating diagonals"), ("delaunay", "jittered Delaunay triangles"),
     )
     for count in (500, 1000, 4000, 16_000)

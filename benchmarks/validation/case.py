@@ -58,10 +58,10 @@ class Case:
     def run(self) -> Row:
         """Measure here and now and return the row. What is raised becomes a failed row with its reason."""
         try:
-            found = self._imported(self.function)(**self.options)
-            if isinstance(found, Measurement):
-                return self.row(found.value, found.status, found.reason, terms=found.terms)
-            value, expected = found if isinstance(found, tuple) else (found, self.expected)
+            measured = self._imported(self.function)(**self.options)
+            if isinstance(measured, Measurement):
+                return self.row(measured.value, measured.status, measured.reason, terms=measured.terms)
+            value, expected = measured if isinstance(measured, tuple) else (measured, self.expected)
             return self.judged(float(value), None if expected is None else float(expected))
         except Exception as error:
             return self.row(reason=f"{type(error).__name__}: {error}")

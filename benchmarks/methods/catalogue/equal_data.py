@@ -16,7 +16,7 @@ from benchmarks.training import Simulated, Training
 
 # Mixed frames for each given one; between the ends for the curve of error against training frames.
 ENDS, CURVE = (0, 12), (0, 1, 3, 12)
-NETWORKS = (
+FAMILIES_OF_NETWORKS = (
     ("snug", "SNUG", CURVE),
     ("pbns", "PBNS", ENDS),
     ("supervised", "Supervised", CURVE),
@@ -26,13 +26,13 @@ NETWORKS = (
 
 
 def _training(name: str, mixed: int, *, converged: bool) -> Training:
-    own = TRAININGS[name]
-    recipe = replace(own.recipe, name=f"{own.recipe.name}-data-{mixed}")
-    if own.simulated:
-        own = replace(own, simulated=Simulated(mixed=mixed))
+    training = TRAININGS[name]
+    recipe = replace(training.recipe, name=f"{training.recipe.name}-data-{mixed}")
+    if training.simulated:
+        training = replace(training, simulated=Simulated(mixed=mixed))
     else:
         recipe = replace(recipe, mixed=float(mixed))
-    return replace(own, recipe=recipe, steps_of="snug", held_out=1, converged=converged)
+    return replace(training, recipe=recipe, steps_of="snug", held_out=1, converged=converged)
 
 
 def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry:
@@ -59,4 +59,6 @@ def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry
     return (*equal, *converged, *map(post_processed, ends))
 
 
-EQUAL_DATA = tuple(entry for own in NETWORKS for entry in _block(*own))
+EQUAL_DATA = tuple(
+    entry for network_and_numbers in FAMILIES_OF_NETWORKS for entry in _block(*network_and_numbers)
+)

@@ -137,13 +137,13 @@ SOLVERS = (
         MethodEntry(
             name=f"simulation-{exchange}",
             label=f"Simulation, {exchange.replace('-', ' ')}",
-            description=f"the reference with {words}",
+            description=f"the reference with {change}",
             module="benchmarks.methods.solvers.other_material",
             options={"exchange": exchange},
             role="ablation",
             reporting=Reporting(base="simulation"),
         )
-        for exchange, words in (
+        for exchange, change in (
             ("printed-bending", "hinges as the paper prints them, not scaled: some 3 times as stiff"),
             ("springs", "springs on the edges in place of StVK's membrane, those of recipe springs"),
             ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),

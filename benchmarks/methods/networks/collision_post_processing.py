@@ -46,10 +46,10 @@ class CollisionPostProcessing:
         patch, skin = self.patch, self.body[frame]
         patch.tree.refit(skin)
         # Exact at any depth, unlike the anchors of training: what lies deep must find the near way out.
-        found = patch.tree.nearest(x, hints=self._faces, rest_points=patch.sample_rest, region=patch.region)
-        self._faces = found.faces
-        corners = vertex_normals(skin, patch.faces)[patch.faces[found.faces]]
-        normals = np.einsum("va,vai->vi", found.barycentric, corners)
+        nearest = patch.tree.nearest(x, hints=self._faces, rest_points=patch.sample_rest, region=patch.region)
+        self._faces = nearest.faces
+        corners = vertex_normals(skin, patch.faces)[patch.faces[nearest.faces]]
+        normals = np.einsum("va,vai->vi", nearest.barycentric, corners)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True) + 1e-30
-        lack = MARGIN - np.einsum("vi,vi->v", normals, x - found.points)
+        lack = MARGIN - np.einsum("vi,vi->v", normals, x - nearest.points)
         return x + np.maximum(lack, 0.0)[:, None] * normals

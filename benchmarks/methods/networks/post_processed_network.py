@@ -39,14 +39,14 @@ class PostProcessedNetwork(Network):
         from benchmarks.methods.networks.collision_post_processing import MARGIN
 
         cleaned = super().run()
-        said = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}
-        return replace(cleaned, provenance=cleaned.provenance | said)
+        facts = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}
+        return replace(cleaned, provenance=cleaned.provenance | facts)
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Return a function of the frame that makes features, joint transforms and the posed body."""
         assert scene.dressed is not None
-        own, body = super().inputs(scene), posed_body(scene.dressed)
-        return lambda frame: (own(frame), body(frame))
+        features, body = super().inputs(scene), posed_body(scene.dressed)
+        return lambda frame: (features(frame), body(frame))
 
     def quasi_static(self) -> Trajectory:
         """Return the network's quasi-static solutions, post-processed as well. Never on the clock."""

@@ -24,14 +24,18 @@ from benchmarks.scene import BuiltScene
 from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
 
-SECONDS = 100.0  # after which it is ended
+TIME_LIMIT = 100.0  # after which it is ended
 PLACES = ("{scene}", "{out}")
-TAIL = 4096  # bytes of what it has said that are looked at
-OURS = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")  # of this process: another environment has its own
+TAIL_BYTES = 4096  # bytes of what it has said that are looked at
+OWN_ENVIRONMENT = (
+    "PYTHONPATH",
+    "PYTHONHOME",
+    "VIRTUAL_ENV",
+)  # of this process: another environment has its own
 
 
 def program(
-    name: str, command: str, *, seconds: float = SECONDS, description: str = "", **fields: Any
+    name: str, command: str, *, seconds: float = TIME_LIMIT, description: str = "", **fields: Any
 ) -> MethodEntry:
     """Return the entry of a program.
 
@@ -39,7 +43,7 @@ def program(
         name: of the method.
         command: words as in a shell, which is not used. {scene} becomes the folder of the exported scene,
             {out} the npz file to be written: positions (T,V,3) [m], and what else benchmarks.score reads. In
-            it seconds_per_frame, one number, is its declared time. {seed} becomes the seed, for a seeded entry.
+            it seconds_per_frame, one number, is its declared time. {seed} becomes the seed.
         seconds: after which it is ended.
         description: one line; by default that it is this program.
         fields: of MethodEntry, as label, files and needs_body.
@@ -62,7 +66,7 @@ class Program(Stored):
     """Roll-out that a program writes when it is asked for."""
 
     command: str = ""
-    seconds: float = SECONDS
+    seconds: float = TIME_LIMIT
     seed: int = 0
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -78,25 +82,27 @@ class Program(Stored):
             RollOutError: what it has written does not belong to the scene.
         """
         with tempfile.TemporaryDirectory(prefix="program-") as folder:
-            exported, out, said = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))
+            exported, out, output = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))
             write_for_program(exported, self.scene)
             places = {"{scene}": str(exported), "{out}": str(out), "{seed}": str(self.seed)}
-            self._execute([_filled(word, places) for word in shlex.split(self.command)], said)
+            self._execute([_filled(word, places) for word in shlex.split(self.command)], output)
             if not out.is_file():
-                raise RuntimeError(f"the program has ended well and has not written {{out}}{_said(said)}")
+                raise RuntimeError(
+                    f"the program has ended well and has not written {{out}}{_last_line(output)}"
+                )
             self.path = str(out)
             super().prepare(self.scene)
             declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
-        told = {} if declared is None else {"declared_ms": _milliseconds(declared)}
-        provenance = {"method": "program", "changes": list(self.done), **told}
+        declared_time = {} if declared is None else {"declared_ms": _milliseconds(declared)}
+        provenance = {"method": "program", "changes": list(self.done), **declared_time}
         return replace(super().run(), provenance=provenance)
 
-    def _execute(self, words: list[str], said: Path) -> None:
-        environment = {name: value for name, value in os.environ.items() if name not in OURS}
-        with said.open("wb") as stream:
+    def _execute(self, arguments: list[str], output: Path) -> None:
+        environment = {name: value for name, value in os.environ.items() if name not in OWN_ENVIRONMENT}
+        with output.open("wb") as stream:
             try:
                 process = subprocess.Popen(
-                    words, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment
+                    arguments, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment
                 )
             except OSError as error:
                 raise RuntimeError(f"the program cannot be started: {error}") from None
@@ -105,10 +111,10 @@ class Program(Stored):
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-                why = f"the program was ended after {self.seconds:g} s{_said(said)}"
+                why = f"the program was ended after {self.seconds:g} s{_last_line(output)}"
                 raise WorkerDied(why, "timeout") from None
         if status:
-            raise RuntimeError(f"the program has ended with status {status}{_said(said)}")
+            raise RuntimeError(f"the program has ended with status {status}{_last_line(output)}")
 
 
 def _filled(word: str, places: dict[str, str]) -> str:
@@ -117,10 +123,10 @@ def _filled(word: str, places: dict[str, str]) -> str:
     return word
 
 
-def _said(said: Path) -> str:
+def _last_line(output: Path) -> str:
     """Its last line, behind a colon; empty where it has said nothing."""
-    with said.open("rb") as stream:
-        stream.seek(max(0, stream.seek(0, os.SEEK_END) - TAIL))
+    with output.open("rb") as stream:
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - TAIL_BYTES))
         lines = stream.read().decode("utf-8", "replace").split("\n")
     last = next((" ".join(line.split()) for line in reversed(lines) if line.strip()), "")
     return f": {last}" if last else ""

@@ -44,10 +44,10 @@ def _springs(term: Energy) -> Energy:
 
 def _pbns_springs(term: Energy) -> Energy:
     """Return PBNS's springs and hinges, as recipe `pbns-springs` has them; the weight is the scene's."""
-    own = _printed_bending(_springs(term))
-    if isinstance(own, BendHinge):
-        own.stiffness = np.full(len(own.stencils), 2.0 * BENDING)
-    return own
+    exchanged = _printed_bending(_springs(term))
+    if isinstance(exchanged, BendHinge):
+        exchanged.stiffness = np.full(len(exchanged.stencils), 2.0 * BENDING)
+    return exchanged
 
 
 EXCHANGES = {"printed-bending": _printed_bending, "springs": _springs, "pbns-springs": _pbns_springs}

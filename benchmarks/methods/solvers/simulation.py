@@ -17,7 +17,7 @@ class Simulation(Method):
 
     options: dict[str, Any]
     scene: BuiltScene | None = None
-    told: bool = False
+    announced: bool = False
 
     def prepare(self, scene: BuiltScene) -> None:
         """Settle the start, and compile the kernels by simulating two frames that are thrown away."""
@@ -29,8 +29,8 @@ class Simulation(Method):
         assert self.scene is not None
         # Hours at the paper's scale: a bar with the time left, a microsecond of a frame's milliseconds.
         # Once: short runs are done again until enough time is measured.
-        label = self.scene.name if self.scene.dressed and not self.told else None
-        self.told = True
+        label = self.scene.name if self.scene.dressed and not self.announced else None
+        self.announced = True
         return self._simulate(frames=self.scene.frames, progress=label)
 
     def _simulate(self, *, frames: int, progress: str | None = None) -> Trajectory:

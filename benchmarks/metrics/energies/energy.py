@@ -75,16 +75,16 @@ def energy_series(
     >>> {term: abs(round(float(series[2]), 9)) for term, series in energy_series(scene, [still])[0].items()}
     {'strain': 0.0, 'bending': 0.0, 'gravity': 0.0, 'inertia': 0.0, 'total': 0.0}
     """
-    own = [copied_terms(scene) for _ in trajectories]
-    found = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]
+    copies = [copied_terms(scene) for _ in trajectories]
+    tables = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]
     for frame in range(max(map(len, trajectories), default=0)):
-        for positions, terms, series in zip(trajectories, own, found):
+        for positions, terms, series in zip(trajectories, copies, tables):
             if frame < len(positions):
                 for name, value in _terms_at(scene, terms, positions, frame).items():
                     series[name][frame] = value
-    for series in found:
+    for series in tables:
         series["total"] = np.sum(list(series.values()), axis=0)
-    return found
+    return tables
 
 
 def _terms_at(
@@ -116,8 +116,8 @@ def _terms_at(
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return mean energies over the evaluated frames [J per frame], and the correlation of inertia."""
-    found = energies(roll_out)
-    means = {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in found.items()}
+    by_term = energies(roll_out)
+    means = {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in by_term.items()}
     correlation = correlation_with_body(roll_out)
     return means if correlation is None else means | {"inertia/correlation": correlation}
 
@@ -147,10 +147,10 @@ def correlation_with_body(roll_out: RollOut) -> float | None:
         return None
     frames = roll_out.judged_beside(bare)
     masses = group.scene.cloth.masses
-    own, body = (accelerations(x, masses, group.scene.dt)[frames] for x in (roll_out.positions, bare))
-    if len(own) < 3 or min(np.ptp(size) / size.max(initial=1e-300) for size in (own, body)) < 1e-9:
+    ours, body = (accelerations(x, masses, group.scene.dt)[frames] for x in (roll_out.positions, bare))
+    if len(ours) < 3 or min(np.ptp(size) / size.max(initial=1e-300) for size in (ours, body)) < 1e-9:
         return None
-    return float(np.corrcoef(own, body)[0, 1])
+    return float(np.corrcoef(ours, body)[0, 1])
 
 
 def accelerations(
@@ -165,7 +165,7 @@ def accelerations(
         masses: (V,) [kg].
         dt: [s].
     """
-    found = np.zeros(len(positions))
+    sizes = np.zeros(len(positions))
     squared = (np.diff(positions, 2, axis=0) ** 2).sum(2)
-    found[FIRST_FULL_FRAME:] = np.sqrt(squared @ masses / masses.sum()) / dt**2
-    return found
+    sizes[FIRST_FULL_FRAME:] = np.sqrt(squared @ masses / masses.sum()) / dt**2
+    return sizes

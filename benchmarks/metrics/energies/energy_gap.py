@@ -50,9 +50,9 @@ FINDERS = {
     "simulator": "by a solve as the simulator does it", "from_frame": "by descending from the frame",
     "frame": "at the frame itself",
 }  # fmt: skip
-ALIKE = 1e-9  # of the scale: minima this near are one
+SAME_MINIMUM = 1e-9  # of the scale: minima this near are one
 PRECISION = 0.1  # standard error of the gap, as a share of it
-LEAST = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
+NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3
 
 METRICS = (
@@ -107,15 +107,15 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     """Return gaps, one-step distances and the gradient left, of the sampled frames."""
     group = roll_out.group
     scale = group.kept(gap_scale)
-    found: dict[str, float | Estimate] = {}
-    found |= roll_out.kept(_judge_steps).metrics()
-    if scale is None or not found:
-        return found
-    gap = found["gap/energy"]
+    values: dict[str, float | Estimate] = {}
+    values |= roll_out.kept(_judge_steps).metrics()
+    if scale is None or not values:
+        return values
+    gap = values["gap/energy"]
     assert isinstance(gap, Estimate)
     if scale > 0.0:
-        found["gap/relative"] = Estimate(gap.value / scale, gap.uncertainty / scale)
-    return found | ({"gap/scale": scale} if roll_out is group.reference else {})
+        values["gap/relative"] = Estimate(gap.value / scale, gap.uncertainty / scale)
+    return values | ({"gap/scale": scale} if roll_out is group.reference else {})
 
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
@@ -185,13 +185,13 @@ class Optimality:
             "step/distance": self.distances, "step/curvature": self.curvatures,
             "gradient/norm": self.gradients,
         }  # fmt: skip
-        found: dict[str, float | Estimate] = {name: self.estimate(v) for name, v in means.items() if v}
-        return found | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
+        estimates: dict[str, float | Estimate] = {name: self.estimate(v) for name, v in means.items() if v}
+        return estimates | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
 
     def precise(self, scale: float) -> bool:
         """Return whether the standard error of the gap is small enough."""
         gap = self.estimate(self.gaps)
-        return gap.uncertainty <= max(PRECISION * abs(gap.value), LEAST * scale)
+        return gap.uncertainty <= max(PRECISION * abs(gap.value), NEGLIGIBLE * scale)
 
 
 def optimality(
@@ -212,36 +212,38 @@ def optimality(
     from reference_sim.minimise.lbfgs import LBFGS
 
     frames = _judged(scene, positions)
-    found, potential = Optimality(judged=len(frames)), _potential(scene)
+    numbers, potential = Optimality(judged=len(frames)), _potential(scene)
     minimiser = LBFGS(potential, max_iterations=ITERATIONS)
     inner = ~boundary_mask(scene.cloth.faces, scene.cloth.vertex_count)
-    for frame in spread(frames):
+    for frame in spread_evenly(frames):
         x = np.ascontiguousarray(positions[frame])
         guess = freeze_step(scene, potential, positions, frame)
         here, gradient = potential.value_and_gradient(x)
         if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
-            found.gaps, found.local, found.gradients = [np.nan], [np.nan], [np.nan]
-            found.refrozen, found.distances, found.curvatures, found.away = [], [], [], {}
-            return found
+            numbers.gaps, numbers.local, numbers.gradients = [np.nan], [np.nan], [np.nan]
+            numbers.refrozen, numbers.distances, numbers.curvatures, numbers.away = [], [], [], {}
+            return numbers
         below = minimiser.minimise(x)
         energies = {"simulator": minimiser.minimise(guess).energy, "from_frame": below.energy, "frame": here}
         # A guess that has no energy, as of a garment that collapsed a frame ago, leads nowhere.
         best = min(energy for energy in energies.values() if np.isfinite(energy))
-        alike = ALIKE * (scale or abs(here))
-        found.found_by[next(name for name in FINDERS if energies[name] <= best + alike)] += 1
-        found.gaps.append(here - best)
-        found.local.append(here - min(here, below.energy))
-        found.gradients.append(float(np.abs(gradient[scene.cloth.free]).max()) / mean_weight(potential))
+        alike = SAME_MINIMUM * (scale or abs(here))
+        numbers.found_by[next(name for name in FINDERS if energies[name] <= best + alike)] += 1
+        numbers.gaps.append(here - best)
+        numbers.local.append(here - min(here, below.energy))
+        numbers.gradients.append(float(np.abs(gradient[scene.cloth.free]).max()) / mean_weight(potential))
         y = below.positions
-        found.away[frame] = MM * np.linalg.norm(x - y, axis=1)
-        found.distances.append(float(np.sqrt((found.away[frame] ** 2).mean())))
-        found.curvatures.append(_curvature_error(x, y, scene.cloth.faces, inner))
-        if scene.obstacle is not None and len(found.refrozen) < samples:
+        numbers.away[frame] = MM * np.linalg.norm(x - y, axis=1)
+        numbers.distances.append(float(np.sqrt((numbers.away[frame] ** 2).mean())))
+        numbers.curvatures.append(_curvature_error(x, y, scene.cloth.faces, inner))
+        if scene.obstacle is not None and len(numbers.refrozen) < samples:
             freeze_step(scene, potential, positions, frame, guess=x)
-            found.refrozen.append(potential.value(x) - min(potential.value(x), minimiser.minimise(x).energy))
-        if len(found.gaps) >= samples and found.precise(scale or 0.0):
+            numbers.refrozen.append(
+                potential.value(x) - min(potential.value(x), minimiser.minimise(x).energy)
+            )
+        if len(numbers.gaps) >= samples and numbers.precise(scale or 0.0):
             break
-    return found
+    return numbers
 
 
 def _judged(scene: BuiltScene, positions: Floats) -> range:
@@ -255,7 +257,7 @@ def _potential(scene: BuiltScene) -> Potential:
     return Potential(copied_terms(scene))
 
 
-def spread(frames: range) -> Iterator[int]:
+def spread_evenly(frames: range) -> Iterator[int]:
     """Yield all of the frames, in an order whose every beginning is spread evenly: halves, quarters.
 
     >>> list(spread(range(2, 10)))

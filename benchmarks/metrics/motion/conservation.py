@@ -73,15 +73,17 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     if roll_out not in _asked(roll_out.group):
         return {}
     laws = roll_out.group.kept(_laws_of)[roll_out]
-    found = laws.metrics(roll_out.scene.warm_up - FIRST_FULL_FRAME)
+    values = laws.metrics(roll_out.scene.warm_up - FIRST_FULL_FRAME)
     if roll_out is not roll_out.group.reference:
-        return found
+        return values
     fields, frames = roll_out.trajectory.frame_fields, roll_out.trajectory.frames
     claims = fields.get("converged", np.ones(frames))[FIRST_FULL_FRAME:] > 0.5
     worst = {"momentum": laws.force / laws.weight, "energy": laws.rise, "residual": laws.residual}
     if claims.any():
-        found |= {f"conservation/{name}_worst": max(0.0, float(v[claims].max())) for name, v in worst.items()}
-    return found
+        values |= {
+            f"conservation/{name}_worst": max(0.0, float(v[claims].max())) for name, v in worst.items()
+        }
+    return values
 
 
 def _asked(group: SceneRollOuts) -> list[RollOut]:
@@ -155,20 +157,22 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
     frames = [len(positions) for positions in trajectories]
     if frames and min(frames) <= FIRST_FULL_FRAME:
         raise ValueError(f"scene {scene.name}: a law needs {FIRST_FULL_FRAME + 1} frames, not {min(frames)}")
-    own = [Potential(copied_terms(scene)) for _ in trajectories]
+    potentials = [Potential(copied_terms(scene)) for _ in trajectories]
     # Angular momentum is taken about the pelvis, or the origin where there is no body.
     pivots = np.zeros((scene.frames, 3)) if scene.dressed is None else scene.dressed.pelvis
-    found: list[list[tuple[float, ...]]] = [[] for _ in trajectories]
+    numbers: list[list[tuple[float, ...]]] = [[] for _ in trajectories]
     # From the first step on, as a solver: an obstacle's search tree covers what it has been asked about, and
     # where two of its faces are equally near, the tree decides between them.
     for frame in range(1, max(frames, default=0)):
         steps = {k: step_to(scene, x, frame) for k, x in enumerate(trajectories) if frame < frames[k]}
         for k, step in steps.items():
-            own[k].prepare(step)
+            potentials[k].prepare(step)
             if frame >= FIRST_FULL_FRAME:
-                found[k].append(_one_step(scene, own[k], step, trajectories[k][frame], pivots[frame]))
+                numbers[k].append(
+                    _one_step(scene, potentials[k], step, trajectories[k][frame], pivots[frame])
+                )
     weight = float(scene.cloth.masses.sum() * GRAVITY)
-    return [LawSeries(weight, *np.array(steps).T) for steps in found]
+    return [LawSeries(weight, *np.array(steps).T) for steps in numbers]
 
 
 def _one_step(

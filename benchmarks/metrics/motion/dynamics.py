@@ -43,12 +43,12 @@ METRICS = (
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return the distance to the quasi-static solution [mm] and, for the reference, its own dynamics."""
     x, group = roll_out.positions, roll_out.group
-    own = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
-    found: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
-    if own is not None:
-        frames = roll_out.judged_beside(own)
-        found["dynamics/quasi_static_difference"] = rms(x[frames], own[frames])
-    return found
+    static = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
+    values: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
+    if static is not None:
+        frames = roll_out.judged_beside(static)
+        values["dynamics/quasi_static_difference"] = rms(x[frames], static[frames])
+    return values
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
@@ -56,17 +56,17 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
     Without an own solution the numbers are left out that it enters.
     """
-    hem, x, own = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
+    hem, x, static = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
     if hem is None:
         return {}
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     common = hem.measure(x)
-    if own is None:
+    if static is None:
         known = roll_out.entry.static_known
-        found |= {n: v for n, v in common.items() if known or n.removeprefix("dynamics/") not in COMMON}
-    elif len(own) >= len(x) and np.isfinite(own).all():
-        found |= hem.measure(x, own)
-    return found | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
+        values |= {n: v for n, v in common.items() if known or n.removeprefix("dynamics/") not in COMMON}
+    elif len(static) >= len(x) and np.isfinite(static).all():
+        values |= hem.measure(x, static)
+    return values | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
                     if f"dynamics/{name}" in common}  # fmt: skip
 
 

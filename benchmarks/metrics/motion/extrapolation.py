@@ -63,25 +63,25 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     bare = roll_out.group.kept(skinned)
     assert scene.dressed is not None and bare is not None
     worst = float(strains(scene.cloth, whole).max())
-    found = {
+    values = {
         "motion/strain": worst,
         "motion/offset": MM * float(np.linalg.norm(whole - bare[: len(whole)], axis=2).max()),
     }
-    garment, there = scene.dressed.garment, roll_out.counterpart
-    if there is not None:
-        found["motion/strain_ratio"] = worst / float(strains(garment.cloth(), there).max())
+    garment, ordinary = scene.dressed.garment, roll_out.counterpart
+    if ordinary is not None:
+        values["motion/strain_ratio"] = worst / float(strains(garment.cloth(), ordinary).max())
     if scene.obstacle is not None:
-        found["motion/penetration"] = 100.0 * float(geometry.inside_of(roll_out).share.mean())
+        values["motion/penetration"] = 100.0 * float(geometry.inside_of(roll_out).share.mean())
     if scene.cloth.material != garment.material and len(x) == scene.frames:
-        found["motion/total"] = float(energy.energies(roll_out)["total"][roll_out.judged].mean())
-    if scene.glitch is not None and there is not None:
-        apart = geometry.distance_rms(whole, there[: len(whole)])
-        found |= {
+        values["motion/total"] = float(energy.energies(roll_out)["total"][roll_out.judged].mean())
+    if scene.glitch is not None and ordinary is not None:
+        apart = geometry.distance_rms(whole, ordinary[: len(whole)])
+        values |= {
             f"motion/recovery_{after}": MM * float(apart[scene.glitch + after])
             for after in AFTER
             if scene.glitch + after < len(apart)
         }
-    return found
+    return values
 
 
 def judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None:

@@ -32,7 +32,7 @@ TURNING = np.deg2rad(5.0)  # rms static yaw from which on gain and lag are those
 SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to be a gain of
 MAX_LAG = 12.0  # frames
 SHORTEST = 8  # frames of which a motion can be said
-LEAST = 1e-6  # [m] rms of a dynamic part that is none
+NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none
 
 
 def in_root_frame(positions: Array, rotations: Array, origins: Array) -> Array:
@@ -58,14 +58,14 @@ def amplitude(part: Array, reference: Array) -> float:
     >>> amplitude(np.full((2, 1, 3), 0.01), np.full((2, 1, 3), 0.02))
     0.5
     """
-    if root_mean_square(reference) < LEAST:
+    if root_mean_square(reference) < NO_MOTION:
         return float("nan")
     return root_mean_square(part) / root_mean_square(reference)
 
 
 def correlation(part: Array, reference: Array) -> float:
     """Return the cosine between D (T,H,3) and the reference's, as vectors; nan where one is zero."""
-    if min(root_mean_square(part), root_mean_square(reference)) < LEAST:
+    if min(root_mean_square(part), root_mean_square(reference)) < NO_MOTION:
         return float("nan")
     return float(np.vdot(part, reference) / (np.linalg.norm(part) * np.linalg.norm(reference)))
 
@@ -171,9 +171,9 @@ class HemMotion:
         """Return curves over time: yaw of the hem against the root [rad], its rms distance to its end [m]."""
         hem = self.of(positions)
         # In the root's own axes the root does not turn: what is left is the hem's lead and overshoot.
-        own = np.broadcast_to(np.eye(3), (len(hem), 3, 3))
+        root = np.broadcast_to(np.eye(3), (len(hem), 3, 3))
         away = np.sqrt(((hem - hem[-1]) ** 2).sum(axis=-1).mean(axis=-1))
-        return {"hem/yaw": hem_yaw(hem, own), "hem/from_end": away}
+        return {"hem/yaw": hem_yaw(hem, root), "hem/from_end": away}
 
     def measure(self, positions: Array, static: Array | None = None) -> dict[str, float]:
         """Return every dynamic metric of positions (T,V,3), [1], [frames] or [mm]; undefined ones left out.
@@ -186,10 +186,10 @@ class HemMotion:
         judged = slice(self.first, last)
         moving, simulated = self.of(positions[:last])[judged], self.of(self.simulated[:last])[judged]
         quiet = self.of(self.quasi_static[:last])[judged]
-        own = quiet if static is None else self.of(static[:last])[judged]
-        part, reference = dynamic_part(moving, own), dynamic_part(simulated, quiet)
-        gain, lag = response(moving, own, self.axes[judged])
-        found = {
+        still = quiet if static is None else self.of(static[:last])[judged]
+        part, reference = dynamic_part(moving, still), dynamic_part(simulated, quiet)
+        gain, lag = response(moving, still, self.axes[judged])
+        values = {
             "dynamics/amplitude": amplitude(part, reference),
             "dynamics/correlation": correlation(part, reference),
             "dynamics/gain": gain,
@@ -198,6 +198,6 @@ class HemMotion:
         }
         if self.stop is not None and self.first <= self.stop < last - AFTER[-1]:
             distances = 1e3 * ringing(moving, self.stop - self.first)
-            found["dynamics/ringing"] = float(distances.mean())
-            found |= {f"dynamics/ringing/{after}": float(d) for after, d in zip(AFTER, distances)}
-        return {name: value for name, value in found.items() if np.isfinite(value)}
+            values["dynamics/ringing"] = float(distances.mean())
+            values |= {f"dynamics/ringing/{after}": float(d) for after, d in zip(AFTER, distances)}
+        return {name: value for name, value in values.items() if np.isfinite(value)}

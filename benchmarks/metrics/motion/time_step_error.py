@@ -58,7 +58,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     if roll_out is not group.reference:
         return {}
     finer = [group.find(role="reference-variant", family="simulation-dt", level=n) for n in (2, 4, 8)]
-    ladder = [roll_out, *(found for found in finer if found is not None)]
+    ladder = [roll_out, *(variant for variant in finer if variant is not None)]
     if len(ladder) < 4:
         return {}
     return time_errors([_quantities(one) for one in ladder])
@@ -66,8 +66,10 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 def _quantities(one: RollOut) -> dict[str, float]:
     """Return energies [J] and mean curvature [1/m] of a roll-out."""
-    found = energy.measure(one) | curvature.measure(one)
-    return {name: value for name, value in found.items() if name in _QUANTITIES or name.startswith("energy/")}
+    values = energy.measure(one) | curvature.measure(one)
+    return {
+        name: value for name, value in values.items() if name in _QUANTITIES or name.startswith("energy/")
+    }
 
 
 def time_errors(ladder: list[dict[str, float]]) -> dict[str, float]:

@@ -15,8 +15,8 @@ from benchmarks.metric import Metric
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
 
-SAMPLES = 24  # frames that are looked at, evenly spaced: 50 ms each
-OFF = 1e-3  # [m] off the skin, where a point is inside the body only if another part of it is there
+SAMPLED_FRAMES = 24  # frames that are looked at, evenly spaced: 50 ms each
+OFFSET = 1e-3  # [m] off the skin, where a point is inside the body only if another part of it is there
 
 METRICS = (
     Metric(
@@ -38,7 +38,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
         return {}
     faces, rest = scene.obstacle.faces, scene.dressed.body.shaped(scene.dressed.betas)
     at_rest = inside_itself(rest, faces)  # eyes in their sockets
-    judged = np.unique(np.linspace(scene.warm_up, frames - 1, SAMPLES).round().astype(int))
+    judged = np.unique(np.linspace(scene.warm_up, frames - 1, SAMPLED_FRAMES).round().astype(int))
     share = [(inside_itself(scene.obstacle.at(frame), faces) & ~at_rest).mean() for frame in judged]
     worst = int(np.argmax(share))
     return {
@@ -56,5 +56,5 @@ def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[n
 
     from reference_sim.geometry.surface import vertex_normals
 
-    points = np.asfortranarray(x + OFF * vertex_normals(x, faces))
+    points = np.asfortranarray(x + OFFSET * vertex_normals(x, faces))
     return np.asarray(igl.fast_winding_number(np.asfortranarray(x), faces, points)).ravel() > 0.5

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from benchmarks.metric import RollOut
 
 Floats = NDArray[np.float64]
-AT_ONCE = 32  # frames
+BLOCK_FRAMES = 32  # frames
 FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 METRICS = (
@@ -67,9 +67,9 @@ METRICS = (
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return the mean curvature and the change of wrinkles over the evaluated frames."""
     judged = roll_out.kept(series_of).part(roll_out.judged)
-    found = {"curvature/mean": float(judged.means().mean())}
+    values = {"curvature/mean": float(judged.means().mean())}
     change = curvature_change(judged)
-    return found if change is None else found | {"curvature/change": change}
+    return values if change is None else values | {"curvature/change": change}
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
@@ -177,7 +177,9 @@ class CurvatureSeries:
 
 def curvature_series(positions: Floats, faces: NDArray[np.int64]) -> CurvatureSeries:
     """Return curvature and areas of every frame of positions (T,V,3) [m]."""
-    blocks = [positions[first : first + AT_ONCE] for first in range(0, max(len(positions), 1), AT_ONCE)]
+    blocks = [
+        positions[first : first + BLOCK_FRAMES] for first in range(0, max(len(positions), 1), BLOCK_FRAMES)
+    ]
     curvature, area = map(np.concatenate, zip(*(mean_curvature(block, faces) for block in blocks)))
     area[:, boundary_mask(faces, positions.shape[1])] = 0.0
     return CurvatureSeries(curvature, area)

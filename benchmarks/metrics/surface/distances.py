@@ -70,19 +70,19 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
     if scene.obstacle is None:
         return {}
-    own = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
+    part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
     inside = inside_of(roll_out)
     depth = inside.depth[judged]
-    found = {
+    values = {
         "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
         "penetration/deep": 100.0 * float((depth > DEEP).mean()),
         "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
-        "penetration/own_part_p999": MM * float(np.percentile(own, 99.9)),
+        "penetration/own_part_p999": MM * float(np.percentile(part_depth, 99.9)),
     }
     if scene.dressed is not None and scene.origin_heights is not None:
         heights = scene.origin_heights[: len(x)][judged]
-        found["drift/hem"] = MM * hem_drift(x[judged], scene.dressed.garment.hem, heights)
-    return found
+        values["drift/hem"] = MM * hem_drift(x[judged], scene.dressed.garment.hem, heights)
+    return values
 
 
 def inside_of(roll_out: RollOut) -> Penetration:

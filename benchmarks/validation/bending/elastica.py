@@ -66,7 +66,7 @@ def tip(cloth: Cloth) -> np.ndarray:
 
 
 @cache
-def reference(weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
+def exact_elastica(weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
     """Integrate the elastica of length 1 under its weight and a force at its end: s (n,), (x, drop) (2, n).
 
     theta, downwards, obeys theta'' = -(weight (1 - s) + load) cos theta, theta(0) = 0, theta'(1) = 0; weight
@@ -105,7 +105,7 @@ def bent_strip(family: str, weight: float, load: float) -> tuple[np.ndarray, np.
         share = cloth.vertex_areas[end] / cloth.vertex_areas[end].sum()
         forces[end, 1] = -load * made.D * made.width * share
         energies.append(DeadLoad(cloth, forces))
-    s, (x, drop) = reference(weight, load)
+    s, (x, drop) = exact_elastica(weight, load)
     rest = cloth.rest_positions
     guess = rest.copy()  # on the elastica: near the answer, not it
     free = rest[:, 0] > made.cell
@@ -119,26 +119,26 @@ def bent_strip(family: str, weight: float, load: float) -> tuple[np.ndarray, np.
 
 
 def heavy(gamma: float) -> float:
-    """Return the distance of the tip to the elastica's under weight, over the length: worst of four families."""
-    return max(_miss(family, gamma, 0.0) for family in SYMMETRIC)
+    """Return the tip's distance to the elastica under weight, over its length, worst of four families."""
+    return max(_tip_distance(family, gamma, 0.0) for family in SYMMETRIC)
 
 
 def end_loaded(load: float) -> float:
     """Return the distance of the tip to the elastica's under a force at the end, worst of four families."""
-    return max(_miss(family, 0.0, load) for family in SYMMETRIC)
+    return max(_tip_distance(family, 0.0, load) for family in SYMMETRIC)
 
 
 def one_sided_diagonals(gamma: float) -> float:
     """Return the tip's distance where all diagonals lean one way: such a strip twists, no elastica."""
-    return _miss("right", gamma, 0.0)
+    return _tip_distance("right", gamma, 0.0)
 
 
-def _miss(family: str, weight: float, load: float) -> float:
+def _tip_distance(family: str, weight: float, load: float) -> float:
     ours, exact = bent_strip(family, weight, load)
     return float(np.linalg.norm(ours - exact))
 
 
 def stiffness_spread(scaling: str) -> float:
     """Return the largest over the smallest D of the five families at one k."""
-    found = [strip(family, scaling).D for family in FAMILIES]
-    return max(found) / min(found)
+    stiffnesses = [strip(family, scaling).D for family in FAMILIES]
+    return max(stiffnesses) / min(stiffnesses)

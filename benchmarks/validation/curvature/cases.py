@@ -6,10 +6,10 @@ from benchmarks.validation.case import known_answer
 
 ORDERS = (
     *(
-        known_answer(f"curvature_{surface}_order", f"order in h of mean curvature on {words}, worst vertex",
+        known_answer(f"curvature_{surface}_order", f"order in h of mean curvature on {title}, worst vertex",
             "curvature.known_surfaces", f"{surface}_order", expected=2.0, tolerance=0.1,
             reason="mixed Voronoi areas are second order there")
-        for surface, words in (
+        for surface, title in (
             ("sphere", "a band of a sphere"), ("cylinder", "a cylinder, oblique triangles"),
             ("torus", "a torus"),
         )

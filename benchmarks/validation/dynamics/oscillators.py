@@ -79,11 +79,11 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
     """
     dt, amplitude = 1 / 30, 1e-5 * HEIGHT
     # omega^2 = 2 A (lambda/2 + mu)/(m h^2): made to fit by the step instead of the length.
-    own = np.sqrt(2 * RIGIDITY / MASS) / HEIGHT
-    dt_here = dt * frequency / own
-    path = _simulated_pendulum(np.array([HEIGHT + amplitude, 0.0]), dt_here, 31, gravity=0.0)[:, 0] - HEIGHT
-    velocity = np.diff(path)[-1] / dt_here
-    left = np.hypot(path[-1], velocity / own) / amplitude
+    natural = np.sqrt(2 * RIGIDITY / MASS) / HEIGHT
+    fitted_dt = dt * frequency / natural
+    path = _simulated_pendulum(np.array([HEIGHT + amplitude, 0.0]), fitted_dt, 31, gravity=0.0)[:, 0] - HEIGHT
+    velocity = np.diff(path)[-1] / fitted_dt
+    left = np.hypot(path[-1], velocity / natural) / amplitude
     return float(left), float((1 + (frequency * dt) ** 2) ** -15)
 
 

@@ -59,8 +59,8 @@ class MovingBall(RoundBody):
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Return tangent planes below points (S, 3) [m] in a frame."""
         centre = np.array([0.0, self.heights[min(frame, len(self.heights) - 1)], 0.0])
-        found = super().planes(points - centre, frame)
-        return Planes(found.points + centre, found.normals, found.faces, found.barycentric)
+        tangent = super().planes(points - centre, frame)
+        return Planes(tangent.points + centre, tangent.normals, tangent.faces, tangent.barycentric)
 
 
 def pressed_order() -> float:

@@ -49,8 +49,8 @@ class TurningDrum(RoundBody):
 
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Return tangent planes below points (S, 3) [m], with places on the turning skin."""
-        found = super().planes(points, frame)
-        return Planes(found.points, found.normals, found.faces, found.points @ self.at(frame).T)
+        tangent = super().planes(points, frame)
+        return Planes(tangent.points, tangent.normals, tangent.faces, tangent.points @ self.at(frame).T)
 
 
 def ratio(mu: float, stiffness: float = HARD) -> float:

@@ -110,6 +110,6 @@ def _pulled_strip() -> tuple[np.ndarray, np.ndarray]:
     x = slid(cloth, rest, frames=31, dt=dt, speed=1e-4 * step[0] / dt, pull=step, quasi_static=True)
     strain, pins = StretchStVK(cloth), cloth.pins
     # A pinned vertex slides too: the friction of its half of a cell is pulled as well.
-    own = MU * cloth.masses[pins].sum() * GRAVITY
-    pulls = np.array([strain.value_and_gradient(frame)[1][pins, 0].sum() + own for frame in x[1:]])
+    pin_friction = MU * cloth.masses[pins].sum() * GRAVITY
+    pulls = np.array([strain.value_and_gradient(frame)[1][pins, 0].sum() + pin_friction for frame in x[1:]])
     return x[1:, pins[0], 0] - LENGTH, pulls / (MU * cloth.masses.sum() * GRAVITY)

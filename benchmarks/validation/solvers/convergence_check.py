@@ -19,7 +19,9 @@ from benchmarks.validation.case import Measurement
 from reference_sim import Potential, Result, minimise
 from reference_sim.energies import BendHinge, Energy
 
-TOLERANCE = 1e-6  # of the relative residual: largest gradient component over the mean weight of a vertex
+RELATIVE_RESIDUAL = (
+    1e-6  # of the relative residual: largest gradient component over the mean weight of a vertex
+)
 ROUND_OFF = 1e-2  # relative residual that round-off may at most excuse
 RISE_ROUND_OFF = 1e-12  # of the sum of the terms' sizes, within the step
 EVALUATION_ROUND_OFF = 1e-6  # of the same: what two evaluations may differ by before the larger one is a rise
@@ -57,7 +59,9 @@ class CheckedResult(Measurement):
 def solve_and_check(step: StressStep, solve: Callable[..., Result] = minimise) -> CheckedResult:
     """Minimise, keep the points on the way, and check the result."""
     kept: list[np.ndarray] = []
-    result = solve(step.potential, step.guess, tolerance=TOLERANCE, timeout=TIMEOUT, observe=kept.append)
+    result = solve(
+        step.potential, step.guess, tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT, observe=kept.append
+    )
     return check_result(step, result, kept)
 
 
@@ -83,24 +87,24 @@ def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = 
         return checked(None, "failed", "pinned vertices moved")
     if status == "diverged" and not np.isfinite(energy_of(step.potential, step.guess)[0]):
         return checked(None, status, result.reason)
-    found = optimality_of(step, x)
-    if not np.isfinite(found.residual):
+    optimum = optimality_of(step, x)
+    if not np.isfinite(optimum.residual):
         return checked(None, "failed", f"a gradient that is not finite is called {result.status}")
     rise = first_rise(step.potential, [step.guess, *kept, x])
     if rise:
-        return checked(found.residual, "failed", rise)
+        return checked(optimum.residual, "failed", rise)
     if status != "ok":
         count = "" if result.status == "max_iterations" else f" ({result.iterations} iterations)"
         reason = f"{result.reason}{count}{collapse_reason(step.potential, x)}"
-        return checked(found.residual, status, reason)
-    if found.residual > max(TOLERANCE, found.round_off):
-        claim = f"claims convergence at a relative residual of {found.residual:.3g}"
-        return checked(found.residual, "failed", claim)
-    if found.lowest_curvature < -found.zero_curvature:
-        claim = f"claims convergence on a saddle: curvature {found.lowest_curvature:.3g} N/m"
-        return checked(found.residual, "failed", claim)
-    excused = "; tolerance at round-off" if found.residual > TOLERANCE else ""
-    return checked(found.residual, "ok", f"{result.iterations} iterations{excused}")
+        return checked(optimum.residual, status, reason)
+    if optimum.residual > max(RELATIVE_RESIDUAL, optimum.round_off):
+        claim = f"claims convergence at a relative residual of {optimum.residual:.3g}"
+        return checked(optimum.residual, "failed", claim)
+    if optimum.lowest_curvature < -optimum.zero_curvature:
+        claim = f"claims convergence on a saddle: curvature {optimum.lowest_curvature:.3g} N/m"
+        return checked(optimum.residual, "failed", claim)
+    excused = "; tolerance at round-off" if optimum.residual > RELATIVE_RESIDUAL else ""
+    return checked(optimum.residual, "ok", f"{result.iterations} iterations{excused}")
 
 
 def energy_of(potential: Potential, x: np.ndarray) -> tuple[float, float]:
@@ -117,12 +121,14 @@ def first_rise(potential: Potential, points: Sequence[np.ndarray]) -> str:
     there the definition and the solver's kernels differ, and a rise within that difference is none that
     anybody could tell.
     """
-    found = [
+    evaluations = [
         (*energy_of(potential, x), potential.value(x), undetermined_energy(potential, x)) for x in points
     ]
-    for k, ((before, size, value, here), (after, _, next_value, there)) in enumerate(pairwise(found)):
+    for k, ((before, size, value, undetermined), (after, _, next_value, next_undetermined)) in enumerate(
+        pairwise(evaluations)
+    ):
         difference = abs(before - value) + abs(after - next_value)
-        unsure = min(difference, EVALUATION_ROUND_OFF * size + here + there)
+        unsure = min(difference, EVALUATION_ROUND_OFF * size + undetermined + next_undetermined)
         if not after <= before + RISE_ROUND_OFF * size + unsure:
             return f"the energy rose from {before:.17g} to {after:.17g} J at step {k}"
     return ""
@@ -159,21 +165,21 @@ def collapse_reason(potential: Potential, x: np.ndarray) -> str:
     if "bending" not in names:
         return ""
     lost = int((areas(potential, x) < COLLAPSED * potential.cloth.areas).sum())
-    words = ""
+    text = ""
     if lost:
         plural = "s have" if lost > 1 else " has"
-        words = (
+        text = (
             f"; {lost} triangle{plural} collapsed, where a hinge's energy jumps: no minimum need exist, "
             "and the area barrier prevents it"
         )
     cost, gain = collapse_energies(potential)
     if "area_barrier" not in names and (gain > cost).any():
         face = int(np.argmax(gain - cost))
-        words += (
+        text += (
             f"; collapse pays: it costs a triangle at most (lambda + mu)/2 A = {cost[face]:.2g} J and frees "
             f"its hinges of up to sum k pi^2/2 = {gain[face]:.2g} J"
         )
-    return words
+    return text
 
 
 def collapse_energies(potential: Potential) -> tuple[np.ndarray, np.ndarray]:
@@ -193,7 +199,7 @@ def collapse_energies(potential: Potential) -> tuple[np.ndarray, np.ndarray]:
 
 
 @dataclass(frozen=True)
-class Optimality:
+class OptimalityCheck:
     """Residual and curvature at a point.
 
     residual, round_off: relative residual, and what round-off does to it [1]. lowest_curvature: smallest
@@ -206,7 +212,7 @@ class Optimality:
     zero_curvature: float
 
 
-def optimality_of(step: StressStep, x: np.ndarray) -> Optimality:
+def optimality_of(step: StressStep, x: np.ndarray) -> OptimalityCheck:
     """Compute gradient and curvature at x (V, 3) over the free vertices."""
     potential = step.potential
     free = np.setdiff1d(np.arange(len(x)), step.pins)
@@ -218,14 +224,14 @@ def optimality_of(step: StressStep, x: np.ndarray) -> Optimality:
     places = (3 * free[:, None] + np.arange(3)).ravel()
     hessian = hessian[np.ix_(places, places)]
     if not np.isfinite(hessian).all():
-        return Optimality(residual, 0.0, float("-inf"), 0.0)
+        return OptimalityCheck(residual, 0.0, float("-inf"), 0.0)
     values = np.linalg.eigvalsh(hessian)
     stiffest = float(np.abs(np.diagonal(hessian)).max())
     round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(x).max()) / step.weight
     width = float(np.sqrt(potential.cloth.areas.sum()))
     # Round-off of the eigenvalues, or a curvature that gains less than the tolerance over the sheet's width.
-    zero = max(2e-13 * float(np.abs(values).max()), 2 * TOLERANCE * step.weight / width)
-    return Optimality(residual, min(round_off, ROUND_OFF), float(values[0]), zero)
+    zero = max(2e-13 * float(np.abs(values).max()), 2 * RELATIVE_RESIDUAL * step.weight / width)
+    return OptimalityCheck(residual, min(round_off, ROUND_OFF), float(values[0]), zero)
 
 
 def dense_hessian(energies: Sequence[Energy], x: np.ndarray) -> np.ndarray:

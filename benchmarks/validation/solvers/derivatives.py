@@ -50,11 +50,11 @@ def _error(
     function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, d: np.ndarray, claimed: np.ndarray
 ) -> float:
     at = [function(x + steps * STEP * d) for steps in (-2, -1, 1, 2)]
-    found = sum(weight * value for weight, value in zip(WEIGHTS, at)) / STEP
-    size = float(np.linalg.norm(found))
+    difference = sum(weight * value for weight, value in zip(WEIGHTS, at)) / STEP
+    size = float(np.linalg.norm(difference))
     if size < 1e-9:
         raise RuntimeError("a derivative of nothing proves nothing")
-    return float(np.linalg.norm(claimed - found)) / size
+    return float(np.linalg.norm(claimed - difference)) / size
 
 
 def _directions(x: np.ndarray) -> np.ndarray:

@@ -41,8 +41,8 @@ MARGIN = 4e-3  # [m] of the contact penalty
 
 
 def solve_sheet(**options: Any) -> CheckedResult:
-    """Solve the step of a sheet as a simulation does, and check it; options: see `sheet`."""
-    return solve_and_check(sheet(**options), lbfgs_then_newton)
+    """Solve the step of a sheet as a simulation does, and check it; options: see `sheet_step`."""
+    return solve_and_check(sheet_step(**options), lbfgs_then_newton)
 
 
 def sheet_iterations(**options: Any) -> Measurement:
@@ -53,11 +53,11 @@ def sheet_iterations(**options: Any) -> Measurement:
 @cache
 def warm_up() -> None:
     """Compile the kernels of all steps, however long that takes."""
-    step = sheet(body="ball", terms="membrane+bending+area")
+    step = sheet_step(body="ball", terms="membrane+bending+area")
     check_result(step, lbfgs_then_newton(step.potential, step.guess))
 
 
-def sheet(
+def sheet_step(
     *,
     stiffness: float = 1.0,
     bending: float = 1.0,

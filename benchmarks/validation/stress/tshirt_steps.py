@@ -31,8 +31,8 @@ SHOULDERS = {"left_shoulder": -1.0, "right_shoulder": 1.0}
 
 
 def solve_shirt(**options: Any) -> CheckedResult:
-    """Solve the step of the shirt as a simulation does, and check it; options: see `shirt`."""
-    return solve_and_check(shirt(**options), lbfgs_then_newton)
+    """Solve the step of the shirt as a simulation does, and check it; options: see `shirt_step`."""
+    return solve_and_check(shirt_step(**options), lbfgs_then_newton)
 
 
 def shirt_iterations(**options: Any) -> Measurement:
@@ -40,7 +40,7 @@ def shirt_iterations(**options: Any) -> Measurement:
     return solve_shirt(**options).counted
 
 
-def shirt(
+def shirt_step(
     *,
     stiffness: float = 1.0,
     gravity: float = 1.0,

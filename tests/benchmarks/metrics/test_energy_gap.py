@@ -18,7 +18,7 @@ from benchmarks.methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.energies import energy_gap as module
 from benchmarks.metrics.energies import replayed_step
-from benchmarks.metrics.energies.energy_gap import FINDERS, gap_scale, optimality, spread
+from benchmarks.metrics.energies.energy_gap import FINDERS, gap_scale, optimality, spread_evenly
 from benchmarks.metrics.energies.replayed_step import first_guess
 from benchmarks.metrics.surface.curvature import curvature_error, curvature_series
 from reference_sim import Potential, Trajectory, minimise, simulate
@@ -221,8 +221,8 @@ def test_every_judged_frame_counts_and_those_of_the_warm_up_do_not():
 
 
 def test_frames_are_sampled_evenly_and_until_the_mean_is_known(monkeypatch):
-    assert sorted(spread(range(3, 14))) == list(range(3, 14))
-    first = sorted(itertools.islice(spread(range(64)), 8))
+    assert sorted(spread_evenly(range(3, 14))) == list(range(3, 14))
+    first = sorted(itertools.islice(spread_evenly(range(64)), 8))
     assert first == list(range(0, 64, 8))
     scene = small_scene("hanging_sheet", cells=4)
     x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=40, start=scene.start, method="newton",

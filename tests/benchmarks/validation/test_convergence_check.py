@@ -15,7 +15,7 @@ from benchmarks.validation.solvers.convergence_check import (
     solve_and_check,
     undetermined_energy,
 )
-from benchmarks.validation.stress.sheet_steps import sheet
+from benchmarks.validation.stress.sheet_steps import sheet_step
 from reference_sim import Result, minimise
 from reference_sim.energies import StretchStVK
 
@@ -37,7 +37,7 @@ def held_by_hinges(cloth, face):
 @pytest.fixture(scope="module")
 def solved():
     """An ordinary step and its true answer."""
-    step = sheet()
+    step = sheet_step()
     return step, minimise(step.potential, step.guess, tolerance=1e-9)
 
 
@@ -58,14 +58,14 @@ def test_a_false_claim_of_a_small_gradient_is_found(solved):
 
 
 def test_a_saddle_called_converged_is_found():
-    step = sheet(start="point", terms="membrane", pins="none", speed=0.0, gravity=0.0)
+    step = sheet_step(start="point", terms="membrane", pins="none", speed=0.0, gravity=0.0)
     checked = check_result(step, claiming(step.guess))
     assert checked.status == "failed" and "saddle" in checked.reason and checked.value == 0.0
 
 
 def test_a_saddle_far_below_the_stiffness_of_the_membrane_is_found():
     """A flat sheet pressed by a hair: the curvature that makes it buckle is far below the membrane's own."""
-    cloth_step = sheet(gravity=0.0, speed=0.0, start="flat", dt=None, ratio=1e-8, pins="side")
+    cloth_step = sheet_step(gravity=0.0, speed=0.0, start="flat", dt=None, ratio=1e-8, pins="side")
     flat = cloth_step.guess * [0.99999, 1.0, 0.99999]
     flat[cloth_step.pins] = cloth_step.guess[cloth_step.pins]
     truth = optimality_of(cloth_step, flat)
@@ -109,30 +109,30 @@ def test_an_honest_failure_keeps_its_name_and_says_what_collapsed(solved):
     cut = minimise(step.potential, step.guess, max_iterations=2)
     checked = check_result(step, cut)
     assert checked.status == "stalled" and checked.value > 1e-6 and "gave up after 2" in checked.reason
-    crushed = sheet(start="a thousandth")
+    crushed = sheet_step(start="a thousandth")
     lost = check_result(crushed, claiming(crushed.guess, "stalled")).reason
     assert re.search(r"; 1\d\d triangles have collapsed", lost) and "area barrier" in lost
     assert "collapse pays" not in lost
-    nameless = solve_and_check(sheet(start="point", pins="none", speed=0.0))
+    nameless = solve_and_check(sheet_step(start="point", pins="none", speed=0.0))
     assert nameless.status == "diverged" and nameless.value is None and "not finite" in nameless.reason
 
 
 def test_where_collapse_pays_is_a_matter_of_two_numbers():
     """Of every case that does not converge for want of a minimum; the ordinary sheet is far from it."""
     for options in ({"stiffness": 1e-2}, {"terms": "bending"}, {"bending": 1e4}, {"bending": 100.0}):
-        cost, gain = collapse_energies(sheet(**options).potential)
+        cost, gain = collapse_energies(sheet_step(**options).potential)
         assert (gain > cost).any(), options
-    ordinary = sheet().potential
+    ordinary = sheet_step().potential
     cost, gain = collapse_energies(ordinary)
     assert (gain < 0.1 * cost).all()
     # A triangle in the middle of the sheet has three hinges, and a membrane of lambda + mu over 2 per area.
     assert gain[60] == pytest.approx(held_by_hinges(ordinary.cloth, ordinary.cloth.faces[60]))
-    printed = collapse_energies(sheet(scaling="none").potential)[1]
+    printed = collapse_energies(sheet_step(scaling="none").potential)[1]
     assert printed.max() == pytest.approx(3 * 0.5 * 3.96e-5 * np.pi**2)
     assert cost.sum() == pytest.approx(0.5 * (20.864 + 11.077) * 0.16, rel=1e-3)
-    soft = sheet(stiffness=1e-3)
+    soft = sheet_step(stiffness=1e-3)
     assert "collapse pays" in check_result(soft, claiming(soft.guess, "stalled")).reason
-    barrier = sheet(stiffness=1e-3, terms="membrane+bending+area")
+    barrier = sheet_step(stiffness=1e-3, terms="membrane+bending+area")
     assert "collapse pays" not in check_result(barrier, claiming(barrier.guess, "stalled")).reason
 
 
@@ -173,7 +173,7 @@ def test_the_check_uses_no_kernel(solved, monkeypatch):
 def test_a_minimiser_that_lies_is_caught_by_what_the_suite_runs(solved):
     """The same way that a case goes, with fakes in the place of the solver."""
     step, _ = solved
-    point = sheet(start="point", terms="membrane", pins="none", speed=0.0, gravity=0.0)
+    point = sheet_step(start="point", terms="membrane", pins="none", speed=0.0, gravity=0.0)
 
     def standing(potential, x0, *, tolerance, timeout, observe):
         observe(x0)

@@ -12,7 +12,7 @@ from benchmarks.meshes import sphere, square_sheet
 from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import of_garment
-from benchmarks.scenes.long_motion import there_and_back
+from benchmarks.scenes.long_motion import repeated_there_and_back
 from benchmarks.scenes.out_of_distribution import faster
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
@@ -283,7 +283,7 @@ def roll_out(scene: BuiltScene, obstacle: Obstacle, **options) -> np.ndarray:
 def test_no_limb_is_lost_in_hard_and_long_motions(name, times):
     """Four times as fast; or there and back for 1,000 frames: depths and distances beside exact planes."""
     motion = make_motion(name)
-    motion = there_and_back(motion) if times == 1000 else faster(motion, times)
+    motion = repeated_there_and_back(motion) if times == 1000 else faster(motion, times)
     scene = dressed_in_motion(motion)
     assert scene.obstacle is not None
     exact = roll_out(scene, scene.obstacle, method="lbfgs", finish=False)

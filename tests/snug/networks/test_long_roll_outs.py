@@ -53,7 +53,7 @@ def rolled(scene, models, name):
 @pytest.mark.parametrize("frames", [5, 20, 77, 150])
 def test_the_last_hundred_frames_show_the_motion_of_the_first(frames):
     motion = swaying(frames)
-    long = long_motion.there_and_back(motion)
+    long = long_motion.repeated_there_and_back(motion)
     assert FRAMES <= long.frames < FRAMES + 2 * frames
     assert np.array_equal(long.poses[-ENDS:], long.poses[:ENDS])
     assert np.array_equal(long.translations[-ENDS:], long.translations[:ENDS])
@@ -85,7 +85,7 @@ def test_the_frames_that_are_kept_are_those_of_the_whole_roll_out(tmp_path):
     model = untrained_model("snug", dressed, [motion], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
     trajectory, _ = rolled(scene, tmp_path, "snug")
-    whole = roll_out(model, dressed, long_motion.there_and_back(motion))
+    whole = roll_out(model, dressed, long_motion.repeated_there_and_back(motion))
     assert np.array_equal(trajectory.positions[:ENDS], whole.positions[:ENDS])
     assert np.array_equal(trajectory.positions[ENDS:], whole.positions[-ENDS:])
     assert np.array_equal(trajectory.times[ENDS:], whole.times[-ENDS:])
