@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
+from reference_sim.assembly.hessian_pattern import HessianPattern
 from reference_sim.energies.energy import Energy, Step
-
-if TYPE_CHECKING:
-    from reference_sim.assembly.hessian_pattern import HessianPattern
 
 
 class Potential:
@@ -126,10 +123,6 @@ class Potential:
 
     def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
         """Return the pattern over the free vertices (V,): of the Hessian, or (block=1) scalar stiffness."""
-        from reference_sim.assembly.hessian_pattern import (
-            HessianPattern,  # loads numba, which a command's --help can do without
-        )
-
         key = (np.packbits(free).tobytes(), block)
         if key not in self._patterns:
             terms = [e for e in self.energies if block == 3 or e.has_scalar_stiffness]

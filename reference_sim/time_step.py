@@ -11,6 +11,7 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
+from reference_sim.energies.inertia import Inertia
 from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise.methods import Minimiser, make_minimiser
 from reference_sim.minimise.result import Result
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
 GUESSES = ("previous", "extrapolated", "body_transported")
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
-LEAST_GAIN = 2e-3  # of that way, by three of them together; less is no way
-PART = 0.8  # of the way to the next touch: closer, a barrier grows stiff
+LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
+APPROACH_SHARE = 0.8  # of the way to the next touch: closer, a barrier grows stiff
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +74,6 @@ class TimeStepper:
         refreeze: int = 0,
         options: dict[str, Any],
     ) -> None:
-        from reference_sim.energies.inertia import Inertia  # not loaded for a static problem
-
         if guess is None:
             guess = "extrapolated" if obstacle is None else "body_transported"
         if guess not in GUESSES or (guess == "body_transported" and obstacle is None):
@@ -202,7 +201,7 @@ class TimeStepper:
                     potential.set_progress(1.0)
                     return self.minimiser.minimise(goal)
                 if share >= max(shares, default=0.0):
-                    part = PART * share
+                    part = APPROACH_SHARE * share
                     x, progress = x + part * (goal - x), progress + part * (1 - progress)
                 shares.append(share)
             potential.set_progress(progress)
@@ -210,7 +209,7 @@ class TimeStepper:
             goal = x + (1 - progress) * motion
             goal[pins] = guess[pins]
             reached.append(progress)
-            if progress - reached[max(len(reached) - 4, 0)] < LEAST_GAIN and len(reached) > 3:
+            if progress - reached[max(len(reached) - 4, 0)] < LEAST_APPROACH and len(reached) > 3:
                 break
         result = self.minimiser.minimise(x)
         if result.status == "diverged":

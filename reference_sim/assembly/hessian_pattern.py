@@ -14,7 +14,9 @@ from reference_sim.energies.energy import Energy
 from reference_sim.kernels.block_indices import BlockPlaces
 from reference_sim.kernels.kernel_cache import njit
 
-SPARE = 3  # a wider pattern keeps up to this many times the blocks that dynamic terms need at the moment
+SPARE_BLOCKS = (
+    3  # a wider pattern keeps up to this many times the blocks that dynamic terms need at the moment
+)
 
 
 class HessianPattern:
@@ -91,7 +93,7 @@ class HessianPattern:
         """Return this pattern, or a wider one if the matrices couple vertices that have no block here.
 
         A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis each
-        time, until more than SPARE times the needed ones are kept.
+        time, until more than SPARE_BLOCKS times the needed ones are kept.
         """
         if not changing:
             return self
@@ -100,7 +102,9 @@ class HessianPattern:
         if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
             return self
         kept = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
-        return self._fixed._widened(np.union1d(kept, needed) if len(kept) < SPARE * len(needed) else needed)
+        return self._fixed._widened(
+            np.union1d(kept, needed) if len(kept) < SPARE_BLOCKS * len(needed) else needed
+        )
 
     def _widened(self, extra: np.ndarray) -> HessianPattern:
         wider = copy.copy(self)

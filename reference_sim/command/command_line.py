@@ -10,7 +10,7 @@ from typing import Any, NoReturn, ParamSpec
 
 from reference_sim.files.atomic_files import disk_full
 
-BAD_INPUT, NO_ROOM, INTERRUPTED = 2, 1, 130  # exit status
+BAD_INPUT, DISK_FULL, INTERRUPTED = 2, 1, 130  # exit status
 Given = ParamSpec("Given")
 
 
@@ -57,7 +57,7 @@ def command(
                 return main(*arguments, **named)
             except refused as error:
                 full = disk_full(error)
-                problem, status = full or str(error), NO_ROOM if full else BAD_INPUT
+                problem, status = full or str(error), DISK_FULL if full else BAD_INPUT
                 remedy = goes_on if full else ""
             except KeyboardInterrupt:
                 problem, status, remedy = "interrupted", INTERRUPTED, goes_on or "nothing was written"

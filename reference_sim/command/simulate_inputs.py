@@ -12,17 +12,17 @@ from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.mesh_files import METRES, read_mesh, read_sequence, to_metres_y_up
 from reference_sim.files.uv_chart import join_seams, rest_chart
 from reference_sim.material import Material
-from reference_sim.trajectory.trajectory import SUFFIXES, Trajectory
+from reference_sim.trajectory.trajectory import TRAJECTORY_SUFFIXES, Trajectory
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from reference_sim.obstacle import Obstacle
 
-FAR = 1.0  # [m] from which garment and obstacle hardly belong together
+FAR_FROM_OBSTACLE = 1.0  # [m] from which garment and obstacle hardly belong together
 
 
-class InputError(ValueError):
+class BadInput(ValueError):
     """Bad input, in one line that names file, element and remedy."""
 
 
@@ -47,7 +47,7 @@ def read_cloth(options: Namespace) -> Cloth:
         try:
             chart = rest_chart(surface, options.uv_scale or METRES[options.units])
         except MeshError as error:
-            raise InputError(f"{options.garment}: {error}") from None
+            raise BadInput(f"{options.garment}: {error}") from None
     if surface.quads:
         print_note(f"{options.garment}: {surface.quads} quads cut into triangles")
     if options.up == "z":
@@ -56,11 +56,11 @@ def read_cloth(options: Namespace) -> Cloth:
     if not 0.02 < size < 20:
         print_note(f"{options.garment} measures {size:.3g} m: is --units {options.units} right?")
     if len(pins) == len(positions):
-        raise InputError(f"--pins {options.pins!r} holds every vertex of {options.garment}: choose fewer")
+        raise BadInput(f"--pins {options.pins!r} holds every vertex of {options.garment}: choose fewer")
     try:
         return Cloth(positions, surface.faces, material, pins=pins, rest_uv=chart)
     except MeshError as error:
-        raise InputError(f"{options.garment}: {error}") from None
+        raise BadInput(f"{options.garment}: {error}") from None
 
 
 def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
@@ -70,7 +70,7 @@ def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
     is a box, comparisons joined by commas.
 
     Raises:
-        InputError: not understood, an index out of range, or nothing chosen.
+        BadInput: not understood, an index out of range, or nothing chosen.
     """
     if which is None:
         return np.zeros(0, dtype=np.int64)
@@ -81,7 +81,7 @@ def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
     if all(re.fullmatch(r"\d+", part) for part in parts):
         indices = np.array([int(part) for part in parts])
         if indices.max() >= len(positions):
-            raise InputError(f"--pins {indices.max()}: the garment has vertices 0..{len(positions) - 1}")
+            raise BadInput(f"--pins {indices.max()}: the garment has vertices 0..{len(positions) - 1}")
         return indices
     chosen = np.ones(len(positions), dtype=bool)
     for part in parts:
@@ -90,16 +90,12 @@ def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
             axis, sign, bound = match.groups()  # type: ignore[union-attr]
             value = float(bound)
         except (AttributeError, ValueError):
-            raise InputError(
-                f"--pins {which!r}: give indices, 'top', or a box such as 'y>1.4,x<0.1'"
-            ) from None
+            raise BadInput(f"--pins {which!r}: give indices, 'top', or a box such as 'y>1.4,x<0.1'") from None
         along = positions[:, "xyz".index(axis)]
         chosen &= along >= value if sign == ">" else along <= value
     if not chosen.any():
         low, high = positions.min(axis=0).round(3).tolist(), positions.max(axis=0).round(3).tolist()
-        raise InputError(
-            f"--pins {which!r}: no vertex in this box; the garment spans {low} to {high} m, y up"
-        )
+        raise BadInput(f"--pins {which!r}: no vertex in this box; the garment spans {low} to {high} m, y up")
     return np.flatnonzero(chosen)
 
 
@@ -114,7 +110,7 @@ def read_obstacle(cloth: Cloth, options: Namespace) -> tuple[Obstacle | None, fl
     from reference_sim.obstacle import Obstacle  # its search for contact serves no cloth that meets nothing
 
     axes = {"units": options.units, "up": options.up}
-    if options.obstacle.lower().endswith(SUFFIXES):
+    if options.obstacle.lower().endswith(TRAJECTORY_SUFFIXES):
         moving = Trajectory.load(options.obstacle)
         positions, faces = moving.positions, moving.faces
         dt = moving.dt if moving.frames > 1 else None
@@ -125,16 +121,16 @@ def read_obstacle(cloth: Cloth, options: Namespace) -> tuple[Obstacle | None, fl
     if options.obstacle_rest:
         rest_surface = read_mesh(options.obstacle_rest)
         if rest_surface.faces.shape != faces.shape or (rest_surface.faces != faces).any():
-            raise InputError(
+            raise BadInput(
                 f"{options.obstacle_rest}: other faces than {options.obstacle}: export both from one mesh"
             )
         rest = to_metres_y_up(rest_surface.positions, **axes)
     try:
         obstacle = Obstacle(positions, faces, rest_positions=rest, region=options.region)
     except MeshError as error:
-        raise InputError(f"{options.obstacle}: {error}") from None
+        raise BadInput(f"{options.obstacle}: {error}") from None
     distance = obstacle.signed_distance(cloth.rest_positions, 0)
-    if distance.min() > FAR:
+    if distance.min() > FAR_FROM_OBSTACLE:
         print_note(f"the garment starts {distance.min():.2g} m from the obstacle: same units and up axis?")
     elif (inside := distance < 0).any():
         print_note(

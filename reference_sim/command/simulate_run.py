@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reference_sim.command.simulate_inputs import InputError, print_note, read_cloth, read_obstacle
+from reference_sim.command.simulate_inputs import BadInput, print_note, read_cloth, read_obstacle
 from reference_sim.command.simulate_options import DEFAULT_DT, DEFAULT_FRAMES
 from reference_sim.command.simulate_terms import check_terms, make_terms
 from reference_sim.command.summary import predict_stretch, summarise
 from reference_sim.files.mesh_files import mesh_paths
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory.point_cache import write_point_cache
-from reference_sim.trajectory.trajectory import SUFFIXES
+from reference_sim.trajectory.trajectory import TRAJECTORY_SUFFIXES
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -29,7 +29,7 @@ def simulate_files(options: Namespace) -> int:
     """
     _check_paths(options)
     if options.uv_scale and options.rest != "uv":
-        raise InputError(f"--uv-scale {options.uv_scale:g} is for a rest shape from UV: add --rest uv")
+        raise BadInput(f"--uv-scale {options.uv_scale:g} is for a rest shape from UV: add --rest uv")
     check_terms(options)
     cloth = read_cloth(options)
     obstacle, obstacle_dt = read_obstacle(cloth, options)
@@ -72,22 +72,22 @@ def simulate_files(options: Namespace) -> int:
 
 def _check_paths(options: Namespace) -> None:
     """Refuse what could not be written, or would destroy an input, before any work."""
-    if options.output.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{options.output}: the trajectory ends in .vtkhdf")
+    if options.output.suffix.lower() not in TRAJECTORY_SUFFIXES:
+        raise BadInput(f"{options.output}: the trajectory ends in .vtkhdf")
     if options.output.exists() and not (options.resume or options.overwrite):
-        raise InputError(f"{options.output} exists: add --resume to go on with it, --overwrite to replace it")
+        raise BadInput(f"{options.output} exists: add --resume to go on with it, --overwrite to replace it")
     outputs = [options.output]
     if options.pc2:
         if options.pc2.suffix.lower() != ".pc2":
-            raise InputError(f"{options.pc2}: a point cache ends in .pc2")
+            raise BadInput(f"{options.pc2}: a point cache ends in .pc2")
         outputs += [options.pc2, options.pc2.with_suffix(".obj")]
     inputs = [Path(p).resolve() for p in (options.garment, options.obstacle_rest) if p]
     if options.obstacle:
         inputs += [path.resolve() for path in mesh_paths(options.obstacle)]
     for path in outputs:
         if not path.parent.is_dir():
-            raise InputError(f"{path.parent}: no such folder to write {path.name} in")
+            raise BadInput(f"{path.parent}: no such folder to write {path.name} in")
         if path.resolve() in inputs:
-            raise InputError(f"{path} would replace an input: choose another name")
+            raise BadInput(f"{path} would replace an input: choose another name")
         if path != options.output and path.exists() and not (options.resume or options.overwrite):
-            raise InputError(f"{path} exists: add --overwrite to replace it")
+            raise BadInput(f"{path} exists: add --overwrite to replace it")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from reference_sim.cloth import Cloth
-from reference_sim.command.simulate_inputs import InputError
+from reference_sim.command.simulate_inputs import BadInput
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
@@ -21,24 +21,22 @@ BARRIER_FLAGS = ("barrier_distance", "barrier_stiffness")
 
 
 def check_terms(options: Namespace) -> None:
-    """Raise InputError where flags ask for what they cannot have, with the remedy."""
+    """Raise BadInput where flags ask for what they cannot have, with the remedy."""
     barrier = options.barrier or options.self_contact
     given = [name for name in PENALTY_FLAGS + BARRIER_FLAGS if getattr(options, name) is not None]
     penalty_only = [_flag(name) for name in given if name in PENALTY_FLAGS]
     barrier_only = [_flag(name) for name in given if name in BARRIER_FLAGS]
     if options.obstacle is None:
         if options.obstacle_rest or (options.friction and not options.self_contact):
-            raise InputError(
-                "--obstacle-rest and --friction need an --obstacle, or --friction --self-contact"
-            )
+            raise BadInput("--obstacle-rest and --friction need an --obstacle, or --friction --self-contact")
         if options.barrier:
-            raise InputError("--barrier needs an --obstacle; without one give --self-contact")
+            raise BadInput("--barrier needs an --obstacle; without one give --self-contact")
         if penalty_only:
-            raise InputError(f"{penalty_only[0]} needs an --obstacle")
+            raise BadInput(f"{penalty_only[0]} needs an --obstacle")
     if barrier and penalty_only:
-        raise InputError(f"{penalty_only[0]} belongs to the penalty, which a barrier replaces: leave it out")
+        raise BadInput(f"{penalty_only[0]} belongs to the penalty, which a barrier replaces: leave it out")
     if barrier_only and not barrier:
-        raise InputError(f"{barrier_only[0]} needs --barrier or --self-contact")
+        raise BadInput(f"{barrier_only[0]} needs --barrier or --self-contact")
 
 
 def make_terms(cloth: Cloth, options: Namespace) -> list[Energy]:

@@ -13,7 +13,7 @@ import numpy as np
 from reference_sim.geometry.triangle import closest_on_triangle
 from reference_sim.kernels.kernel_cache import njit
 
-SLACK = 0.001  # m: beyond the margin, and still followed
+WALK_SLACK = 0.001  # m: beyond the margin, and still followed
 CROSSINGS = 12  # sides that an anchor may cross at a time: some 15 cm
 
 

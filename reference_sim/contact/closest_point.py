@@ -23,8 +23,8 @@ from reference_sim.contact.closest_point_groups import search
 from reference_sim.geometry.triangle import SLIVER
 from reference_sim.kernels.kernel_cache import njit
 
-LEAF = 16  # faces in a leaf, at most
-HALVINGS = 6  # of the longest side, for samples that nothing is remembered of
+LEAF_SIZE = 16  # faces in a leaf, at most
+CELL_HALVINGS = 6  # of the longest side, for samples that nothing is remembered of
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def _halved(centroids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return faces in the order of the leaves (F,), and where each of L leaves begins, (L + 1,) with end."""
     count = len(centroids)
     order, starts = np.arange(count), np.array([0, count])
-    while np.diff(starts).max() > LEAF:
+    while np.diff(starts).max() > LEAF_SIZE:
         x = centroids[order]
         block = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         low, high = (ends.reduceat(x, starts[:-1], axis=0) for ends in (np.minimum, np.maximum))
@@ -142,8 +142,8 @@ def by_cells(points: np.ndarray) -> np.ndarray:
         return np.empty(0, np.int64)
     side = max(float(np.ptp(points, axis=0).max()), 1e-30)
     with np.errstate(invalid="ignore"):  # whoever asks for NaN gets some face
-        cells = ((points - points.min(axis=0)) / side * (2**HALVINGS - 1)).astype(np.int64)
-    bits, axes = np.arange(HALVINGS), np.arange(3)[:, None]
+        cells = ((points - points.min(axis=0)) / side * (2**CELL_HALVINGS - 1)).astype(np.int64)
+    bits, axes = np.arange(CELL_HALVINGS), np.arange(3)[:, None]
     return np.argsort((((cells[:, :, None] >> bits) & 1) << (3 * bits + axes)).sum(axis=(1, 2)))
 
 

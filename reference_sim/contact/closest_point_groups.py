@@ -12,9 +12,9 @@ import numpy as np
 from reference_sim.geometry.triangle import closest_on_triangle
 from reference_sim.kernels.kernel_cache import njit
 
-GROUP = 16  # samples; fewer share less of the way, more are farther apart
-FAST = {"nnan", "nsz", "reassoc"}  # for bounds alone, within ROUND_OFF
-ROUND_OFF = 1e-14  # of lengths: some fifty times that of float64
+GROUP_SIZE = 16  # samples; fewer share less of the way, more are farther apart
+BOUND_MATH = {"nnan", "nsz", "reassoc"}  # for bounds alone, within DISTANCE_ROUND_OFF
+DISTANCE_ROUND_OFF = 1e-14  # of lengths: some fifty times that of float64
 
 
 @njit(cache=True, error_model="numpy")
@@ -27,13 +27,13 @@ def search(
     faces (S,) come in as hints and go out as answers, -1 where no face lies within a finite reach (S,).
     """
     leaf_faces, v, w = np.empty(len(points), np.int64), np.empty(len(points)), np.empty(len(points))
-    missed = np.empty(GROUP, np.int64)
+    missed = np.empty(GROUP_SIZE, np.int64)
     scratch = (
-        np.empty((3, GROUP)), np.empty((3, GROUP)), np.empty((4, 3)), np.empty((GROUP, 2)),
-        np.empty((3, GROUP)), np.empty((2, GROUP), np.int64), np.empty(64, np.int64), np.empty(64),
+        np.empty((3, GROUP_SIZE)), np.empty((3, GROUP_SIZE)), np.empty((4, 3)), np.empty((GROUP_SIZE, 2)),
+        np.empty((3, GROUP_SIZE)), np.empty((2, GROUP_SIZE), np.int64), np.empty(64, np.int64), np.empty(64),
     )  # fmt: skip
-    for begin in range(0, len(sequence), GROUP):
-        members = sequence[begin : begin + GROUP]
+    for begin in range(0, len(sequence), GROUP_SIZE):
+        members = sequence[begin : begin + GROUP_SIZE]
         _descend(
             members, points, rest_points, region, exact, reach, corners, discs, centroids, boxes, rest_boxes,
             starts, order, place, faces, leaf_faces, v, w, scratch,
@@ -62,7 +62,7 @@ def _descend(
     members, points, rest_points, region, exact, reach, corners, discs, centroids, boxes, rest_boxes, starts,
     order, place, faces, leaf_faces, leaf_v, leaf_w, scratch,
 ):  # fmt: skip
-    """Find the closest allowed faces of at most GROUP members by one descent.
+    """Find the closest allowed faces of at most GROUP_SIZE members by one descent.
 
     Writes into leaf_faces (S,) the place of the face in the order of the leaves, -1 for none, and its
     weights.
@@ -73,12 +73,12 @@ def _descend(
     limit, inner, count, size = region * region, len(starts) - 2, len(members), 0.0
     for i in range(3):
         size += np.float64(boxes[0, 1, i]) - boxes[0, 0, i]
-        for g in range(GROUP):  # an incomplete group is filled up with its first member
+        for g in range(GROUP_SIZE):  # an incomplete group is filled up with its first member
             s = members[g if g < count else 0]
             x[i, g], rest[i, g] = points[s, i], rest_points[s, i]
         span[0, i], span[1, i] = _ends(x[i])
         span[2, i], span[3, i] = _ends(rest[i])
-    for g in range(GROUP):
+    for g in range(GROUP_SIZE):
         s = members[g if g < count else 0]
         best[g], answer[g], hint[g] = reach[s] * reach[s], -1, -1
         weights[g, 0] = weights[g, 1] = 0.0
@@ -162,12 +162,12 @@ def _apart(boxes, rest_boxes, node, span, limit):
     return apart if rest_apart <= limit else np.inf
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, fastmath=BOUND_MATH)
 def _box_distances(boxes, node, x, out):
     """Write the squared distances from the points of a group to a box."""
     l0, l1, l2 = np.float64(boxes[node, 0, 0]), np.float64(boxes[node, 0, 1]), np.float64(boxes[node, 0, 2])
     h0, h1, h2 = np.float64(boxes[node, 1, 0]), np.float64(boxes[node, 1, 1]), np.float64(boxes[node, 1, 2])
-    for g in range(GROUP):
+    for g in range(GROUP_SIZE):
         dx = max(max(l0 - x[0, g], x[0, g] - h0), 0.0)
         dy = max(max(l1 - x[1, g], x[1, g] - h1), 0.0)
         dz = max(max(l2 - x[2, g], x[2, g] - h2), 0.0)
@@ -199,5 +199,5 @@ def _useful(squared, size, exact):
     distance = np.sqrt(squared)
     if distance > exact:
         distance = max(exact, 0.5 * distance)
-    distance += ROUND_OFF * (distance + size)
+    distance += DISTANCE_ROUND_OFF * (distance + size)
     return distance * distance

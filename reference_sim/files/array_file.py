@@ -12,15 +12,15 @@ import warnings
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 
 LIMIT = 1 << 30  # [bytes] of all arrays that are read of a file together, unpacked
-PLAIN = "biufcSU"  # kinds of types: truths, numbers, text
+PLAIN_KINDS = "biufcSU"  # kinds of types: truths, numbers, text
 # Deflate packs at most so many bytes into one; plus the shortest block.
-MOST_PACKED, SHORTEST = 1032, 64
-BLOCK = 1 << 20
+MOST_PACKED, SHORTEST_DEFLATE = 1032, 64
+READ_SIZE = 1 << 20
 
 
 class ArrayFileError(ValueError):
@@ -104,14 +104,14 @@ def _check_member(info: zipfile.ZipInfo) -> None:
         raise ValueError("is encrypted")
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"is packed by method {info.compress_type}, only 0 and 8 (deflate) are read")
-    if info.file_size > MOST_PACKED * info.compress_size + SHORTEST:
+    if info.file_size > MOST_PACKED * info.compress_size + SHORTEST_DEFLATE:
         raise ValueError(f"declares {info.file_size} bytes packed into {info.compress_size}")
 
 
 def _array(stream: IO[bytes], length: int, limit: int) -> np.ndarray:
     """Read the array of a stream of `length` bytes; raise whatever its bytes make numpy or zipfile raise."""
     version = np.lib.format.read_magic(stream)
-    readers: dict[Any, Any] = {
+    readers = {
         (1, 0): np.lib.format.read_array_header_1_0,
         (2, 0): np.lib.format.read_array_header_2_0,
     }
@@ -122,7 +122,7 @@ def _array(stream: IO[bytes], length: int, limit: int) -> np.ndarray:
     with warnings.catch_warnings():  # of headers that Python 2 wrote, and of odd bytes in them
         warnings.simplefilter("ignore")
         shape, by_columns, dtype = readers[version](head)
-    if dtype.kind not in PLAIN or dtype.subdtype is not None or dtype.itemsize == 0:
+    if dtype.kind not in PLAIN_KINDS or dtype.subdtype is not None or dtype.itemsize == 0:
         raise ValueError(f"has type {dtype}, only plain numbers and text are read")
     count = math.prod(shape)
     size = count * dtype.itemsize
@@ -135,7 +135,7 @@ def _array(stream: IO[bytes], length: int, limit: int) -> np.ndarray:
         raise ValueError(f"declares shape {_short(shape)} of {dtype}, {size} bytes, and has {stored}")
     data = bytearray(size)
     view, done = memoryview(data), 0
-    while block := head.read(BLOCK) or stream.read(BLOCK):
+    while block := head.read(READ_SIZE) or stream.read(READ_SIZE):
         view[done : done + len(block)] = block  # one that is too long is a ValueError
         done += len(block)
     if done != size:

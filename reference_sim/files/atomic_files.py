@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+NO_ROOM_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
@@ -29,7 +29,7 @@ def replacing(path: Path) -> Iterator[Path]:
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
-        if error.errno in NO_ROOM:
+        if error.errno in NO_ROOM_ERRORS:
             error.filename, error.filename2 = str(path), None
         raise
     finally:
@@ -64,7 +64,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
 def disk_full(error: BaseException) -> str:
     """Return one line on the file that found no room and how much there is; "" for any other error."""
-    if not isinstance(error, OSError) or error.errno not in NO_ROOM:
+    if not isinstance(error, OSError) or error.errno not in NO_ROOM_ERRORS:
         return ""
     path = Path(error.filename or ".").absolute()
     folder = next((parent for parent in path.parents if parent.is_dir()), Path())

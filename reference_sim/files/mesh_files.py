@@ -7,20 +7,19 @@ from __future__ import annotations
 
 import glob
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, read_parts
+from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, Polygon, read_parts
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
-FARTHEST = 1e12  # in any unit: squares and cubes of it are still numbers
+LARGEST_COORDINATE = 1e12  # in any unit: squares and cubes of it are still numbers
 # What programs call the texture coordinates of a vertex: two numbers, or one array of both.
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 UV_ARRAYS = (UV_OF_VTK, "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
@@ -64,10 +63,12 @@ def read_mesh(path: str | Path) -> Surface:
         raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
     if positions.ndim != 2 or positions.shape[1] != 3:
         raise MeshError(f"{path}: vertices have shape {positions.shape}: expected three coordinates each")
-    bad = np.flatnonzero(~(np.abs(positions) < FARTHEST).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(positions) < LARGEST_COORDINATE).all(axis=1))
     if bad.size:
         where = positions[bad[0]].tolist()
-        raise MeshError(f"{path}: vertex {bad[0]} is not finite, or farther than {FARTHEST:g}: {where}")
+        raise MeshError(
+            f"{path}: vertex {bad[0]} is not finite, or farther than {LARGEST_COORDINATE:g}: {where}"
+        )
     corners = np.array([len(polygon) for polygon in polygons])
     if corners.max() > 4 or corners.min() < 3:
         k = int(np.argmax((corners > 4) | (corners < 3)))
@@ -81,7 +82,7 @@ def read_mesh(path: str | Path) -> Surface:
     )
 
 
-def _halved(polygons: Any) -> list[Any]:
+def _halved(polygons: Sequence[Polygon]) -> list[tuple[int, int, int]]:
     """Cut quads into triangles; triangles stay."""
     return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
 
@@ -92,9 +93,10 @@ def _corner_uv(path: Path, parts: Parts, faces: np.ndarray) -> np.ndarray | None
     if parts.uv_polygons:
         uv, places = np.asarray(parts.uv, dtype=np.float64), np.array(_halved(parts.uv_polygons), np.int64)
     else:
-        uv = _uv_of_vertices(parts.vertex_data)
-        if uv is None:
+        vertex_uv = _uv_of_vertices(parts.vertex_data)
+        if vertex_uv is None:
             return None
+        uv = vertex_uv
     if (places < 0).all():
         return None
     bad = np.flatnonzero((places >= len(uv)).any(axis=1) | (places < -1).any(axis=1))

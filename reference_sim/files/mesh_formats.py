@@ -6,10 +6,9 @@ import contextlib
 import io
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,9 @@ from reference_sim.cloth import MeshError
 from reference_sim.files.mesh_header import check_header
 
 UV_OF_VTK = "UV"  # what the texture coordinates of a VTK file are called here
+
+
+Polygon = Sequence[int] | np.ndarray  # indices of its corners
 
 
 @dataclass(frozen=True)
@@ -32,10 +34,10 @@ class Parts:
         vertex_data: name -> (V,) or (V, k).
     """
 
-    points: Any
-    polygons: list[Any]
-    uv: Any = ()
-    uv_polygons: tuple[Any, ...] | list[Any] = ()
+    points: np.ndarray | list[list[float]]
+    polygons: Sequence[Polygon]
+    uv: Sequence[Sequence[float]] = ()
+    uv_polygons: Sequence[Polygon] = ()
     vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 

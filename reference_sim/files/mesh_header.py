@@ -12,7 +12,7 @@ from pathlib import Path
 from reference_sim.cloth import MeshError
 from reference_sim.files.array_file import MOST_PACKED
 
-REMEDY = "export it again, as OBJ or PLY"
+EXPORT_AGAIN = "export it again, as OBJ or PLY"
 SECTIONS = (
     b"POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA|"
     rb"DIMENSIONS|[XYZ]_COORDINATES|FIELD\s+\S+|LOOKUP_TABLE\s+\S+|COLOR_SCALARS\s+\S+"
@@ -41,9 +41,9 @@ def check_header(path: Path) -> None:
     head, end, _ = data.partition(b"end_header") if kind == ".ply" else (data, b"", b"")
     lines = list(re.finditer(pattern, head, re.MULTILINE | re.IGNORECASE))
     if (kind == ".ply" and not end) or (kind == ".off" and not lines):
-        raise MeshError(f"{path}: cannot be read (its header does not end): {REMEDY}")
+        raise MeshError(f"{path}: cannot be read (its header does not end): {EXPORT_AGAIN}")
     for line in lines:
         for count in line[1].split():
             if len(count) > 20 or int(count) > most:
                 text = " ".join(line[0].decode(errors="replace").split())[:60]
-                raise MeshError(f"{path}: cannot be read (shorter than '{text}' says): {REMEDY}")
+                raise MeshError(f"{path}: cannot be read (shorter than '{text}' says): {EXPORT_AGAIN}")

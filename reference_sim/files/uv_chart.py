@@ -13,9 +13,9 @@ import numpy as np
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.mesh_files import Surface
 
-JOINED = 1e-6  # [m] from which two vertices are one: round-off of six digits
+JOIN_DISTANCE = 1e-6  # [m] from which two vertices are one: round-off of six digits
 AREA_FACTOR = 1.5  # a chart whose area is further from the mesh's is in another unit
-STRETCH = 1.5  # from chart to mesh, or its inverse: no cloth is sewn so
+LARGEST_STRETCH = 1.5  # from chart to mesh, or its inverse: no cloth is sewn so
 STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
 
 
@@ -31,7 +31,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
     from scipy.spatial import cKDTree
 
     count = len(surface.positions)
-    pairs = cKDTree(surface.positions).query_pairs(JOINED, output_type="ndarray")
+    pairs = cKDTree(surface.positions).query_pairs(JOIN_DISTANCE, output_type="ndarray")
     if not len(pairs):
         return surface, np.arange(count), np.arange(count)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
@@ -81,12 +81,12 @@ def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndar
     if small.size:
         raise MeshError(f"triangle {small[0]} has no area in the UV chart: mend the chart, or {instead}")
     stretch = stretches(corners, chart)
-    off = (stretch[:, 0] > STRETCH) | (stretch[:, 1] < 1 / STRETCH)
+    off = (stretch[:, 0] > LARGEST_STRETCH) | (stretch[:, 1] < 1 / LARGEST_STRETCH)
     share = flat[off].sum() / flat.sum()
     if share > STRETCHED_SHARE:
         raise MeshError(
-            f"{share:.0%} of its UV chart is stretched or pressed by more than {STRETCH:g} on the mesh: that "
-            f"is a texture and no pattern; {instead}"
+            f"{share:.0%} of its UV chart is stretched or pressed by more than {LARGEST_STRETCH:g} on the "
+            f"mesh: that is a texture and no pattern; {instead}"
         )
     return chart
 

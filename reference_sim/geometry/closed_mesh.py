@@ -6,7 +6,7 @@ import numpy as np
 
 from reference_sim.cloth import MeshError
 
-SLIVER = 1e-12  # area of a face relative to the mean, below which it has no normal
+LEAST_AREA_RATIO = 1e-12  # area of a face relative to the mean, below which it has no normal
 
 
 def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
@@ -61,7 +61,7 @@ def _check_shape(corner: np.ndarray, frame: int) -> None:
     """Refuse faces (F, 3, 3) of one frame without an area, or with no positive volume inside."""
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = np.sqrt(np.einsum("fi,fi->f", normal, normal))
-    if not area.min() > SLIVER * area.mean():
+    if not area.min() > LEAST_AREA_RATIO * area.mean():
         raise MeshError(f"obstacle face {int(area.argmin())} has no area in frame {frame}: remove it")
     if frame == 0:
         volume = np.einsum("fi,fi->", corner[:, 0], normal) / 6

@@ -7,7 +7,9 @@ import numpy as np
 from reference_sim.kernels.kernel_cache import njit
 
 ON_SIDE = 1e-6  # weight of a corner below which a place is on a side; weights may be rounded to float32
-BALL = 0.1  # [m] diameter, of a limb: what the surface is taken for beside the faces that a sample may meet
+TANGENT_BALL = (
+    0.1  # [m] diameter, of a limb: what the surface is taken for beside the faces that a sample may meet
+)
 BEYOND = 1e-3  # cosine to a face, of an offset that leads over it: above the round-off of a foot on a side
 
 
@@ -92,7 +94,7 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
             beside |= _beyond(offset, closest[s], faces[closest_faces[s]], barycentric[s], vertices, faces)
         if beside:
-            ball = max(BALL, 1.5 * length)  # below c is in it, however deep
+            ball = max(TANGENT_BALL, 1.5 * length)  # below c is in it, however deep
             for c in range(3):
                 normals[s, c] = ball * smooth[c] + length * offset[c]
             _normalise(normals[s])

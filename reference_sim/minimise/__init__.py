@@ -1,7 +1,7 @@
 """Minimisers of a Potential: Newton's method and L-BFGS, with one loop, one call and one type of result.
 
->>> from reference_sim.minimise import METHODS, STATUSES
->>> sorted(METHODS), STATUSES[0]
+>>> from reference_sim.minimise import MINIMISERS, STATUSES
+>>> sorted(MINIMISERS), STATUSES[0]
 (['lbfgs', 'newton'], 'converged')
 """
 

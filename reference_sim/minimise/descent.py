@@ -13,7 +13,7 @@ from reference_sim.minimise.result import Result, Stop
 from reference_sim.potential import Potential
 
 SUFFICIENT_DECREASE = 1e-4
-HALVINGS = 24  # of a step before its direction is given up
+STEP_HALVINGS = 24  # of a step before its direction is given up
 
 Observer = Callable[[np.ndarray], object]  # is called with positions (V, 3) [m]
 
@@ -95,7 +95,7 @@ class Descent:
         """
         step = self.spread(p)
         alpha = self.potential.largest_step(self.x, step) if allowed is None else allowed
-        for _ in range(HALVINGS):
+        for _ in range(STEP_HALVINGS):
             trial = self.x + alpha * step
             value, gradient = self.evaluate(trial)
             if np.isfinite(value) and np.isfinite(gradient).all():

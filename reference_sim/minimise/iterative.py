@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
 from reference_sim.assembly.cholesky import analyse
+from reference_sim.geometry.surface import vertex_normals
 from reference_sim.minimise.descent import mean_weight
 from reference_sim.minimise.factorised import FactorisedHessian
 from reference_sim.minimise.lbfgs_history import dot
@@ -45,10 +46,6 @@ class IterativeHessian(FactorisedHessian):
 
     def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
         """Return values (nnz,) at x (V, 3), and keep the preconditioner's scalar and normals there."""
-        from reference_sim.geometry.surface import (
-            vertex_normals,  # loads numba, which a command's --help can do without
-        )
-
         self._scalar_data = self._scalar.assemble(x)
         self._normals = vertex_normals(x, self._faces)[self._pattern.free]
         return super().assemble(x, convexity)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from reference_sim.minimise.two_loop import first_loop, second_loop
+
 LEAST_CURVATURE = 1e-10  # of |s| |y|: pairs of negative curvature would make the estimate indefinite
 
 
@@ -47,11 +49,6 @@ class LBFGSHistory:
             g: (3n,) gradient [N].
             solve: applies the first guess of the inverse Hessian, which the pairs correct.
         """
-        from reference_sim.minimise.two_loop import (  # loads numba, which a command's --help can do without
-            first_loop,
-            second_loop,
-        )
-
         q, alphas = -g, np.empty(len(self))
         order = np.arange(self._count - len(self), self._count) % max(self._memory, 1)  # oldest first
         first_loop(self._pairs, self._curvatures, order, q, alphas)

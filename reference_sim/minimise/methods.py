@@ -12,7 +12,7 @@ from reference_sim.minimise.newton import Newton
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 
-METHODS = {"newton": Newton, "lbfgs": LBFGS}
+MINIMISERS = {"newton": Newton, "lbfgs": LBFGS}
 
 
 class Minimiser(Protocol):
@@ -30,7 +30,7 @@ def make_minimiser(
 
     Args:
         potential: the sum of energies.
-        method: a name in METHODS, or a function that is called as `method(potential, **options)`.
+        method: a name in MINIMISERS, or a function that is called as `method(potential, **options)`.
         options: of the method's class.
 
     Raises:
@@ -38,9 +38,9 @@ def make_minimiser(
     """
     if callable(method):
         return method(potential, **options)
-    if method not in METHODS:
-        raise ValueError(f"unknown minimiser {method!r}: choose one of {', '.join(METHODS)}")
-    return METHODS[method](potential, **options)
+    if method not in MINIMISERS:
+        raise ValueError(f"unknown minimiser {method!r}: choose one of {', '.join(MINIMISERS)}")
+    return MINIMISERS[method](potential, **options)
 
 
 def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **options: Any) -> Result:

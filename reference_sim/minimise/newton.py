@@ -39,9 +39,12 @@ STEP_TOLERANCE = 1e-3  # of a mean edge length
 WATCHDOG_AFTER = 20  # iterations: most steps of a garment are done by then, and sooner so
 WATCHDOG_STEPS = 40  # full steps in a row before the energy has to be below its start
 PREDICTED = 0.9  # share of the predicted decrease from which on the quadratic model needs no help
-ROUND_OFF = 1e-2  # relative residual that round-off may excuse at most
-MEMORY = 20  # steps that correct a factorisation used again
-WINDOW, RATE = 8, 0.5  # it is given up where so many steps do not bring the gradient down to this share
+RESIDUAL_ROUND_OFF = 1e-2  # relative residual that round-off may excuse at most
+REUSE_MEMORY = 20  # steps that correct a factorisation used again
+REUSE_WINDOW, REUSE_RATE = (
+    8,
+    0.5,
+)  # it is given up where so many steps do not bring the gradient down to this share
 
 
 class Newton:
@@ -106,7 +109,7 @@ class Newton:
         run.residuals = []
         small = run.gradient_norm() <= self.tolerance
         # Round-off excuses no more than this (`target`): no Hessian is needed to say so.
-        if spent and run.gradient_norm() > max(self.tolerance, ROUND_OFF):
+        if spent and run.gradient_norm() > max(self.tolerance, RESIDUAL_ROUND_OFF):
             return None
         if small:
             self.potential.forget()
@@ -128,7 +131,7 @@ class Newton:
         """Return the tolerance, but never below what round-off of the positions does to the gradient."""
         stiffest = self.hessian.stiffest(run.data)
         round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(run.x).max(initial=0.0))
-        return max(self.tolerance, min(round_off / run.weight, ROUND_OFF))
+        return max(self.tolerance, min(round_off / run.weight, RESIDUAL_ROUND_OFF))
 
     def step(self, run: NewtonRun) -> Stop | None:
         """Go on with the last factorisation while it serves, else with the Hessian that was assembled."""
@@ -168,7 +171,7 @@ class NewtonRun(FactorisedDescent):
         self.max_iterations, self.timeout = newton.max_iterations, newton.timeout
         self.data, self.target = np.empty(0), newton.tolerance
         self.quasi_newton_steps = self.iterations
-        self.history = LBFGSHistory(MEMORY)
+        self.history = LBFGSHistory(REUSE_MEMORY)
         self.residuals: list[float] = []
         self.projection_level, self.raised = newton.first_level, newton.first_level > 0
         self.predicting, self.watchdog_steps = False, WATCHDOG_STEPS
@@ -182,7 +185,7 @@ class NewtonRun(FactorisedDescent):
         norms = self.residuals
         if not norms or norms[-1] <= self.target:
             return False
-        return len(norms) <= WINDOW or norms[-1] <= RATE * min(norms[:-WINDOW])
+        return len(norms) <= REUSE_WINDOW or norms[-1] <= REUSE_RATE * min(norms[:-REUSE_WINDOW])
 
     def full_steps(self, data: np.ndarray, projection: int) -> bool:
         """Take full steps until one ends below the start; if none does, go back and take a part of the first.

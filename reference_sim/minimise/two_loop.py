@@ -6,10 +6,10 @@ import numpy as np
 
 from reference_sim.kernels.kernel_cache import njit
 
-FAST = {"reassoc", "contract", "nsz"}  # sums in vector instructions
+SUM_MATH = {"reassoc", "contract", "nsz"}  # sums in vector instructions
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, fastmath=SUM_MATH)
 def first_loop(
     pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, q: np.ndarray, alphas: np.ndarray
 ) -> None:
@@ -23,7 +23,7 @@ def first_loop(
             q[i] -= alphas[k] * y[i]
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, fastmath=SUM_MATH)
 def second_loop(
     pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, p: np.ndarray, alphas: np.ndarray
 ) -> None:

@@ -15,7 +15,7 @@ from reference_sim.files.atomic_files import replacing
 from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
 
 SIGNATURE = b"POINTCACHE2\0"
-HEADER = len(SIGNATURE) + 20
+HEADER_SIZE = len(SIGNATURE) + 20
 TYPES = {".pc2": "<f4", ".pc16": "<f2"}
 
 
@@ -58,11 +58,11 @@ def read_point_cache(path: str | Path) -> np.ndarray:
         raise TrajectoryError(f"{path}: no such file")
     kind, length = np.dtype(TYPES[path.suffix.lower()]), path.stat().st_size
     with path.open("rb") as file:
-        header = file.read(HEADER)
-        if len(header) < HEADER or not header.startswith(SIGNATURE):
+        header = file.read(HEADER_SIZE)
+        if len(header) < HEADER_SIZE or not header.startswith(SIGNATURE):
             raise TrajectoryError(f"{path}: is no point cache: it does not begin with POINTCACHE2")
         version, points, _, _, frames = struct.unpack("<iiffi", header[len(SIGNATURE) :])
-        declared = HEADER + frames * points * 3 * kind.itemsize
+        declared = HEADER_SIZE + frames * points * 3 * kind.itemsize
         if version != 1 or points < 1 or frames < 1 or declared != length:
             raise TrajectoryError(
                 f"{path}: version {version}, {frames} samples of {points} points take {declared} bytes, the "

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.trajectory.trajectory import UNREADABLE, Trajectory, TrajectoryError, read_trajectory
-from reference_sim.trajectory.writer import BEFORE, END_OF_FILE, FAILURE, UNFINISHED
+from reference_sim.trajectory.trajectory import UNREADABLE_ERRORS, Trajectory, TrajectoryError, read_frames
+from reference_sim.trajectory.writer import BEFORE_LAST_STEP, END_OF_FILE, FIRST_FAILURE, UNFINISHED
 
 if TYPE_CHECKING:
     import h5py
@@ -62,7 +62,7 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
     try:
         with _opened(path) as file:
             earlier = _whole_frames(file)
-    except UNREADABLE as error:
+    except UNREADABLE_ERRORS as error:
         raise TrajectoryError(
             f"{path}: nothing to resume: not a readable trajectory ({_one_line(error)}); "
             "remove it, or write elsewhere"
@@ -111,12 +111,12 @@ def _whole_frames(file: h5py.File) -> PartialRun:
     if whole == 0:
         raise ValueError("no whole frame in it")
     last = whole - 1
-    held = BEFORE in benchmark and last >= written - 2
-    before = benchmark[BEFORE][last % 2] if held else None
-    trajectory = read_trajectory(file, frames=whole)
+    held = BEFORE_LAST_STEP in benchmark and last >= written - 2
+    before = benchmark[BEFORE_LAST_STEP][last % 2] if held else None
+    trajectory = read_frames(file, frames=whole)
     ended = trajectory.status != UNFINISHED
     if not ended:
-        status, reason = json.loads(benchmark.attrs.get(FAILURE, '["converged", ""]'))
+        status, reason = json.loads(benchmark.attrs.get(FIRST_FAILURE, '["converged", ""]'))
         trajectory = trajectory.with_status(status, reason)
     return PartialRun(trajectory, before, ended)
 

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     import h5py
 
 
-SUFFIXES = (".vtkhdf", ".hdf")
-SMALL = 1 << 20  # [bytes] that nobody minds
+TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
+ALWAYS_READ = 1 << 20  # [bytes] that nobody minds
 # What h5py and numpy raise for a file that is none, or is damaged.
-UNREADABLE = (
+UNREADABLE_ERRORS = (
     OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, ArithmeticError,
     MemoryError,
 )  # fmt: skip
@@ -106,10 +106,10 @@ class Trajectory:
 
         try:
             with h5py.File(path, "r") as file:
-                return read_trajectory(file)
+                return read_frames(file)
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
-        except UNREADABLE as error:
+        except UNREADABLE_ERRORS as error:
             reason = " ".join(str(error).split())
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 
@@ -131,11 +131,11 @@ class Trajectory:
         return self if whole.all() else self.first(int(np.argmin(whole)))
 
 
-def read_trajectory(file: h5py.File, *, frames: int | None = None) -> Trajectory:
+def read_frames(file: h5py.File, *, frames: int | None = None) -> Trajectory:
     """Read the first `frames` frames of an open file, by default all that are whole.
 
     Raises:
-        UNREADABLE: one of these, for a file that is no trajectory or is damaged.
+        UNREADABLE_ERRORS: one of these, for a file that is no trajectory or is damaged.
     """
     benchmark, vtk = file["benchmark"], file["VTKHDF"]
     provenance = json.loads(benchmark.attrs["provenance"])
@@ -165,6 +165,6 @@ def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
     if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
         raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
     size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
-    if size > MOST_PACKED * dataset.id.get_storage_size() + SMALL:
+    if size > MOST_PACKED * dataset.id.get_storage_size() + ALWAYS_READ:
         raise ValueError(f"{dataset.name} declares {size} bytes, more than it holds")
     return dataset[:rows]

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 UNFINISHED = "unfinished"  # status of a file whose writer did not end by itself
 # Where the writer keeps what a resumed run needs.
-BEFORE, FAILURE = "before_last_step", "first_failure"
+BEFORE_LAST_STEP, FIRST_FAILURE = "before_last_step", "first_failure"
 END_OF_FILE = slice(40, 48)  # of the superblock (version 0): where HDF5 believes the file to end
-ROOM = 1 << 20  # [bytes] that HDF5 may need beside the numbers of a frame
+ROOM_FOR_HDF5 = 1 << 20  # [bytes] that HDF5 may need beside the numbers of a frame
 
 
 class TrajectoryWriter:
@@ -69,7 +69,7 @@ class TrajectoryWriter:
 
         path.write_bytes(b"")
         try:
-            reserve(path, 16 * numbers + ROOM)
+            reserve(path, 16 * numbers + ROOM_FOR_HDF5)
             self._file = h5py.File(path, "w")
             self._reserve(numbers)
         except OSError:
@@ -82,7 +82,7 @@ class TrajectoryWriter:
         Raises:
             OSError: no room; what was written before is then whole.
         """
-        reserve(self._part or self.path, self._file.id.get_filesize() + 16 * numbers + ROOM)
+        reserve(self._part or self.path, self._file.id.get_filesize() + 16 * numbers + ROOM_FOR_HDF5)
 
     def append(
         self,
@@ -149,9 +149,9 @@ class TrajectoryWriter:
             group[key].resize((k + count,))
             group[key][k:] = values
         if before is not None:
-            if BEFORE not in benchmark:
-                benchmark.create_dataset(BEFORE, (2, *np.shape(before)), dtype="f8")
-            benchmark[BEFORE][k % 2] = (
+            if BEFORE_LAST_STEP not in benchmark:
+                benchmark.create_dataset(BEFORE_LAST_STEP, (2, *np.shape(before)), dtype="f8")
+            benchmark[BEFORE_LAST_STEP][k % 2] = (
                 before  # the other half still serves the frame before, should this one fail
             )
         self.frames = k + count
@@ -180,7 +180,7 @@ class TrajectoryWriter:
 
     def first_failure(self, status: str, reason: str) -> None:
         """Note how the frame failed that is appended next, for a run that resumes this one."""
-        self._file["benchmark"].attrs[FAILURE] = json.dumps([status, reason])
+        self._file["benchmark"].attrs[FIRST_FAILURE] = json.dumps([status, reason])
 
     def finish(self, status: str, reason: str) -> None:
         """Write how the run ended."""
@@ -205,7 +205,7 @@ class TrajectoryWriter:
             os.fsync(file.fileno())
 
 
-def _append(dataset: h5py.Dataset, rows: Any) -> None:
+def _append(dataset: h5py.Dataset, rows: np.ndarray) -> None:
     rows = np.asarray(rows)
     size = dataset.shape[0]
     dataset.resize(size + len(rows), axis=0)

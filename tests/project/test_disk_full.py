@@ -25,7 +25,7 @@ from reference_sim import Trajectory
 from reference_sim.command import simulate_command as command
 from reference_sim.files.array_file import write_array
 from reference_sim.files.atomic_files import disk_full, new_folder, replacing
-from reference_sim.trajectory.writer import ROOM
+from reference_sim.trajectory.writer import ROOM_FOR_HDF5
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.training import checkpoint as checkpoints
 from snug.training.checkpoint import Checkpoint
@@ -93,7 +93,7 @@ def test_a_model_that_finds_no_room_leaves_the_one_before_it(tmp_path):
     assert not read_tensors(path)[0]["a"].any() and os.listdir(tmp_path) == ["a.safetensors"]
 
 
-@pytest.mark.parametrize("size", [0, 1000, ROOM, ROOM + 30_000])
+@pytest.mark.parametrize("size", [0, 1000, ROOM_FOR_HDF5, ROOM_FOR_HDF5 + 30_000])
 def test_a_trajectory_that_finds_no_room_leaves_no_part(tmp_path, size):
     with pytest.raises(OSError, match="File too large") as full, files_up_to(size):
         wave(40).save(tmp_path / "a.vtkhdf")
@@ -102,7 +102,7 @@ def test_a_trajectory_that_finds_no_room_leaves_no_part(tmp_path, size):
 
 def test_a_trajectory_takes_no_more_room_than_it_needs(tmp_path):
     wave(5).save(tmp_path / "a.vtkhdf")
-    assert (tmp_path / "a.vtkhdf").stat().st_size < ROOM // 4
+    assert (tmp_path / "a.vtkhdf").stat().st_size < ROOM_FOR_HDF5 // 4
 
 
 # --- commands ----------------------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def test_a_simulation_stops_in_one_line_and_resumes_to_the_same_bits(tmp_path, m
     Path("sheet.obj").write_text("".join(lines))
     words = ["sheet.obj", "--pins", "0,6", "--frames", "12", "--quiet", "-o"]
     assert command.main([*words, "whole.vtkhdf"]) == 0
-    limit = Path("whole.vtkhdf").stat().st_size + ROOM - 10_000
+    limit = Path("whole.vtkhdf").stat().st_size + ROOM_FOR_HDF5 - 10_000
     stopped = limited(limit, "reference_sim.simulate", *words, "a.vtkhdf", cwd=tmp_path)
     assert stopped.returncode == 1 and stopped.stderr.count("\n") == 1
     assert stopped.stderr.startswith("simulate: a.vtkhdf: File too large") and "--resume" in stopped.stderr

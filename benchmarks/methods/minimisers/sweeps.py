@@ -11,7 +11,7 @@ from reference_sim.minimise.loop import iterate
 from reference_sim.minimise.result import Result, Stop
 from reference_sim.potential import Potential
 
-FAR = 100.0  # [m] from the guess: nowhere
+RUNAWAY_DISTANCE = 100.0  # [m] from the guess: nowhere
 
 
 class SweepRun(Descent):
@@ -48,8 +48,9 @@ class SweepSolver(ABC):
         """Sweep once."""
 
     def terminate(self, run: SweepRun) -> Stop | None:
-        """Stop after the last sweep, or the one that threw a vertex nowhere, or FAR from where it began."""
-        if run.iterations and not (np.abs(run.swept - run.x).max(initial=0.0) < FAR):  # also where it is NaN
+        """Stop after the last sweep, or the one that threw a vertex nowhere, or RUNAWAY_DISTANCE from where it began."""
+        # Written so that NaN is far too.
+        if run.iterations and not (np.abs(run.swept - run.x).max(initial=0.0) < RUNAWAY_DISTANCE):
             return Stop("diverged", f"sweep {run.iterations} threw a vertex far away")
         if run.iterations < self.max_iterations:
             return None

@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 
 from reference_sim.contact.anchor_walk import triangle_adjacency
 from reference_sim.contact.closest_point import FaceTree, by_cells
-from reference_sim.contact.closest_point_groups import GROUP
+from reference_sim.contact.closest_point_groups import GROUP_SIZE
 from reference_sim.geometry.surface import carry, plane_normals, vertex_normals
 from reference_sim.minimise.compiled.sliding import ask_neighbours, gaps_of, not_outside, slide
 from reference_sim.obstacle import Obstacle, Planes, reachable_faces
@@ -218,8 +218,8 @@ class _Anchors:
                 out = np.where(self.distance > reach, -1, self.faces)
                 deep = not_outside(out, points, self._home_faces(patch), vertices, patch.faces)
                 self.search(deep, points, patch, region)
-        groups = np.arange(-(-len(near) // GROUP))[self.turn :: ROTATION]
-        which = (GROUP * groups[:, None] + np.arange(GROUP)).ravel()
+        groups = np.arange(-(-len(near) // GROUP_SIZE))[self.turn :: ROTATION]
+        which = (GROUP_SIZE * groups[:, None] + np.arange(GROUP_SIZE)).ravel()
         self.search(near[which[which < len(near)]], points, patch, region)
         self.turn = (self.turn + 1) % ROTATION
         ask_neighbours(points, self.neighbours, *skin, self.home, limit, *state)

@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from reference_sim.contact.anchor_walk import SLACK, triangle_adjacency
+from reference_sim.contact.anchor_walk import WALK_SLACK, triangle_adjacency
 from reference_sim.contact.closest_point import FaceTree
 from reference_sim.energies import ContactPenalty
 from reference_sim.kernels.training_lanes import TRAINING_LANES
@@ -181,7 +181,7 @@ class ContactCache:
             self.patch.centroids,
             self.patch.sample_rest,
             np.float32(self.patch.region**2),
-            np.float32(SLACK),
+            np.float32(WALK_SLACK),
             walk,
             self.faces,
             self.barycentric,

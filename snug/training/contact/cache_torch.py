@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.contact.anchor_walk import CROSSINGS, SLACK
+from reference_sim.contact.anchor_walk import CROSSINGS, WALK_SLACK
 from snug.training.contact.cache import PARTS, ContactCache, Patch
 
 NEAREST = 3  # body vertices whose faces are tried for each sample
@@ -72,7 +72,7 @@ class TensorContactCache:
         reach: float,
     ) -> None:  # fmt: skip
         """Anchors of frames (N,) go to where reference_sim.contact.anchor_walk.walk_to_foot takes them for samples
-        (N, S, 3): those of samples less than `reach` and SLACK above their planes. positions, normals: see
+        (N, S, 3): those of samples less than `reach` and WALK_SLACK above their planes. positions, normals: see
         `planes`.
         """
         # A frame that comes twice walks once: which of two writes lands last is not a GPU's to choose.
@@ -83,7 +83,7 @@ class TensorContactCache:
             rows[once],
         )
         points, directions = self.planes(frames, rows, positions, normals)
-        near = ((samples - points) * directions).sum(-1) < reach + SLACK
+        near = ((samples - points) * directions).sum(-1) < reach + WALK_SLACK
         place, sample = near.nonzero(as_tuple=True)
         chosen = torch.as_tensor(frames, device=samples.device)[place]
         row = torch.as_tensor(rows, device=samples.device)[place]

@@ -20,7 +20,7 @@ from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.scenes.from_roll_out import declared
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
-from reference_sim.trajectory.point_cache import HEADER, SIGNATURE, read_point_cache, write_point_cache
+from reference_sim.trajectory.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 SCENE = small_scene("hanging_sheet", cells=6, frames=8)
@@ -263,7 +263,7 @@ def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_
     path = tmp_path / "mine.pc2"
     head = np.array([1, 2**30], "<i4").tobytes() + np.array([0, 1], "<f4").tobytes()
     path.write_bytes(SIGNATURE + head + np.array([2**30], "<i4").tobytes() + bytes(36))
-    assert HEADER == 32
+    assert HEADER_SIZE == 32
     with pytest.raises(RollOutError, match="the file has 68"):
         read_roll_out(path)
     import h5py

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from reference_sim.contact.closest_point import FaceTree
-from reference_sim.contact.closest_point_groups import GROUP
+from reference_sim.contact.closest_point_groups import GROUP_SIZE
 from reference_sim.geometry.surface import vertex_normals
 from reference_sim.geometry.triangle import closest_on_triangle
 from tests.reference_sim.meshes import grid, random_rotation, sphere
@@ -199,7 +199,7 @@ def test_a_refitted_tree_answers_as_one_built_for_the_pose():
     assert_closest(tree, moved, points)
 
 
-@pytest.mark.parametrize("count", [1, GROUP - 1, GROUP, GROUP + 1])
+@pytest.mark.parametrize("count", [1, GROUP_SIZE - 1, GROUP_SIZE, GROUP_SIZE + 1])
 def test_company_changes_nothing(count):
     """Samples are searched in groups: each gets what it would alone, with hints or without, in any order."""
     positions, faces = mesh("sphere")

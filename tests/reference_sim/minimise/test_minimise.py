@@ -8,12 +8,12 @@ import torch
 
 from reference_sim import GRAVITY, Cloth, Material, Potential, Result, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
-from reference_sim.minimise import METHODS, STATUSES, make_minimiser
+from reference_sim.minimise import MINIMISERS, STATUSES, make_minimiser
 from reference_sim.minimise.lbfgs_history import LBFGSHistory
 from reference_sim.minimise.newton import NewtonRun
 from tests.reference_sim.meshes import grid, patch, random_rotation
 
-both = pytest.mark.parametrize("method", METHODS)
+both = pytest.mark.parametrize("method", MINIMISERS)
 TOLERANCE = 1e-6  # relative residual, the default that a result promises
 SHEET, FACES = grid(8, 8, width=0.5, depth=0.5)
 SIDES = np.flatnonzero((SHEET[:, 0] == 0) | (SHEET[:, 0] == 0.5))
