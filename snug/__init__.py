@@ -1,1 +1,38 @@
-"""Bodies, garments, networks and their training."""
+"""Neural garments: bodies, garments, motions, networks and their training.
+
+| room | what lies there |
+| --- | --- |
+| body, motion, garments | the parametric body, its motions, the garments it wears |
+| recipes | options of network and training, and the named sets of them |
+| kernels | compiled closed forms that training and roll-outs run on a CPU |
+| networks | architectures, their inputs, trained models in files, roll-outs |
+| training | losses, one optimisation step, the loop over steps, checkpoints |
+| train, check | the commands `python -m snug.train` and `python -m snug.check` |
+
+Imports run downwards: body < motion < garments < recipes < kernels < networks < training < train. The function
+that trains is `train_network`; `snug.train` is the command.
+
+A small top of the chest's own skin, a static network trained for two steps, and its roll-out:
+
+>>> import numpy as np
+>>> import snug
+>>> from snug.recipes import Recipe
+>>> body = snug.Body.load()
+>>> chest = body.skinning_weights[:, 9] > 0.9
+>>> vertices, faces = np.unique(body.faces[chest[body.faces].all(axis=1)], return_inverse=True)
+>>> weights = body.skinning_weights[vertices]
+>>> top = snug.Garment("top", body.template[vertices], faces.reshape(-1, 3), vertices, weights)
+>>> dressed = snug.DressedBody(body, top)
+>>> poses = np.zeros((4, 24, 3))
+>>> poses[:, 9, 1] = np.linspace(0.0, 0.4, 4)  # the chest turns [rad]
+>>> motion = snug.Motion("turn", poses, np.zeros((4, 3)))
+>>> recipe = Recipe(terms=("strain", "bending", "gravity"), mixed=0.0)
+>>> model = snug.train_network("pbns", dressed, [motion], steps=2, seed=0, recipe=recipe, kernels=False,
+...                            progress=False)
+>>> snug.roll_out(model, dressed, motion).positions.shape  # (T, V, 3) [m]
+(4, 51, 3)
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

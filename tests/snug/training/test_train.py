@@ -372,7 +372,7 @@ def test_mixed_motions_join_the_training_set():
 
 
 def test_command_line_answers_without_torch():
-    code = "import sys, snug.train as t; t.parse([]); sys.exit('torch' in sys.modules)"
+    code = "import sys, snug.train as t; t.parse_options([]); sys.exit('torch' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
     shown = subprocess.run([sys.executable, "-m", "snug.train", "--help"], capture_output=True, text=True)
     assert shown.returncode == 0 and "examples:" in shown.stdout
