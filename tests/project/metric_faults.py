@@ -7,7 +7,7 @@ from tests.project.faults import Fault
 ENERGY_GAP, STEP, ENERGY, CURVATURE, DISTANCES, BODY, HEM, DYNAMICS, EXCESS, CONSERVATION = (
     f"benchmarks/metrics/{name}.py"
     for name in (
-        "energies/energy_gap", "energies/time_step", "energies/energy", "surface/curvature",
+        "energies/energy_gap", "energies/replayed_step", "energies/energy", "surface/curvature",
         "surface/distances", "surface/body_intersections", "motion/hem", "motion/dynamics",
         "energies/excess", "motion/conservation",
     )
@@ -23,8 +23,8 @@ METRIC_FAULTS = {
         Fault("velocity over two steps", STEP, "2, 0)]) / scene.dt", "2, 0)]) / (2 * scene.dt)"),
         Fault("scale of the guess alone", ENERGY_GAP, "potential.value(start) - potential.value(here)",
               "potential.value(start)"),
-        Fault("gap to the minimum below", ENERGY_GAP, "found.gaps.append(here - best)",
-              "found.gaps.append(here - below.energy)"),
+        Fault("gap to the minimum below", ENERGY_GAP, "numbers.gaps.append(here - best)",
+              "numbers.gaps.append(here - below.energy)"),
         Fault("warm-up judged", ENERGY_GAP, "range(scene.warm_up, len(", "range(2, len("),
         Fault("areas of the frame instead of the minimum", ENERGY_GAP,
               "ours, _ = mean_curvature(x, faces)\n    theirs, areas = mean_curvature(y, faces)",
@@ -48,7 +48,8 @@ METRIC_FAULTS = {
               "scene.origin_heights[0] - term.origin_height"),
         Fault("inertia of half the velocity", ENERGY, "velocity=(previous - before) / scene.dt",
               "velocity=(previous - before) / (2 * scene.dt)"),
-        Fault("inside by the skin itself", BODY, "x + OFF * vertex_normals", "x - OFF * vertex_normals"),
+        Fault("inside by the skin itself", BODY, "x + OFFSET * vertex_normals",
+              "x - OFFSET * vertex_normals"),
         Fault("inside at rest too", BODY, "& ~at_rest", ""),
         Fault("depth outside too", DISTANCES, "share=(depth > 0.0).mean(1)", "share=(depth >= 0.0).mean(1)"),
         Fault("histogram of equal weights", CURVATURE, "area / area.sum(), -area_ref / area_ref.sum()",
@@ -57,13 +58,13 @@ METRIC_FAULTS = {
     "benchmarks/metrics/test_uncertainty": (
         Fault("least change of the reference", "benchmarks/tasks/metric_task.py", "Estimate(value, max(",
               "Estimate(value, min("),
-        Fault("smaller steps are as right", "benchmarks/results/run_folder.py", '"simulation-refrozen")',
+        Fault("smaller steps are as right", "benchmarks/results/row.py", '"simulation-refrozen")',
               '"simulation-refrozen", "simulation-dt")'),
         Fault("energies of the warm-up", ENERGY, "series[roll_out.judged].mean()", "series[2:].mean()"),
         Fault("excess with the zero of gravity", EXCESS, 'above["total"] - above.get("gravity", 0.0)',
               'above["total"]'),
         Fault("common dynamics by the own static answer", DYNAMICS, "common = hem.measure(x)",
-              "common = hem.measure(x, own)"),
+              "common = hem.measure(x, static)"),
     ),
     "benchmarks/metrics/test_dynamics": (
         Fault("static answer one frame late", HEM, "difference = moving - static\n",
