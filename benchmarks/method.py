@@ -73,9 +73,11 @@ def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray
 class Reporting:
     """Place of a method among others in reports: curves, comparisons and pairing of seeds.
 
-    family: methods of one curve, which differ in effort alone; level: the place on it, as a number of
-    iterations or a tolerance. base: name of the method that this one is compared with. pairing_group: shared
-    by methods that are compared seed by seed.
+    Attributes:
+        family: methods of one curve, which differ in effort alone; the method's own name where it is empty.
+        level: place on that curve, as a number of iterations or a tolerance.
+        base: name of the method that this one is compared with.
+        pairing_group: shared by methods that are compared seed by seed.
     """
 
     family: str = ""
@@ -88,22 +90,37 @@ class Reporting:
 class MethodEntry:
     """Declaration of a method: cheap to list. Its module is imported when a cell needs it.
 
-    label: its name for people. module: has make(*, models, seed, **options), which gives a Method; where it
-    is left out, that is the file that declares the entry. declared_in: that file, or module of an installed
-    package; empty for those of the project, and filled in where it is read. files: what it reads besides,
-    beside that file, so that a run knows when one has changed.
-    needs_body: whether it works on dressed scenes alone. trained: the name of the network it needs, if any;
-    training: how that is trained, where benchmarks.methods.catalogue.trainings does not have it.
-    seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
-    dtype: the numbers it computes with; trajectories and metrics are float64 in any case.
-    needs_no_obstacle: whether it knows no contact. package: what it needs installed besides this project.
-    truncated: whether it stops before the minimum on purpose, so that running out of iterations is its end.
-    batched: whether it computes many bodies at once. gives_first_frame: whether it computes frame 0 too; a
-    simulator is given it. conserving: whether conservation laws are asked of it. timed: whether its costs are
-    asked for where those of the scene are. declared_ms: [ms] a frame, as its author says, where no clock of
-    ours can measure it; what a trajectory says as provenance counts as well. static_known: whether its answer
-    to poses held still is what quasi_static() says. left_out: why it is not run, where somebody wants it so.
-    role: one of benchmarks.results.row.ROLES. reporting: its place among others, for reports alone.
+    Attributes:
+        name: in commands, rows and files.
+        description: one line, for --list and run.json.
+        label: its name for people.
+        module: has make(*, models, seed, **options), which returns a Method; by default the file that
+            declares the entry.
+        declared_in: that file, or module of an installed package; empty for the project's own. Filled in
+            where it is read.
+        files: what it reads besides, beside that file; a run notices when one has changed.
+        options: of make().
+        needs_body: whether it works on dressed scenes alone.
+        trained: name of the network that it needs, if any.
+        training: how that is trained, where catalogue/trainings.py does not have it.
+        seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
+        dtype: of its computation; trajectories and metrics are float64 in any case.
+        truncated: whether it stops before the minimum on purpose, where iterations run out.
+        needs_no_obstacle: whether it knows no contact.
+        package: what it needs installed besides this project.
+        batched: whether it computes many bodies at once.
+        gives_first_frame: whether it computes frame 0 too; a simulator is given it.
+        conserving: whether conservation laws are measured.
+        timed: whether its costs are measured where those of the scene are.
+        declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance of a
+            trajectory may say it as well.
+        static_known: whether its quasi-static solution is what quasi_static() returns.
+        left_out: why it is not run, where somebody wants it so.
+        role: one of benchmarks.results.row.ROLES.
+        reporting: its place among others, for reports alone.
+
+    Raises:
+        DeclarationError: an unknown role.
     """
 
     name: str

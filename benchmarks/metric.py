@@ -58,13 +58,25 @@ class Estimate(NamedTuple):
 class Metric:
     """Declaration of a metric.
 
-    title: the head of its column; table: the table that has this column, or empty. arbitrary_zero: whether
-    its zero is a choice, as the height of a potential energy: then differences say something, and ratios
-    nothing. of: what it is a number of: the "answer" of a method; the "method" itself, as its size; or the
-    "machine", as every time. Another seed gives another answer; another machine, or the same when it is
-    busy, another time. reference_tolerance: how far from zero the value of the reference simulation may be;
-    its row is then judged. declared_in: as of a MethodEntry. Raises ValueError for what is no word where one
-    is due, for no unit, and for another `of`.
+    Attributes:
+        name: in results.csv, also a pattern such as "energy/*".
+        unit: "1" where it has no dimension.
+        title: head of its column.
+        definition: one line for the report.
+        table: the table that has this column, or empty.
+        lower_is_better: None where neither is.
+        arbitrary_zero: whether its zero is a choice, as the height of a potential energy: then differences
+            say something, and ratios nothing.
+        of: what it is a number of: the "answer" of a method; the "method" itself, as its size; or the
+            "machine", as every time. Another seed gives another answer; another machine another time.
+        reference_tolerance: how far from zero the value of the reference may be; its row is then judged.
+        declared_in: as of a MethodEntry.
+
+    Raises:
+        ValueError: another `of`, no unit, or a field that is no string.
+
+    >>> Metric(name="height/mean", unit="m", title="Height", definition="mean over frames").of
+    'answer'
     """
 
     name: str
@@ -109,10 +121,12 @@ class RollOut(Kept):
     Attributes:
         group: the roll-outs of the scene.
         entry: the method.
-        status: of its cell; suites: those that report it.
-        trajectory: as the method gave it; positions: (T,V,3) [m] of it that are finite.
-        quasi_static: (T,V,3) [m] its own answer to poses held still, or None.
-        counterpart: (T',V,3) [m] what the same method did in the scene's counterpart, or None.
+        status: of its cell.
+        suites: those that report it.
+        trajectory: as the method returned it.
+        positions: (T,V,3) [m] of it that are finite.
+        quasi_static: (T,V,3) [m] the method's quasi-static solutions, or None.
+        counterpart: (T',V,3) [m] roll-out of the same method in the scene's counterpart, or None.
         training_poses: (N,24,3) [rad] that its network trained on, or None.
     """
 
@@ -165,8 +179,8 @@ class SceneRollOuts(Kept):
 
     Attributes:
         scene: as it was built.
-        gap_samples: frames at least at which a step is solved again.
-        quasi_static: (T,V,3) [m] the simulator's answer to poses held still, or None.
+        gap_samples: least number of frames whose time step is solved again.
+        quasi_static: (T,V,3) [m] the simulator's quasi-static solutions, or None.
         roll_outs: to be filled before anything is measured.
     """
 

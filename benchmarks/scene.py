@@ -25,15 +25,22 @@ if TYPE_CHECKING:
 class Scene:
     """Declaration of a scene: cheap to list. Its module is imported when it is built.
 
-    module: has build(scene, assets, **options), which gives a BuiltScene. module, declared_in, files: as of a
-    MethodEntry. sizes: values of the preset that build() takes as options; options: further ones.
-    garment: what a body wears in it; it then needs the assets, and networks work on no other. motion: its
-    name, and part, whether it is "whole" or a "clip". obstacle: whether there is another thing to touch.
-    metrics: names of the modules of benchmarks.metrics that are measured here; None for all that apply.
-    counterpart: another scene that metrics compare each method's roll-out with, by the same method.
-    start_of: another scene whose settled start is that of this one too. networks_only: whether nobody
-    simulates it, so that it has neither start nor posed body. own_garment: whether it tailors a garment that
-    no network of the run was trained for.
+    Attributes:
+        name: in commands, rows and files.
+        description: one line, for --list and run.json.
+        module: has build(scene, assets, **options), which returns a BuiltScene.
+        declared_in, files: as of a MethodEntry.
+        sizes: values of the preset that build() takes as options.
+        options: further options of build().
+        garment: what a body wears in it; it then needs the assets, and networks work on no other.
+        motion: name of the motion.
+        part: of the motion: "whole", "clip", "loop" or "start".
+        obstacle: whether there is another thing to touch.
+        metrics: names of the modules of benchmarks.metrics that are measured here; None for all that apply.
+        counterpart: another scene whose roll-out by the same method metrics compare with.
+        start_of: another scene whose settled start is that of this one too.
+        networks_only: whether nobody simulates it, so that it has neither start nor posed body.
+        own_garment: whether it tailors a garment that no network of the run was trained for.
     """
 
     name: str
@@ -117,15 +124,27 @@ class Dressed:
 class BuiltScene:
     """Built scene: all that a method may read. Frame 0 of every array is the start.
 
-    energies: the terms declared, inertia left out: the time step adds it. dt [s]; frames: positions of a
-    trajectory, the start included. settle: gives the start (V,3) [m] from which to simulate, at rest, or
-    positions and velocities (2,V,3) [m, m/s]; it may itself simulate, so it is called once, off the clock.
-    warm_up: frames at the beginning that are not judged; the first two have no two before them.
-    origin_heights: (T,) [m] where the gravity energy of each
-    frame is zero. exact: (T,V,3) [m] or None. pin_positions: frame -> (P,3) [m] of handles that move.
-    substeps: time steps that a simulator takes for a frame. glitch: the frame whose pose is wrong on purpose.
-    kept: frames of the motion that a trajectory holds, or None for all. repeated: two sets of frames of the
-    trajectory that show the same motion. Raises ValueError for a warm-up below two.
+    Attributes:
+        name: of its declaration.
+        cloth: mesh, masses, material and pins.
+        energies: the terms declared; the time step adds inertia.
+        dt: [s] of a frame.
+        frames: positions of a trajectory, the start included.
+        settle: returns the start (V,3) [m] at rest, or positions and velocities (2,V,3) [m, m/s]. It may
+            itself simulate, so it is called once, off the clock.
+        obstacle: what the cloth touches, or None.
+        origin_heights: (T,) [m] where the gravity energy of each frame is zero.
+        exact: the exact answer (T,V,3) [m], or None.
+        dressed: body, garment and motion, or None.
+        pin_positions: frame -> (P,3) [m] of pins that move.
+        substeps: time steps that a simulator takes for a frame.
+        warm_up: frames at the beginning that metrics leave out; the first two have no two before them.
+        glitch: the frame whose pose is wrong on purpose.
+        kept: frames of the motion that a trajectory holds, or None for all.
+        repeated: two sets of frames of the trajectory that show the same motion.
+
+    Raises:
+        ValueError: a warm-up below two.
     """
 
     name: str

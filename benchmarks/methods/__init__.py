@@ -1,4 +1,16 @@
-"""Methods: the visible tuple of declarations. Nothing is imported until a cell needs it."""
+"""Methods: the visible tuple of declarations. Nothing is imported until a cell needs it.
+
+| folder | what lies there |
+| --- | --- |
+| catalogue | declarations, in blocks: networks, ablations, equal_data, solvers; trainings of networks |
+| networks | implementations that need a body: networks, skinning, collision post-processing, the bound |
+| solvers | implementations that solve the time step: the reference, its variants, stopped solvers |
+| minimisers | vertex block descent and XPBD on our energies |
+| outside | stored roll-outs and programs |
+
+>>> len({method.name for method in METHODS}) == len(METHODS)
+True
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,15 @@
-"""Metrics: the visible tuple of modules, each with the metrics it measures. See benchmarks.metric."""
+"""Metrics: the visible tuple of modules, each with the metrics it measures. See benchmarks.metric.
+
+| folder | metrics |
+| --- | --- |
+| energies | energy/*, excess/*, gap/*, step/*, gradient/norm |
+| surface | curvature/*, distance/*, penetration/*, drift/hem, deformation/*, dihedral/mean, body/*, mesh/* |
+| motion | dynamics/*, conservation/*, exact/distance, time_error/*, motion/*, roll_out/* |
+| cost | cost/*, solver/*, training_distance/*, performance/* |
+
+>>> find_metric("curvature/mean").unit
+'1/m'
+"""
 
 from __future__ import annotations
 

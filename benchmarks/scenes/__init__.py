@@ -1,4 +1,16 @@
-"""Scenes: the visible tuples of declarations. Nothing is imported until a scene is built."""
+"""Scenes: the visible tuples of declarations. Nothing is imported until a scene is built.
+
+| module | scenes |
+| --- | --- |
+| hanging_sheet, sheet_on_sphere, flag, twisted_strip, free_fall | small ones without a body, in SCENES |
+| dressed_body | "<garment>/<motion>": a body in a garment, by GARMENT_SCENES |
+| variations | declarations of FURTHER_SCENES: out of distribution, very long, other meshes and steps |
+| out_of_distribution, long_motion, dependence | their build() |
+| from_roll_out | the scene that a stored roll-out brings itself |
+
+>>> [scene.name for scene in SCENES][:2]
+['hanging_sheet', 'sheet_on_sphere']
+"""
 
 from __future__ import annotations
 
