@@ -1,148 +1,72 @@
-"""python -m reports.build RUN_DIR: the tables, figures and PDF of a finished run.
+"""python -m reports.build RUN_DIR: tables, figures, page and PDF of a finished run.
 
-Reads run.json, results.csv, frame_energies.csv, trajectories and histories of trainings in RUN_DIR, and
-nothing else; writes tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it
-writes the same bytes twice.
+Reads run.json, results.csv, frame_energies.csv, trajectories and models in RUN_DIR, and nothing else; writes
+tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from benchmarks.results.json_file import ResultsError
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import ResultsError, RunFolder
 from reference_sim.command.command_line import Parser, command
-from reference_sim.files.atomic_files import replacing
-from reports.run.read import read_run, read_trajectory
 
 if TYPE_CHECKING:
-    from reports.figures.plotting import Picture
-    from reports.figures.training import History
-    from reports.run.rows import Run
-
-TEMPLATE = Path(__file__).parent / "report.typ"
-# Names of what draw() makes.
-FIGURES = (
-    "against_shape.*", "against_vertices.*", "break_even.*", "convergence.*", "dots.*", "equal_data.*",
-    "energy_series_*", "error_against_time*", "failures.*", "frames_*", "held_out.*", "hem_*", "histograms.*",
-    "known_answers.*", "lead.*", "map_*", "stability_maps.*", "strip_*", "training_*", "training.*",
-)  # fmt: skip
+    from reports.figures.figure import Picture
 
 
 def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
-    """Make everything; returns the path of the PDF and what could not be read, one sentence each.
+    """Make tables, figures, page and PDF of a run.
 
-    Raises ResultsError when run.json or results.csv is absent, broken or of an earlier version, before
-    anything is written.
+    Returns:
+        Path of the PDF, and a sentence for each file that could not be read.
+
+    Raises:
+        ResultsError: when run.json or results.csv is absent, broken or of an earlier version; before anything
+            is written.
     """
+    # Heavy: not needed for --help.
+    from reports.blocks.block import Report
+    from reports.document.typeset import write_pdf
+    from reports.figures import FIGURES
+    from reports.figures.figure import draw_figures, remove_figures
+    from reports.page.write_page import write_page
+    from reports.pictures import PICTURES
+    from reports.run.reading import read_run_with_trainings
+    from reports.tables import make_tables
+    from reports.tables.table_files import write_tables
+
     folder = RunFolder(run_dir)
-    run = read_run(folder)
-    from reports.document.document import document
-    from reports.figures.training import curves_table, read_histories, trainings
-    from reports.page.write import write_page
-    from reports.tables.dictionary import dictionary
-    from reports.tables.latex import write_latex
-    from reports.tables.tables import make_tables
-
-    problems: list[str] = []
-    histories = read_histories(folder, run, problems)
-    tables = make_tables(run) | {made.name: made for made in trainings(run, histories)}
-    # Of other suites, asked for in this folder before. What --axes drew stays.
-    made = [path for kind in ("*.csv", "*.tex") for path in folder.tables.glob(kind)]
-    for old in [*made, *(p for kind in FIGURES for p in folder.figures.glob(kind))]:
-        old.unlink()
-    for table in (*tables.values(), dictionary(run)):
-        table.write_csv(folder.tables)
-    write_latex(run, tables, folder.tables)
-    for table in curves_table(histories):
-        table.write_csv(folder.tables)
-    pictures = draw(folder, run, histories, problems)
-    write_page(folder, run, tables, problems, lambda path: read_trajectory(folder, path, problems))
-    problems = list(dict.fromkeys(problems))  # the page reads again what was drawn
-    typeset(folder, document(run, tables, pictures, problems))
-    return folder.report_path, problems
-
-
-def draw(folder: RunFolder, run: Run, histories: Sequence[History], problems: list[str]) -> list[Picture]:
-    """Every figure that the run holds something for."""
-    from reports.figures import figures
-    from reports.figures.break_even import break_even
-    from reports.figures.convergence import convergence_curve
-    from reports.figures.equal_data import error_against_frames, held_out_curves
-    from reports.figures.shapes import against_shape
-    from reports.figures.stability import stability_maps
-    from reports.figures.training import training_curves
-    from reports.figures.work_precision import error_against_time
-    from reports.pictures.chosen_roll_outs import draw_roll_outs
-
-    pictures = draw_roll_outs(folder, run, lambda path: read_trajectory(folder, path, problems))
-    for make in (
-        error_against_time, break_even, figures.dots, figures.against_vertices, against_shape,
-        figures.known_answers, stability_maps, error_against_frames,
-    ):  # fmt: skip
-        pictures += make(folder.figures, run)
-    for trained in (held_out_curves, training_curves):
-        pictures += trained(folder.figures, run, histories)
-    return pictures + convergence_curve(folder, problems)
+    run = read_run_with_trainings(folder)
+    tables = make_tables(run)
+    write_tables(folder.tables, run, tables)
+    figures = (*PICTURES, *FIGURES)
+    remove_figures(folder.figures, figures)
+    report = Report(run, tables, draw_figures(run, folder.figures, figures))
+    write_page(folder, report)
+    return write_pdf(folder, report), run.problems
 
 
 def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:
-    """Any metric against any other, into figures/. Raises ResultsError for a name that no row has."""
+    """Draw any metric against any other into figures/. Raises ResultsError for a name that no row has."""
+    from reports.figures.figure import save_drawing
+    from reports.figures.metric_against_metric import metric_against_metric
+    from reports.run.reading import read_run
+
     run = read_run(folder)
-    asked = scenes.split(",") if scenes else []
-    for what, names in (("metric", (x, y)), ("scene", asked)):
-        for name in names:
-            if name not in set(run.frame[what]):
-                raise ResultsError(f"{folder.rows_path}: no row has the {what} '{name}'")
-    from reports.figures.work_precision import metric_against_metric
-
-    asked = asked or most_shared(run, x, y)
-    picture = metric_against_metric(folder.figures, run, x, y, asked)
-    if picture is None:
-        where = ", ".join(asked) or "every scene"
-        raise ResultsError(f"{folder.rows_path}: fewer than two methods have both {x} and {y} on {where}")
-    return picture
-
-
-def most_shared(run: Run, x: str, y: str) -> list[str]:
-    """The scenes in which most methods have both metrics, the same methods in each."""
-    from reports.run.rows import SUITES
-
-    rows = run.cells(*SUITES)
-    rows = rows[rows["usable"] & rows["metric"].isin((x, y))]
-    count = rows.groupby(["scene", "method"])["metric"].nunique()
-    both = count[count == len({x, y})].reset_index().groupby("scene")["method"].agg(frozenset)
-    most: frozenset[str] = max(both, key=len, default=frozenset())
-    return sorted(str(scene) for scene, methods in both.items() if methods == most)
-
-
-def typeset(folder: RunFolder, content: dict[str, Any]) -> None:
-    """report.pdf from the template, with fonts of the typesetter alone and the run's own date."""
-    import typst
-
-    from reports.figures.plotting import printable
-    from reports.run.configuration import moment
-
-    config = folder.read_config()
-    finished = moment(config.get("finished")) or moment(config.get("started"))
-    compiler = typst.Compiler(
-        TEMPLATE.read_bytes(),
-        root=str(folder.path),
-        ignore_system_fonts=True,
-        sys_inputs={"content": printable(json.dumps(content, ensure_ascii=False, allow_nan=False))},
-    )
-    with replacing(folder.report_path) as temporary:
-        stamp = int(finished.timestamp()) if finished else 0
-        compiler.compile(output=str(temporary), format="pdf", timestamp=stamp)
+    try:
+        drawing = metric_against_metric(run, x, y, scenes.split(",") if scenes else ())
+    except ResultsError as error:
+        raise ResultsError(f"{folder.rows_path}: {error}") from None
+    return save_drawing(folder.figures, drawing)
 
 
 @command("reports.build", goes_on="the same command begins again", bad_input=(ResultsError,))
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit status: 0 made; 1 made, but some file of the run could not be read; 2 no run folder."""
+    """Run the command; return its exit status."""
     parser = Parser(
         prog="python -m reports.build",
         description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run.",
@@ -160,12 +84,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--scenes",
         metavar="NAME,...",
-        help="of --axes (default: those in which most methods have both)",
+        help="scenes of --axes (default: those in which most methods have both)",
     )
     options = parser.parse_args(arguments)
     if options.axes:
-        x, y = options.axes
-        picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
+        picture = draw_axes(RunFolder(options.run_dir), *options.axes, options.scenes)
         print(picture.caption, picture.path, sep="\n")
         return 0
     path, problems = build_report(options.run_dir)

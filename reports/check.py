@@ -1,16 +1,20 @@
-"""python -m reports.check RUN: what a reader of the run's numbers would miss, before they are published."""
+"""python -m reports.check RUN: gaps in a run's numbers, to be found before they are published."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
-from reports.run.read import read_run
-from reports.run.rows import Run
+from reports.run.finished_run import Run
+from reports.run.reading import read_run
 from reports.statistics.pareto import REPEATS, TIME
+from reports.tables import make_tables
+from reports.tables.dictionary import dictionary
 
 SHOWN = 4  # names in a line
 CELL = ["suite", "scene", "method", "seed"]
@@ -18,57 +22,47 @@ EXAMPLES = """examples:
   python -m reports.check reports/runs/NAME
 
 Each line is one finding:
-  files     not as the run or the report wrote them; tables that are not what results.csv gives
+  files     not as the run or the report wrote them; tables that are not what results.csv gives; no report
   unit      none, or not one for all rows of a metric, or not the declared one
   seeds     of a trained method, that others have and it has not
   hardware  a row that does not say where and with what it was measured; times of several machines
   spread    one seed; run times taken once; scenes in which nothing says how sure the reference is
   skips     a row that did not end well and gives no reason; a method without any row where others have one
-  numbers   of report.html or report.pdf that are in no CSV of the run
-The page is read cell by cell. Numbers of the PDF are looked for among all CSV files, by three digits and
-more: a weak test, for of random ones from .01 to 100 nine in ten are there in a run of four suites. It takes
-pip install pypdfium2.
 exit status: 0 nothing found; 1 something; 2 the folder is no run."""
 
 
 def findings(folder: RunFolder, run: Run) -> Iterator[tuple[str, str]]:
-    """(topic, finding) of everything that can be checked."""
-    from reports.check_numbers import numbers_of_pages, tables_as_made
-
-    for topic, check in (("unit", units), ("seeds", seeds), ("hardware", hardware), ("spread", spread),
-                         ("skips", skips)):  # fmt: skip
-        yield from ((topic, said) for said in check(run))
-    if run.changed:
-        yield "files", f"not as the run wrote them: {_names(run.changed)}"
-    yield from (("files", said) for said in tables_as_made(folder, run))
-    yield from (("numbers", said) for said in numbers_of_pages(folder))
+    """Yield (topic, finding) of everything that can be checked."""
+    for topic, check in CHECKS.items():
+        yield from ((topic, finding) for finding in check(run))
+    yield from (("files", finding) for finding in files(folder, run))
 
 
 def units(run: Run) -> Iterator[str]:
-    """Of metrics; a case has the unit of its own row."""
+    """Find metrics without one unit; a case has the unit of its own row."""
     declared = run.config.get("metrics") or {}
     rows = run.frame
     if len(none := rows[rows["unit"] == ""]):
         yield f"{len(none)} rows have none: {_names(none['metric'])}"
     rows = rows[(rows["case"] == "") & rows["usable"] & (rows["unit"] != "")]
-    for metric, own in rows.groupby("metric", sort=False)["unit"]:
-        found = sorted(set(own))
-        said = (declared.get(metric) or {}).get("unit")
-        if len(found) > 1 or (said and found != [said]):
-            yield f"{metric} has {' and '.join(found)}" + (f", declared is {said}" if said else "")
+    for metric, of_metric in rows.groupby("metric", sort=False)["unit"]:
+        units_here = sorted(set(of_metric))
+        unit = (declared.get(metric) or {}).get("unit")
+        if len(units_here) > 1 or (unit and units_here != [unit]):
+            yield f"{metric} has {' and '.join(units_here)}" + (f", declared is {unit}" if unit else "")
 
 
 def seeds(run: Run) -> Iterator[str]:
-    """Those that a trained method lacks of all that the run has."""
+    """Find seeds that a trained method lacks of all that the run has."""
     rows = run.frame[run.frame["seeded"] & (run.frame["status"] != "skipped")]
     asked = {int(seed) for seed in rows["seed"]}
-    for (scene, method), own in rows.groupby(["scene", "method"], sort=False)["seed"]:
-        if lacking := sorted(asked - {int(seed) for seed in own}):
-            yield f"{method} in {scene} has none of seed {_names(map(str, lacking))}"
+    for (scene, method), present in rows.groupby(["scene", "method"], sort=False)["seed"]:
+        if missing := sorted(asked - {int(seed) for seed in present}):
+            yield f"{method} in {scene} has none of seed {_names(map(str, missing))}"
 
 
 def hardware(run: Run) -> Iterator[str]:
-    """Where each row was measured, and whether times are of one machine."""
+    """Find rows that do not say where they were measured, and times of several machines."""
     for column in ("preset", "commit", "hardware", "dtype"):
         if len(none := run.frame[run.frame[column] == ""]):
             yield f"{len(none)} rows have no {column}: {_names(none['scene'])}"
@@ -81,7 +75,7 @@ def hardware(run: Run) -> Iterator[str]:
 
 
 def spread(run: Run) -> Iterator[str]:
-    """What nobody repeated, so that no reader can tell a difference from chance."""
+    """Find numbers that nobody repeated, so that a difference cannot be told from chance."""
     cells = run.suite("garments", "speed")
     cells = cells[(cells["case"] == "") & cells["usable"]]
     trained = cells[cells["seeded"]]
@@ -100,7 +94,7 @@ def spread(run: Run) -> Iterator[str]:
 
 
 def skips(run: Run) -> Iterator[str]:
-    """Rows without a reason; methods without a row in scenes of a suite in which the reference ran."""
+    """Find rows without a reason, and methods without a row in scenes of a suite with the reference."""
     bad = run.frame[(run.frame["status"] != "ok") & (run.frame["reason"] == "")]
     for (scene, method, status), _ in bad.groupby(["scene", "method", "status"], sort=False):
         yield f"{method} in {scene}: {status}, without a reason"
@@ -108,34 +102,55 @@ def skips(run: Run) -> Iterator[str]:
         rows = run.suite(suite)
         rows = rows[rows["case"] == ""]
         methods = list(dict.fromkeys(rows["method"]))
-        for scene, own in rows.groupby("scene", sort=False)["method"]:
-            if run.reference in set(own) and (lacking := [m for m in methods if m not in set(own)]):
-                yield f"no row says why {scene} lacks {_names(lacking)}"
+        for scene, present in rows.groupby("scene", sort=False)["method"]:
+            missing = [m for m in methods if m not in set(present)]
+            if run.reference in set(present) and missing:
+                yield f"no row says why {scene} lacks {_names(missing)}"
+
+
+def files(folder: RunFolder, run: Run) -> Iterator[str]:
+    """Find files that are not as they were written, tables that differ from results.csv, a missing report."""
+    if run.changed:
+        yield f"not as the run wrote them: {_names(run.changed)}"
+    again = f"run python -m reports.build {folder.path}"
+    with tempfile.TemporaryDirectory() as temporary:
+        for table in (*make_tables(run).values(), dictionary(run)):
+            made, path = table.write_csv(Path(temporary)), folder.tables / f"{table.name}.csv"
+            if not path.is_file():
+                yield f"tables/{path.name} is absent: {again}"
+            elif path.read_bytes() != made.read_bytes():
+                yield f"tables/{path.name} is not what results.csv gives: {again}"
+    for path in (folder.page_path, folder.report_path):
+        if not path.is_file():
+            yield f"{path.name} is absent: {again}"
+
+
+CHECKS = {"unit": units, "seeds": seeds, "hardware": hardware, "spread": spread, "skips": skips}
 
 
 def _names(names: Iterable[str]) -> str:
-    """The first few, without repeats, and how many more."""
-    found = list(dict.fromkeys(names))
-    more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-    return ", ".join(found[:SHOWN]) + more
+    """Return the first few names, without repeats, and how many more there are."""
+    every = list(dict.fromkeys(names))
+    more = f" and {len(every) - SHOWN} more" if len(every) > SHOWN else ""
+    return ", ".join(every[:SHOWN]) + more
 
 
 @command("reports.check")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     parser = Parser(
         prog="python -m reports.check",
-        description="What a reader of a run's numbers would miss: units, seeds, hardware, spreads, reasons.",
+        description="Find gaps in a run's numbers: units, seeds, hardware, spreads, reasons, files.",
         epilog=EXAMPLES,
     )
     parser.add_argument("run_dir", metavar="RUN", help="folder of a run")
     options = parser.parse_args(arguments)
     folder = RunFolder(options.run_dir)
-    found = list(findings(folder, read_run(folder)))
-    for topic, said in found:
-        print(f"{topic:10}{said}")
-    print(f"{folder.path}: {len(found)} findings" if found else f"{folder.path}: nothing found")
-    return 1 if found else 0
+    every = list(findings(folder, read_run(folder)))
+    for topic, finding in every:
+        print(f"{topic:10}{finding}")
+    print(f"{folder.path}: {len(every)} findings" if every else f"{folder.path}: nothing found")
+    return 1 if every else 0
 
 
 if __name__ == "__main__":

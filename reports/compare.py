@@ -1,4 +1,4 @@
-"""python -m reports.compare A B: what changed from run A to run B beyond the noise of both, as a gate.
+"""python -m reports.compare A B: changes from run A to run B beyond the noise of both; fails if worse.
 
 Only cells that both runs have are compared: the same scene, method and seed. Suite garments is compared by
 garment, over its motions and seeds; every other scene by itself, over its seeds.
@@ -15,12 +15,12 @@ import pandas as pd
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
-from reports.run.read import read_run
-from reports.run.rows import SUITES, Metric, Run
-from reports.statistics.means import Mean, means
+from reports.run.finished_run import SUITES, Metric, Run
+from reports.run.reading import read_run
+from reports.statistics.means_and_spreads import Mean, means
 from reports.statistics.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
 from reports.statistics.significance import OPEN, TIED, Effect, effect_on, holm, standing
-from reports.tables.numbers import number, with_spread
+from reports.tables.number_texts import number, with_spread
 
 CELL = ["scene", "method", "seed", "metric"]
 GROUP = ["place", "method", "metric"]

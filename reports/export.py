@@ -163,9 +163,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = make_parser().parse_args(arguments)
     path = Path(options.out)
     demand_writable(path)
-    from reports.run.kept_roll_outs import read_kept
+    from reports.run.selected_roll_outs import select_roll_outs
 
-    kept = read_kept(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
+    kept = select_roll_outs(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
     cloth = kept.cloths[options.method]
     meshes = {"garment": cloth} | ({"body": kept.body.first(cloth.frames)} if kept.body else {})
     write(path, meshes)

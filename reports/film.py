@@ -18,7 +18,7 @@ from reports.pictures.render import camera_axes, vertex_normals
 
 if TYPE_CHECKING:
     from reference_sim.trajectory.trajectory import Trajectory
-    from reports.run.kept_roll_outs import Kept
+    from reports.run.selected_roll_outs import SelectedRollOuts
 
 EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.mp4
@@ -40,7 +40,7 @@ SWATCH = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).s
 class Stage:
     """Cloths and body in one scene, of which one cloth is shown at a time: every view has the same camera."""
 
-    def __init__(self, kept: Kept, width: int, azimuth: float) -> None:
+    def __init__(self, kept: SelectedRollOuts, width: int, azimuth: float) -> None:
         import pyvista
         from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -96,7 +96,7 @@ def _move(mesh, positions: np.ndarray, frame: int) -> None:
     mesh.point_data.active_normals = vertex_normals(mesh.points.astype(float), mesh.regular_faces)
 
 
-def camera_path(kept: Kept, axes: np.ndarray) -> tuple[np.ndarray, float]:
+def camera_path(kept: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
     """Where the camera looks in each frame (T,3) [m], smoothed, and half the height that it must see [m]."""
     cloths = kept.cloths.values()
     frames = max(cloth.frames for cloth in cloths)
@@ -115,7 +115,7 @@ def camera_path(kept: Kept, axes: np.ndarray) -> tuple[np.ndarray, float]:
     return centres @ axes.T, MARGIN * float(max(up, TALL * right))
 
 
-def pictures(kept: Kept, width: int, azimuth: float) -> Iterator[np.ndarray]:
+def pictures(kept: SelectedRollOuts, width: int, azimuth: float) -> Iterator[np.ndarray]:
     """Every frame of the film: all views with their names, and the time."""
     stage = Stage(kept, width, azimuth)
     try:
@@ -127,7 +127,7 @@ def pictures(kept: Kept, width: int, azimuth: float) -> Iterator[np.ndarray]:
         stage.close()
 
 
-def _composed(kept: Kept, views: dict[str, np.ndarray], frame: int, time: float) -> np.ndarray:
+def _composed(kept: SelectedRollOuts, views: dict[str, np.ndarray], frame: int, time: float) -> np.ndarray:
     """Views in rows, each under its method's name, and the time [s] below them."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
@@ -239,9 +239,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
         raise ValueError("--speed is .01 to 10, --width 64 to 2000")
     demand_possible(path)
-    from reports.run.kept_roll_outs import read_kept
+    from reports.run.selected_roll_outs import select_roll_outs
 
-    kept = read_kept(RunFolder(options.run_dir), options.scene, methods, options.seed)
+    kept = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
     dt = min(cloth.dt for cloth in kept.cloths.values())
     rate = options.speed / dt if dt > 0.0 else 1.0
     with replacing(path) as temporary:

@@ -1,1 +1,1 @@
-"""The PDF of a run."""
+"""The PDF of a run: report blocks laid out by a typesetter."""

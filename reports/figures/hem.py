@@ -1,42 +1,63 @@
-"""How a hem answers to the body's motion, frame by frame: the dynamics that no energy of a frame shows."""
+"""Dynamics of the hem frame by frame: how it answers to the body's motion."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from reports.figures.plotting import PAGE_WIDTH, Picture, file_name, grid, legend_above, new_figure, save
-from reports.figures.styles import leading, style
-from reports.run.rows import Run
-from reports.tables.numbers import number
-
-if TYPE_CHECKING:
-    from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory.trajectory import Trajectory
+from reports.figures.chosen_roll_outs import SceneRollOuts, long_motion
+from reports.figures.figure import Drawing, Figure
+from reports.figures.method_styles import leading, style
+from reports.figures.plotting import PAGE_WIDTH, file_name, grid, legend_above, new_figure
+from reports.run.finished_run import Run
+from reports.tables.number_texts import number
 
 YAW, FROM_END = "hem/yaw", "hem/from_end"
-LEAST = np.radians(5.0)  # of yaw: with less there is nothing to see
+LEAST_YAW = np.radians(5.0)  # with less there is nothing to see
 HELD = 24  # frames a body holds still at the end to count as stopped, as for the ringing
 BEFORE = 4  # frames before the stop that are shown with what follows it
 STOPPED = "#F3F3F3"
 
 
-def hem_curves(
-    folder: Path, run: Run, scene: str, series: Mapping[str, Trajectory], body: Trajectory | None = None
-) -> Picture | None:
-    """Yaw of the hem in the root's axes and its distance from where it ends, a curve per method.
+class Hem(Figure):
+    """Yaw of the hem in the root's axes and its distance from where it ends, a curve per method."""
 
-    Where the body stops, that is marked, and what follows is drawn again, larger. None for a scene without
-    these curves, or whose hem hardly turns.
-    """
-    having = {m for m, mesh in series.items() if {YAW, FROM_END} <= mesh.frame_fields.keys()}
-    frames = max((series[m].frames for m in having), default=0)  # what ended early has no end to swing about
-    methods = leading(run, (m for m in having if series[m].frames == frames))
+    name, files = "hem", ("hem_*",)
+
+    def needs(self, run: Run) -> bool:
+        """Return whether the hem turns in the motion that is shown at length."""
+        motion = long_motion(run)
+        return motion is not None and hem_turns(run, motion.roll_outs)
+
+    def draw(self, run: Run) -> Iterator[Drawing]:
+        """Draw that motion."""
+        motion = long_motion(run)
+        assert motion is not None
+        yield draw_hem(run, motion.roll_outs)
+
+
+def _methods_with_hem(run: Run, roll_outs: SceneRollOuts) -> list[str]:
+    """Return the methods with curves of the hem; a roll-out that ended early has no end to swing about."""
+    series = roll_outs.series
+    measured = {m for m, cloth in series.items() if {YAW, FROM_END} <= cloth.frame_fields.keys()}
+    frames = max((series[m].frames for m in measured), default=0)
+    return leading(run, (m for m in measured if series[m].frames == frames))
+
+
+def hem_turns(run: Run, roll_outs: SceneRollOuts) -> bool:
+    """Return whether a hem turns by LEAST_YAW or more in these roll-outs."""
+    methods = _methods_with_hem(run, roll_outs)
+    yaw = [np.degrees(roll_outs.series[m].frame_fields[YAW]) for m in methods]
+    largest = max((float(np.nanmax(np.abs(curve))) for curve in yaw), default=0.0)
+    return largest >= np.degrees(LEAST_YAW)
+
+
+def draw_hem(run: Run, roll_outs: SceneRollOuts) -> Drawing:
+    """Draw yaw and distance; where the body stops, that is marked and what follows drawn again, larger."""
+    series, body, methods = roll_outs.series, roll_outs.body, _methods_with_hem(run, roll_outs)
     yaw = {m: np.degrees(series[m].frame_fields[YAW]) for m in methods}
-    if max((float(np.nanmax(np.abs(curve))) for curve in yaw.values()), default=0.0) < np.degrees(LEAST):
-        return None
     stop = None if body is None else stop_frame(body)
     from_end = {m: 1e3 * series[m].frame_fields[FROM_END] for m in methods}
     panels = [("yaw of the hem [degrees]", yaw, 0), ("from its end [mm]", from_end, 0)]
@@ -56,25 +77,25 @@ def hem_curves(
         axes.set(title=title, xlabel="time [s]")
         grid(axes)
     legend_above(figure, [style(run, method) for method in methods], lines=True)
-    caption = f"{scene}: the hem in the axes of the root."
+    caption = f"{roll_outs.scene}: the hem in the axes of the root."
     if stop is not None and body is not None:
         caption += f" Grey: the body has stopped, at {number(float(body.times[stop]))} s. "
         far = [f"{run.label(m)} {number(round(overshoot(c, stop), 1), 2)}" for m, c in yaw.items()]
         caption += f"Farthest past its end after the stop, in degrees: {', '.join(far)}."
-    return save(figure, folder, f"hem_{file_name(scene)}", caption=caption, kind="hem")
+    return Drawing(figure, f"hem_{file_name(roll_outs.scene)}", caption)
 
 
 def stop_frame(body: Trajectory) -> int | None:
-    """The frame from which the body stays where it is, None where it does not hold still at the end."""
+    """Return the frame from which the body holds still, None where it moves until the end."""
     moves = np.flatnonzero((body.positions[:-1] != body.positions[-1]).any(axis=(1, 2)))
     stop = int(moves[-1]) + 1 if len(moves) else 0
     return stop if 0 < stop < body.frames - HELD else None
 
 
 def overshoot(yaw: Sequence[float] | np.ndarray, stop: int) -> float:
-    """How far past its end a hem swings once the body has stopped: the lesser of its farthest on either side.
+    """Return how far a hem swings past its end once the body has stopped.
 
-    A hem that comes to its end from one side has none.
+    It is the lesser of the farthest on either side: a hem that comes to its end from one side has none.
     """
     away = np.asarray(yaw)[stop:] - yaw[-1]
     return float(min(away.max(), -away.min()))

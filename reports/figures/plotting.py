@@ -1,11 +1,10 @@
-"""One look for all plots, and files that come out the same every time they are made."""
+"""Plotting in one look, into files that come out the same every time."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.atomic_files import replacing
-from reports.figures.styles import Style
+from reports.figures.method_styles import Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +50,7 @@ _LOOK: dict[Any, Any] = {
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure [inches] in the look of the report, without pyplot and its global state."""
+    """Make an empty figure [inches] in the look of the report, without pyplot and its global state."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -81,7 +80,7 @@ def log_axis(axes: Axes, which: str) -> None:
 
 
 def power_text(value: float) -> str:
-    """For matplotlib, whose raised digits are too small to read: "0.25", "2e-7"."""
+    """Return a number as "0.25" or "2e-7": matplotlib's raised digits are too small to read."""
     if value == 0.0 or 1e-3 <= abs(value) < 1e4:
         return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
     mantissa, _, power = f"{value:.0e}".partition("e")
@@ -89,7 +88,7 @@ def power_text(value: float) -> str:
 
 
 def wrapped(name: str, width: int = 44) -> str:
-    """A long name on several lines, broken after a separator where there is one."""
+    """Break a long name into lines, after a separator where there is one."""
     lines = [""]
     for piece in re.findall(rf"[^_/ :-]{{1,{max(width - 1, 1)}}}[_/ :-]?|[_/ :-]", name):
         if lines[-1] and len(lines[-1]) + len(piece) > width:
@@ -99,40 +98,31 @@ def wrapped(name: str, width: int = 44) -> str:
 
 
 def printable(text: str) -> str:
-    """The text with letters that the typesetter's fonts do not have as "U+88FE"."""
-    lacking = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
-    return text.translate({ord(c): f"U+{ord(c):04X}" for c in lacking})
+    """Return the text with letters that the typesetter's fonts do not have as "U+88FE"."""
+    missing = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
+    return text.translate({ord(c): f"U+{ord(c):04X}" for c in missing})
 
 
 @cache
 def _letters() -> frozenset[str]:
-    """What DejaVu Sans Mono has: the widest of the typesetter's fonts, and in matplotlib too."""
+    """Return the letters of DejaVu Sans Mono, the widest of the typesetter's fonts, which matplotlib has too."""
     from matplotlib.font_manager import findfont, get_font
 
     return frozenset(map(chr, get_font(findfont("DejaVu Sans Mono")).get_charmap()))
 
 
 def grid(axes: Axes, which: str = "both") -> None:
+    """Draw pale lines behind the data."""
     axes.grid(True, axis=which, color=GRID, linewidth=0.6)  # type: ignore[arg-type]
 
 
 def file_name(text: str) -> str:
-    """A scene's or method's name as part of a file name, in letters that the report's text keeps."""
+    """Return a scene's or method's name as part of a file name, in letters that the report's text keeps."""
     return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A finished figure: its file for the PDF, caption, kind and share of the page's width."""
-
-    path: Path
-    caption: str
-    kind: str
-    width: float
-
-
-def save(figure: Figure, folder: Path, name: str, *, caption: str, kind: str, vector: bool = True) -> Picture:
-    """Write <name>.png and, unless it is a photograph, <name>.svg, which the PDF then takes."""
+def save(figure: Figure, folder: Path, name: str, *, vector: bool = True) -> Path:
+    """Write <name>.png and, if `vector`, <name>.svg; return the path of the latter, or else of the former."""
     path = folder / f"{name}.png"
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=200, metadata={"Software": None})
@@ -141,18 +131,18 @@ def save(figure: Figure, folder: Path, name: str, *, caption: str, kind: str, ve
         path = folder / f"{name}.svg"
         with replacing(path) as temporary:
             figure.savefig(temporary, metadata={"Date": None})
-    return Picture(path, caption, kind, min(1.0, float(figure.get_figwidth()) / PAGE_WIDTH))
+    return path
 
 
 def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
-    """One legend for all panels, above them: of lines, or else of markers (of none where that is empty)."""
+    """Draw one legend for all panels, above them: of lines, or else of markers."""
     letters = [len(look.label) + 8 for look in entries]
     columns = _columns(letters, figure.get_figwidth() / PAGE_WIDTH)
     _legend(figure, entries, lines, loc="outside upper center", ncols=columns)
 
 
 def legend_beside(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
-    """The same in columns to the right."""
+    """Draw one legend for all panels in columns to the right."""
     _legend(figure, entries, lines, loc="outside right center", ncols=-(-len(entries) // MOST_LINES))
 
 
@@ -182,8 +172,9 @@ def _legend(figure: Figure, entries: Sequence[Style], lines: bool, **more: Any) 
 
 
 def _columns(letters: Sequence[int], width: float = 1.0) -> int:
-    """As many columns of a legend as fit into that share of the page's width: it is filled column by column,
-    each as wide as its longest entry.
+    """Return as many columns of a legend as fit into that share of the page's width.
+
+    It is filled column by column, each as wide as its longest entry.
     """
     count = len(letters)
     for columns in range(count, 1, -1):

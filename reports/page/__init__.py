@@ -1,1 +1,1 @@
-"""report.html: the garments of a run in motion, its plots and its tables, as one file that opens offline."""
+"""The page of a run, report.html: garments in motion, plots and tables in one file that opens offline."""

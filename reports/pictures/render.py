@@ -1,4 +1,4 @@
-"""Shaded pictures of meshes: an orthographic camera, a depth buffer, light from the side.
+"""Rendering of meshes: an orthographic camera, a depth buffer, light from the side.
 
 Drawn with numpy alone: no OpenGL is needed, whose drivers kill the process where there is no display, and
 the same machine gives the same bytes.
@@ -23,8 +23,9 @@ CREASE = 0.008  # [m] below its surroundings at which a fold is at its darkest
 
 @dataclass(frozen=True)
 class Camera:
-    """An orthographic camera: centre (3,) [m] and height [m] of what it sees, turned by `turn` degrees about
-    the vertical, a little from above; y is up and a body faces +z.
+    """An orthographic camera that looks a little from above; y is up and a body faces +z.
+
+    centre (3,) [m] and height [m] are of what it sees, turn [degrees] is about the vertical.
     """
 
     centre: np.ndarray
@@ -32,12 +33,12 @@ class Camera:
     turn: float = -25.0
 
     def seen(self, positions: np.ndarray) -> np.ndarray:
-        """(V,3) [m] -> (V,3): right, up and towards the camera, from the middle of the picture [m]."""
+        """Return positions (V,3) [m] as right, up and towards the camera, from the middle of the picture [m]."""
         return (positions - self.centre) @ camera_axes(self.turn)
 
 
 def camera_axes(turn: float) -> np.ndarray:
-    """(3,3): right, up and towards the camera as columns; turned from +z to -x [degrees]."""
+    """Return (3,3): right, up and towards the camera as columns; turned from +z to -x [degrees]."""
     side, lift = np.radians(-turn), np.radians(ABOVE)
     towards = np.array([np.sin(side) * np.cos(lift), np.sin(lift), np.cos(side) * np.cos(lift)])
     right = np.array([np.cos(side), 0.0, -np.sin(side)])
@@ -45,7 +46,7 @@ def camera_axes(turn: float) -> np.ndarray:
 
 
 def camera_for(positions: Sequence[np.ndarray], turn: float, tall: float) -> Camera:
-    """One that just sees all of these (V,3) [m], in a picture `tall` times as high as wide."""
+    """Return a camera that just sees all of these (V,3) [m], in a picture `tall` times as high as wide."""
     seen = np.concatenate(positions) @ camera_axes(turn)
     low, high = seen.min(axis=0), seen.max(axis=0)
     width, height = (high - low)[:2]
@@ -65,16 +66,16 @@ class Surface:
 def views(
     body: Surface | None, cloths: Sequence[Surface], camera: Camera, width: int, height: int
 ) -> list[np.ndarray]:
-    """A picture (height,width,3) of each cloth on the same body: colours 0 to 1 on white."""
+    """Render each cloth on the same body (height,width,3): colours 0 to 1 on white."""
     w, h = width * SAMPLES, height * SAMPLES
     depth, image = np.full(h * w, -np.inf), np.ones((h * w, 3))
     if body is not None:
         _paint(body, camera, (w, h), depth, image)
     pictures = []
     for cloth in cloths:
-        own, painted = depth.copy(), image.copy()
-        _paint(cloth, camera, (w, h), own, painted)
-        painted = _creased(painted.reshape(h, w, 3), own.reshape(h, w))
+        nearest, painted = depth.copy(), image.copy()
+        _paint(cloth, camera, (w, h), nearest, painted)
+        painted = _creased(painted.reshape(h, w, 3), nearest.reshape(h, w))
         pictures.append(painted.reshape(height, SAMPLES, width, SAMPLES, 3).mean(axis=(1, 3)))
     return pictures
 
@@ -82,7 +83,7 @@ def views(
 def _paint(
     surface: Surface, camera: Camera, size: tuple[int, int], depth: np.ndarray, image: np.ndarray
 ) -> None:
-    """Into the buffers (h*w,) and (h*w,3), where the surface is the nearest yet."""
+    """Paint into the buffers (h*w,) and (h*w,3), where the surface is the nearest yet."""
     w, h = size
     seen = camera.seen(surface.positions)
     scale = h / camera.height
@@ -96,12 +97,12 @@ def _paint(
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
     key, fill = (np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0) for light in (KEY, FILL))
-    own = np.broadcast_to(np.asarray(surface.colour, dtype=float), (len(seen), 3))
-    image[pixels] = (0.36 + 0.72 * key + 0.16 * fill)[:, None] * (weights * own[corners]).sum(axis=1)
+    colours = np.broadcast_to(np.asarray(surface.colour, dtype=float), (len(seen), 3))
+    image[pixels] = (0.36 + 0.72 * key + 0.16 * fill)[:, None] * (weights * colours[corners]).sum(axis=1)
 
 
 def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles (F,3,2) in pixels -> for each pixel in each of them: its number, the face, weights (P,3)."""
+    """Return for each pixel in each triangle (F,3,2) [pixels]: its number, the face, weights (P,3)."""
     low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, [w, h])
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int), 0, [w, h])
     first, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -131,17 +132,17 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
 
 
 def vertex_normals(seen: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit normals (V,3) of vertices, by the areas of their faces; of one without any, zero."""
+    """Return unit normals (V,3) of vertices, by the areas of their faces; zero for one without any."""
     corners = seen[faces]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    found = np.stack(
+    normals = np.stack(
         [np.bincount(faces.ravel(), np.repeat(flat[:, k], 3), len(seen)) for k in range(3)], axis=1
     )
-    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def _creased(image: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """Darker where the surface lies a little below its surroundings, as in a fold; not behind an arm."""
+    """Darken where the surface lies a little below its surroundings, as in a fold; not behind an arm."""
     shown = np.isfinite(depth)
     level, reach = np.where(shown, depth, 0.0), image.shape[1] / 66.0
     share = np.maximum(gaussian_filter(shown.astype(float), reach), 1e-6)

@@ -1,4 +1,4 @@
-"""Methods as points in the plane of run time and error: which are beaten by none, who first reaches what."""
+"""Methods as points in the plane of run time and error, and the Pareto front among them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from reports.run.rows import Run
-from reports.statistics.means import means
+from reports.run.finished_run import Run
+from reports.statistics.means_and_spreads import means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
@@ -18,19 +18,19 @@ ERRORS = (
 )  # fmt: skip
 PLANES = {"gap/energy": "gap/refrozen"}  # what the reference leaves where its planes are searched at its end
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
-
-
+# Of the step's own potential, which another step size changes.
+OWN_STEP = ("gap/energy", "gap/relative", "step/curvature", "step/distance", "gradient/norm")
 MOST_SLACK = 0.2  # share of a run time within which another one may count as no slower
 
 
 @dataclass(frozen=True)
 class Point:
-    """A method's run time [ms per frame] and error.
+    """Run time [ms per frame] and error of a method.
 
     time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
     standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is more,
     how far another simulation as right as the reference moves it. Both 0 where unknown.
-    fewer: words on seeds that are missing, empty where none is.
+    fewer: remark on seeds that are missing, empty where none is.
     """
 
     method: str
@@ -42,9 +42,14 @@ class Point:
 
 
 def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str, x: str = "") -> list[Point]:
-    """Every method that has both numbers in all the scenes, as means over them and the seeds that did all.
+    """Return a point for each method that has both numbers in all the scenes and seeds.
 
-    x: another metric than the run time.
+    Args:
+        run: the run.
+        frame: rows of it.
+        scenes: over which means are taken, over seeds too that came through all of them.
+        metric: of the error.
+        x: metric in place of the run time.
     """
     rows = frame[frame["scene"].isin(list(scenes))]
     x = x or run_time(rows)
@@ -54,29 +59,34 @@ def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str,
     rows = rows.assign(usable=rows["usable"] & in_all)
     rows = rows[rows["metric"].isin([metric, x, TIME, REPEATS]) | ~rows["usable"]]
     wide = means(rows, "method", "metric")
-    found = []
+    points = []
     for method in run.ordered(rows["method"]):
-        time, error, own, repeats = (wide.get((method, name)) for name in (x, metric, TIME, REPEATS))
+        time, error, inference, repeats = (wide.get((method, name)) for name in (x, metric, TIME, REPEATS))
         if time is None or error is None:
             continue
         spread = 2.0 * (time.spread or 0.0)
-        if repeats is not None and own is not None and x in (TIME, WHOLE):
-            spread = own.value * repeats.value / 100.0
-        found.append(
+        if repeats is not None and inference is not None and x in (TIME, WHOLE):
+            spread = inference.value * repeats.value / 100.0
+        points.append(
             Point(method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0, error.fewer)
         )
-    return found
+    return points
 
 
 def run_time(rows: pd.DataFrame) -> str:
-    """The metric of run time that these rows share: from pose to vertices where every timed cell has that."""
+    """Return the metric of run time of these rows: end-to-end time where every timed cell has it."""
     usable = rows[rows["usable"]].set_index(["scene", "method", "seed"])
-    own, whole = (usable.index[usable["metric"] == name] for name in (TIME, WHOLE))
-    return WHOLE if len(whole) and own.isin(whole).all() else TIME
+    inference, whole = (usable.index[usable["metric"] == name] for name in (TIME, WHOLE))
+    return WHOLE if len(whole) and inference.isin(whole).all() else TIME
+
+
+def time_label(metric: str) -> str:
+    """Return the label of an axis of run time."""
+    return f"run time, {'pose to vertices' if metric == WHOLE else 'own work'} [ms per frame]"
 
 
 def front(points: Iterable[Point]) -> list[Point]:
-    """Those to which no other is at once at least as fast and as accurate, from fast to accurate."""
+    """Return the Pareto front: points that no other beats in both, from fast to accurate."""
     best: list[Point] = []
     for point in sorted(points, key=lambda p: (p.time, p.error, p.method)):
         if not best or point.error < best[-1].error:
@@ -85,48 +95,74 @@ def front(points: Iterable[Point]) -> list[Point]:
 
 
 def fastest(points: Iterable[Point], error: float) -> Point | None:
-    """The fastest with at most that error, or None."""
+    """Return the fastest point with at most that error, or None."""
     reached = [point for point in points if point.error <= error]
     return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
 
 
 def of_one_problem(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Those that solve what the reference solves."""
+    """Return the points of methods that solve the same discrete problem as the reference."""
     return [p for p in points if run.methods[p.method].family != SMALLER_STEPS]
 
 
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Solvers alone, truncated or to a tolerance, with nothing learned, of the reference's own problem."""
+    """Return the points of solvers without anything learned, of the reference's discrete problem."""
     kept = set(run.with_role("reference", "solver", "reference-variant"))
     return [p for p in of_one_problem(run, points) if p.method in kept]
 
 
 def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Of the solvers alone those that differ from others of their family by one number."""
+    """Return the points of solvers that differ from others of their family by one number."""
     return [p for p in solvers(run, points) if run.methods[p.method].level is not None]
 
 
 def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
-    """The error [unit of the metric] below which a method is as near to the reference as another right one.
+    """Return the error [unit of the metric] below which a method is inconclusive from the reference.
 
-    The largest of simulations from moved starts and with planes searched twice; of the gap what the
-    reference leaves on planes searched at its end. 0 where none is known.
+    It is the largest of the perturbed references; of the energy gap what the reference leaves on contact
+    planes searched at its end. 0 where none is known.
     """
-    who, what = ([run.reference], PLANES[metric]) if metric in PLANES else (run.twins, metric)
-    kept = rows[rows["usable"] & (rows["metric"] == what) & rows["method"].isin(who)]["value"]
+    ensemble = [run.reference] if metric in PLANES else run.reference_ensemble
+    of_ensemble = (rows["metric"] == PLANES.get(metric, metric)) & rows["method"].isin(ensemble)
+    kept = rows[rows["usable"] & of_ensemble]["value"]
     return float(kept.max()) if len(kept) else 0.0
 
 
-def beaten_by(points: Sequence[Point], own: Point) -> Point | None:
-    """The most accurate of those that are no slower and no less accurate, None where there is none."""
-    faster = [p for p in points if p is not own and overtaken(own, [p])]
+def beaten_by(points: Sequence[Point], point: Point) -> Point | None:
+    """Return the most accurate of the points that are no slower and no less accurate, or None."""
+    faster = [p for p in points if p is not point and overtaken(point, [p])]
     return min(faster, key=lambda p: p.error) if faster else None
 
 
 def overtaken(point: Point, others: Sequence[Point]) -> bool:
-    """Whether one of the others is no less accurate, and no slower by more than the point's own repeats.
+    """Return whether another is no less accurate and no slower by more than the point's own repeats.
 
     A rival whose run times scatter widely is no faster for that; nor is one that takes much longer.
     """
     latest = point.time + min(point.time_spread, MOST_SLACK * point.time)
     return any(p.error <= point.error and p.time <= latest for p in others)
+
+
+def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
+    """Return the rows of plots of error against run time, and their scenes in order.
+
+    Scenes of the first garment come first, among them those on which most methods were timed.
+    """
+    cells = run.cells("speed", "garments")
+    timed = cells[cells["usable"] & (cells["metric"] == TIME)]
+    apart = run.standing_apart(timed)
+    frame = cells[~cells["method"].isin(apart)]
+    ran = timed[~timed["method"].isin(apart)].groupby("scene")["method"].nunique()
+    first = next(iter(run.garments(frame).values()), [])
+    scenes = [scene for scene in dict.fromkeys(frame["scene"]) if scene in ran]
+    return frame, sorted(scenes, key=lambda scene: (scene not in first, -int(ran[scene])))
+
+
+def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
+    """Return the points of one panel; the reference, whose error is zero by construction, is none of them."""
+    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
+    # Smaller steps have errors of the garment, but none of the reference's own step.
+    left_out = (SMALLER_STEPS,) if metric in OWN_STEP else ()
+    reference = run.with_role("reference")
+    kept = [p for p in points if run.methods[p.method].family not in left_out and p.method not in reference]
+    return [p for p in kept if p.time > 0.0]

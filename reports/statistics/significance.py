@@ -1,4 +1,4 @@
-"""How far two methods lie apart, with an interval and a p-value over motions and seeds; Holm's correction."""
+"""Effect of one method against another, with interval, p-value and Holm's correction."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from reports.run.rows import Metric, Run
-from reports.statistics.means import Mean, pair
+from reports.run.finished_run import Metric, Run
+from reports.statistics.means_and_spreads import Mean, pair
 
 TIE = 0.05  # share of the larger of two values up to which they count as equal
 LEVEL = 0.05  # of the two-sided tests, and what an interval leaves out
@@ -21,11 +21,11 @@ DRAWS, SEED = 10_000, 20220619  # of the bootstrap; the same draws for every com
 
 @dataclass(frozen=True)
 class Effect:
-    """The first method over the second, or less the second, with what motions and seeds leave uncertain.
+    """Ratio or difference of two methods, with the uncertainty that motions and seeds leave.
 
     value: on the scale of the test: the mean over motions and seeds of the difference, of logarithms where
-    `ratio`. error: its standard error, None where nothing was repeated; freedom: of Student's t. covers: what
-    was resampled: "motions and seeds", "motions", "seeds" or nothing. scale: by which a difference is a
+    `ratio`. error: its standard error, None where nothing was repeated; freedom: of Student's t. covers: the
+    resampled factors: "motions and seeds", "motions", "seeds" or nothing. scale: by which a difference is a
     share; 0 where nothing is known to be one. complete: neither mean lacks a scene or a
     seed. one_seed: whether a mean is of one seed, and nobody knows how far another would move it.
     """
@@ -41,12 +41,12 @@ class Effect:
 
     @property
     def shown(self) -> float:
-        """The ratio of the geometric means, or the difference of the means."""
+        """Ratio of the geometric means, or difference of the means."""
         return float(np.exp(self.value)) if self.ratio else self.value
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Of 95 %, of this comparison alone; None where nothing was repeated."""
+        """Interval of 95 % of this comparison alone; None where nothing was repeated."""
         if self.error is None:
             return None
         low, high = (self.value + sign * self._quantile * self.error for sign in (-1.0, 1.0))
@@ -54,9 +54,9 @@ class Effect:
             return (float(np.exp(low)), float(np.exp(high))) if self.ratio else (low, high)
 
     def p_value(self, factor: float = 1.0) -> float | None:
-        """Two-sided, that `factor` times the first is the second: below LEVEL where the interval excludes it.
+        """Return the two-sided p-value that `factor` times the first is the second.
 
-        None where nothing was repeated.
+        It is below LEVEL where the interval excludes it; None where nothing was repeated.
         """
         from scipy import stats
 
@@ -68,11 +68,11 @@ class Effect:
         return float(2.0 * stats.t.sf(distance / self.error, self.freedom))
 
     def above(self, factor: float = 1.0) -> float:
-        """How far, on the scale of the test, `factor` times the first is above the second."""
+        """Return how far `factor` times the first is above the second, on the scale of the test."""
         return self.value + (math.log(factor) if self.ratio else 0.0)
 
     def equal(self, factor: float = 1.0) -> bool:
-        """Whether all of the interval is within TIE of equality; the value where nothing was repeated."""
+        """Return whether all of the interval, or a value without one, is within TIE of equality."""
         reach = 0.0 if self.error is None else self._quantile * self.error
         return abs(self.above(factor)) + reach <= (-math.log1p(-TIE) if self.ratio else TIE * self.scale)
 
@@ -84,7 +84,7 @@ class Effect:
 
 
 def effect(one: Mean, other: Mean, *, differences: bool = False, scale: float | None = None) -> Effect:
-    """Of two means over the same motions, as reports.statistics.means.pair gives them.
+    """Compute the effect between two means over the same motions, as means_and_spreads.pair gives them.
 
     Positive numbers are compared by their logarithms, cell by cell: a violent motion has more of every energy
     with every method, and what came out a million times as large with one seed is told apart all the same.
@@ -123,8 +123,10 @@ def effect(one: Mean, other: Mean, *, differences: bool = False, scale: float | 
 
 
 def effect_on(metric: Metric, one: Mean, other: Mean, run: Run, rows: pd.DataFrame) -> Effect:
-    """Of two means of this metric. Where its zero is a choice, they are told apart by their difference, as a
-    share of what the baseline, skinning, has more than the reference in the same scenes of these rows.
+    """Compute the effect between two means of a metric.
+
+    Where its zero is a choice they are compared by their difference, as a share of the excess of skinning
+    (the baseline) over the reference in the same scenes of these rows.
     """
     if not metric.arbitrary_zero:
         return effect(one, other)
@@ -136,64 +138,65 @@ def effect_on(metric: Metric, one: Mean, other: Mean, run: Run, rows: pd.DataFra
 
 
 def _one_seed(mean: Mean, beside: Mean) -> bool:
-    """Whether the mean is of one seed of many, and the one beside it does not tell what seeds scatter."""
+    """Return whether the mean is of one seed and the other one does not show how seeds scatter."""
     return mean.seeded and mean.seeds == 1 and not (beside.seeded and beside.seeds > 1)
 
 
 def within_uncertainty(one: Mean, other: Mean, factor: float = 1.0) -> bool:
-    """Whether `factor` times the first differs from the second by no more than other references, as right as
-    the one taken, would move them apart; False where nobody measured that.
+    """Return whether `factor` times the first differs from the second within the reference's uncertainty.
+
+    False where nobody measured how far equally valid references would move them apart.
     """
     moved = _moved_apart(one, other, factor)
     return moved > 0.0 and abs(factor * one.value - other.value) <= moved
 
 
 def _moved_apart(one: Mean, other: Mean, factor: float) -> float:
-    """By how much another reference moves `factor` times the first against the second: the most that one of
-    them does in a scene, the mean of scenes. Most of what it does to one method it does to the other too.
+    """Return how far an equally valid reference moves `factor` times the first against the second.
 
-    Where nobody knows what each reference does, the sum of both uncertainties, which is no less.
+    It is the largest change by one of them in a scene, the mean of scenes: most of a change is common to both
+    methods. Where the single changes are unknown, the sum of both uncertainties, which is no less.
     """
     known = [mean.moved and mean.moved.keys() >= mean.cells.keys() for mean in (one, other)]
-    if any(mean.uncertainty and not told for mean, told in zip((one, other), known)):
+    if any(mean.uncertainty and not moved for mean, moved in zip((one, other), known)):
         return factor * (one.uncertainty or 0.0) + (other.uncertainty or 0.0)
     largest = []
     for scene in dict.fromkeys(scene for scene, _ in one.cells):
         first, second = (_moved_in(mean, scene) for mean in (one, other))
-        twins = first.keys() & second.keys() or first.keys() | second.keys()
-        apart = [abs(factor * first.get(twin, 0.0) - second.get(twin, 0.0)) for twin in twins]
+        references = first.keys() & second.keys() or first.keys() | second.keys()
+        apart = [abs(factor * first.get(name, 0.0) - second.get(name, 0.0)) for name in references]
         largest.append(max(apart, default=0.0))
     return float(np.mean(largest)) if largest else 0.0
 
 
 def _moved_in(mean: Mean, scene: str) -> dict[str, float]:
-    """What each other reference changes of the scene's value, the mean of seeds."""
+    """Return the change of the scene's value by each other reference, the mean of seeds."""
     changes: dict[str, list[float]] = {}
     for (where, _), moved in mean.moved.items():
-        for twin, change in moved.items() if where == scene else ():
-            changes.setdefault(twin, []).append(change)
-    return {twin: float(np.mean(found)) for twin, found in changes.items()}
+        for name, change in moved.items() if where == scene else ():
+            changes.setdefault(name, []).append(change)
+    return {name: float(np.mean(of_seeds)) for name, of_seeds in changes.items()}
 
 
-def standing(one: Mean, other: Mean, found: Effect, p: float | None, factor: float = 1.0) -> str:
-    """How `factor` times the first stands to the second: TIED, OPEN, LESS or MORE.
+def standing(one: Mean, other: Mean, far: Effect, p: float | None, factor: float = 1.0) -> str:
+    """Return how `factor` times the first stands to the second: TIED, OPEN, LESS or MORE.
 
-    p: of found.p_value(factor), corrected where the comparison is one of a family.
+    p: of far.p_value(factor), corrected where the comparison is one of a family.
     """
-    if found.one_seed:
+    if far.one_seed:
         return OPEN  # nobody knows how far another would move it
     if within_uncertainty(one, other, factor):
         return TIED
     if p is None or p >= LEVEL:
-        if found.equal(factor):
+        if far.equal(factor):
             return TIED
         if p is not None:
             return OPEN
-    return LESS if found.above(factor) < 0.0 else MORE
+    return LESS if far.above(factor) < 0.0 else MORE
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """The p-values of a family corrected for their number, in their order: Holm's step-down (1979)."""
+    """Return the p-values of a family corrected for their number, in their order: Holm's step-down (1979)."""
     corrected, largest = [1.0] * len(p_values), 0.0
     for rank, place in enumerate(np.argsort(p_values, kind="stable")):
         largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[place]))
@@ -202,13 +205,13 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def _grid(mean: Mean) -> np.ndarray:
-    """(M,S): the value of each motion with each seed, both in order."""
+    """Return (M,S): value of each motion with each seed, both in order."""
     scenes, seeds = (sorted(set(names)) for names in zip(*mean.cells))
     return np.array([[mean.cells[scene, seed] for seed in seeds] for scene in scenes])
 
 
 def _drawn_alike(one: Mean, other: Mean, first: np.ndarray, second: np.ndarray) -> list[np.ndarray]:
-    """Grids (M,S) whose means add up to the effect, each of which has seeds of its own."""
+    """Return grids (M,S) whose means add up to the effect, each with seeds of its own."""
     seeds = [{seed for _, seed in mean.cells} for mean in (one, other)]
     if one.pairing_group and one.pairing_group == other.pairing_group and seeds[0] == seeds[1]:
         return [first - second]
@@ -222,7 +225,7 @@ def _drawn_alike(one: Mean, other: Mean, first: np.ndarray, second: np.ndarray) 
 
 
 def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
-    """Standard error of the sum of the means of the grids (M,S), and its degrees of freedom."""
+    """Return the standard error of the sum of the means of the grids (M,S), and its degrees of freedom."""
     motions = _weights(len(grids[0]), 0)
     seeds = [_weights(grid.shape[1], stream) for stream, grid in enumerate(grids, 1)]
     draws = sum(np.einsum("bs,bs->b", motions @ grid, drawn) for grid, drawn in zip(grids, seeds))
@@ -237,7 +240,7 @@ def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
 
 @cache
 def _weights(count: int, stream: int) -> np.ndarray:
-    """(DRAWS,count) shares of `count` things in draws of count - 1 of them; a single thing is in each."""
+    """Return (DRAWS,count): shares of `count` things in draws of count - 1; a single thing is in each."""
     if count == 1:
         return np.ones((DRAWS, 1))
     generator = np.random.default_rng((SEED, stream, count))

@@ -1,1 +1,47 @@
-"""Tables of a run: PDF, CSV, LaTeX."""
+"""Tables of a run, for CSV, PDF, page and LaTeX.
+
+TABLES lists them in order; each entry makes its tables of a run. A new table of means is one Pivot here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from reports.run.finished_run import Run
+from reports.tables.ablations import ablation_effects, ablations
+from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
+from reports.tables.equal_data import EQUAL_DATA
+from reports.tables.findings import findings
+from reports.tables.metric_tables import metric_tables
+from reports.tables.outcomes import endings, extremes, metrics, unfinished, validation
+from reports.tables.page_one_table import overview
+from reports.tables.speed import SPEED, crossings, error_rivals, reference_uncertainty
+from reports.tables.table import Table
+from reports.tables.trainings import training_curves, trainings
+
+TABLES: tuple[Callable[[Run], list[Table]], ...] = (
+    metric_tables,
+    overview,
+    findings,
+    EQUAL_DATA,
+    ablations,
+    ablation_effects,
+    crossings,
+    error_rivals,
+    reference_uncertainty,
+    SPEED,
+    shapes,
+    SHAPES_BY_SCENE,
+    validation,
+    extremes,
+    endings,
+    unfinished,
+    metrics,
+    trainings,
+    training_curves,
+)
+
+
+def make_tables(run: Run) -> dict[str, Table]:
+    """Make every table that the run has a number for: name -> table."""
+    return {table.name: table for make in TABLES for table in make(run)}

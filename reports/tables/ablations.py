@@ -1,4 +1,4 @@
-"""Variants of a method beside their base, and how far the variation moves what."""
+"""Tables of ablations: variants of a method against their base."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from reports.run.rows import Run
-from reports.statistics.means import mean_of, pair
+from reports.run.finished_run import Run
+from reports.statistics.means_and_spreads import mean_of, pair
 from reports.statistics.significance import effect_on
-from reports.tables.table import Cell, Column, Table, metric_column, table
+from reports.tables.table import GARMENT, METHOD, Cell, Table, metric_column, table
 
 SHOWN = (
     "energy/strain", "energy/bending", "energy/gravity", "energy/inertia", "energy/collision", "energy/total",
@@ -18,14 +18,11 @@ SHOWN = (
 # A term that is left out of the loss is of course larger; the total is the base's own loss, curvature error
 # (the paper's measure) is nobody's.
 COMPARED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
-HEAD = (
-    Column("garment", "Garment", text=True),
-    Column("method", "Method", text=True, method=True),
-)
+HEAD = (GARMENT, METHOD)
 
 
 def ablations(run: Run) -> list[Table]:
-    """The numbers of each base and of its ablations that ran, by garment."""
+    """Tabulate the numbers of each base and of its ablations that ran, by garment."""
     metrics = [run.metrics[name] for name in SHOWN if name in run.metrics]
     lines: list[tuple[Cell, ...]] = [
         (garment, method, *(mean_of(rows, method, metric.name) for metric in metrics))
@@ -38,7 +35,7 @@ def ablations(run: Run) -> list[Table]:
 
 
 def ablation_effects(run: Run) -> list[Table]:
-    """Each ablation over its base, or less its base, with intervals."""
+    """Tabulate the effect of each ablation against its base, with intervals."""
     metrics = [run.metrics[name] for name in COMPARED if name in run.metrics]
     lines: list[tuple[Cell, ...]] = []
     for garment, base, below, rows in _families(run):
@@ -59,11 +56,11 @@ def ablation_effects(run: Run) -> list[Table]:
 
 
 def _families(run: Run) -> Iterator[tuple[str, str, list[str], pd.DataFrame]]:
-    """Garment, base, the ablations that ran beside it, and the rows of the garment."""
-    for garment in run.garments(run.worn):
-        rows = run.worn[run.worn["garment"] == garment]
+    """Yield garment, base, the ablations that ran with it, and the rows of the garment."""
+    for garment in run.garments(run.garment_rows):
+        rows = run.garment_rows[run.garment_rows["garment"] == garment]
         usable = rows[rows["usable"]]["method"]
-        beside = run.standing_apart(rows)
-        below = [method for method in run.ordered(usable) if method in beside]
+        ablations_here = run.standing_apart(rows)
+        below = [method for method in run.ordered(usable) if method in ablations_here]
         for base in dict.fromkeys(run.methods[method].base for method in below):
             yield garment, base, [m for m in below if run.methods[m].base == base], rows

@@ -1,9 +1,9 @@
-"""What stands in results.csv, generated from its declarations: each column, metric and judged case."""
+"""Dictionary of results.csv: each column, metric and judged case, as declared."""
 
 from __future__ import annotations
 
-from benchmarks.results.row import ROLES, STATUSES
-from reports.run.rows import Run
+from benchmarks.results.run_folder import ROLES, STATUSES
+from reports.run.finished_run import Run
 from reports.tables.table import Column, Table
 
 # The columns of benchmarks.results.row.Row: unit, where it has one, and meaning.
@@ -48,9 +48,9 @@ SIDES = {True: "lower", False: "higher", None: ""}
 
 
 def dictionary(run: Run) -> Table:
-    """A line for each column of results.csv, each metric of this run and each case that is judged."""
+    """List each column of results.csv, each metric of this run and each case that is judged."""
     lines: list[tuple[str, ...]] = [
-        ("column", name, unit, "", said, "", "") for name, (unit, said) in COLUMNS.items()
+        ("column", name, unit, "", meaning, "", "") for name, (unit, meaning) in COLUMNS.items()
     ]
     judged = run.frame[run.frame["case"] != ""].drop_duplicates("case")
     measured = set(run.frame[run.frame["case"] == ""]["metric"])
@@ -61,7 +61,7 @@ def dictionary(run: Run) -> Table:
     ]
     cases = run.config.get("cases") or {}
     for row in judged.itertuples():
-        said = str(cases[row.case].get("description") or "")
-        lines.append(("case", f"{row.scene} {row.metric}", row.unit, row.case, said, "", row.suite))
+        description = str(cases[row.case].get("description") or "")
+        lines.append(("case", f"{row.scene} {row.metric}", row.unit, row.case, description, "", row.suite))
     names = ("kind", "name", "unit", "title", "definition", "better", "table")
     return Table("dictionary", tuple(Column(name, name, text=True) for name in names), tuple(lines))

@@ -10,9 +10,9 @@ from textwrap import wrap
 import pandas as pd
 
 from reference_sim.files.atomic_files import replacing
-from reports.document.layout import column_texts, remarks_of
-from reports.run.rows import Run
-from reports.tables import paper
+from reports.run.finished_run import Run
+from reports.tables.cell_texts import column_texts, remarks_below
+from reports.tables.paper_values import PRINTED
 from reports.tables.table import Table
 
 HEAD = "% Needs \\usepackage{booktabs} and LuaLaTeX or XeLaTeX for names not Latin; as wide as two columns.\n"
@@ -27,14 +27,14 @@ _NUMBER = re.compile(r"(-?[\d,.]+(?:\\times 10\^\{-?\d+\})?)")
 
 def write_latex(run: Run, tables: Mapping[str, Table], folder: Path) -> None:
     """Write <folder>/<name>.tex of the tables that the paper has, each whole or not at all."""
-    for name in paper.PRINTED:
+    for name in PRINTED:
         if name in tables:
             with replacing(folder / f"{name}.tex") as temporary:
                 temporary.write_text(latex(run, tables[name]), encoding="utf-8", newline="\n")
 
 
 def latex(run: Run, table: Table) -> str:
-    """A table environment: names escaped, each number with its spread or uncertainty and its marks."""
+    """Return a table environment: names escaped, each number with its spread or uncertainty and marks."""
     columns = [
         column_texts(run, column, [row[place] for row in table.rows], [])
         for place, column in enumerate(table.columns)
@@ -45,13 +45,13 @@ def latex(run: Run, table: Table) -> str:
         head: [cell["text"] if column.text else _cell(cell) for cell in texts]
         for head, column, texts in zip(heads, table.columns, columns)
     }
-    words = [head for head, column in zip(heads, table.columns) if column.text]
+    texts = [head for head, column in zip(heads, table.columns) if column.text]
     styled = pd.DataFrame(cells).style.hide(axis="index")
-    styled = styled.format(escape="latex", subset=words)
+    styled = styled.format(escape="latex", subset=texts)
     styled = styled.format_index(_stacked, escape="latex", axis="columns")
-    # Of rows that stand beside the paper's in the PDF, the remark on those is not for here.
+    # Without the table's note, which is on the paper's own numbers in the PDF.
     lines = [list(line) for line in zip(*columns)]
-    note = remarks_of(Table(table.name, table.columns, table.rows), lines)
+    note = remarks_below(Table(table.name, table.columns, table.rows), lines)
     kinds = "".join("l" if column.text else "r" for column in table.columns)
     text = styled.to_latex(
         column_format=kinds, hrules=True, position_float="centering", caption=_plain(table.caption),
@@ -63,7 +63,7 @@ def latex(run: Run, table: Table) -> str:
 
 
 def _stacked(head: str) -> str:
-    """A heading of short lines, its unit on the last: columns are as wide as their numbers."""
+    """Return a heading of short lines, its unit on the last: columns are as wide as their numbers."""
     head = head.partition(NUMBER)[0]
     title, _, unit = head.partition(" [")
     lines = [*wrap(title, LINE, break_long_words=False), *([f"{{[{unit}}}"] if unit else [])]
@@ -81,16 +81,16 @@ def _cell(cell: Mapping[str, str]) -> str:
 
 
 def _math(text: str) -> str:
-    """A number as "2.50×10⁻⁷" or "1,730 s" with its digits in math, its unit not."""
-    plain = _POWER.sub(lambda found: rf"\times 10^{{{found[1]}}}", text.strip())
-    found = _NUMBER.match(plain.translate(_PLAIN))
-    if not found:
+    """Return a number as "2.50×10⁻⁷" or "1,730 s" with its digits in math, its unit not."""
+    plain = _POWER.sub(lambda power: rf"\times 10^{{{power[1]}}}", text.strip())
+    match = _NUMBER.match(plain.translate(_PLAIN))
+    if not match:
         return "--" if plain == "–" else plain.replace("∞", r"$\infty$")
-    return f"${found[1].replace(',', '{,}')}$" + plain[found.end() :].replace(" ", "~")
+    return f"${match[1].replace(',', '{,}')}$" + plain[match.end() :].replace(" ", "~")
 
 
 def _plain(text: str) -> str:
-    """Words of the report itself, with the few of their signs that LaTeX reads otherwise."""
+    """Return a text of the report itself, with the few signs replaced that LaTeX reads otherwise."""
     for sign, instead in (("%", r"\%"), ("±", r"$\pm$"), *((m, f"$^{{{x}}}$") for m, x in MARKS.items())):
         text = text.replace(sign, instead)
     return text

@@ -1,7 +1,4 @@
-"""A table: columns, rows of numbers and texts, and its CSV file.
-
-It knows nothing of the page it is printed on: the CSV keeps nine digits, the PDF three.
-"""
+"""A table: columns, rows of numbers and texts, and its CSV file, which keeps nine digits."""
 
 from __future__ import annotations
 
@@ -9,14 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from reference_sim.files.atomic_files import replacing
-from reports.run.rows import Metric
-from reports.statistics.means import Mean
+from reports.run.finished_run import Metric
+from reports.statistics.means_and_spreads import Mean
 from reports.statistics.significance import Effect
-from reports.tables.numbers import CSV_DASH, csv_number
+from reports.tables.number_texts import CSV_DASH, csv_number
 
 EFFECT_PARTS = ("kind", "low", "high", "covers")
 Cell = float | int | str | Mean | Effect | None
@@ -41,8 +39,12 @@ class Column:
 
     @property
     def unit_above(self) -> str:
-        """The unit as the column's heading has it: a duration is printed with a unit of its own."""
+        """Unit in the column's heading; a duration is printed with a unit of its own."""
         return "" if self.unit == "s" else self.unit
+
+
+METHOD = Column("method", "Method", text=True, method=True)
+GARMENT, SCENE, SUITE = (Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite"))
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Table:
     """Columns and rows; each row has one cell per column.
 
     grouped_by: columns that become headings in the PDF. references: label and texts by column of rows that
-    others printed; they are in no CSV.
+    the paper printed; they are in no CSV.
     """
 
     name: str
@@ -62,10 +64,10 @@ class Table:
     note: str = ""
 
     def write_csv(self, folder: Path) -> Path:
-        """Write <folder>/<name>.csv, whole or not at all.
+        """Write <folder>/<name>.csv whole or not at all; return its path.
 
-        A mean gets a column for its spread over seeds, and where there is any, one for its uncertainty and
-        one for the roll-outs that it lacks; an effect columns for what it is and its interval.
+        A mean gets a column for its spread over seeds and, where there is any, one for its uncertainty and one
+        for the roll-outs that it lacks; an effect gets columns for its kind and its interval.
         """
         path = folder / f"{self.name}.csv"
         texts: dict[str, list[str]] = {}
@@ -78,25 +80,26 @@ class Table:
                 moved = [cell.uncertainty if isinstance(cell, Mean) else None for cell in cells]
                 if any(x is not None for x in moved):
                     texts[f"{column.name}_uncertainty"] = [csv_number(x) for x in moved]
-                lacking = [cell.lacking if isinstance(cell, Mean) else 0 for cell in cells]
-                if any(lacking):
-                    texts[f"{column.name}_lacking"] = [str(count) for count in lacking]
+                missing = [cell.lacking if isinstance(cell, Mean) else 0 for cell in cells]
+                if any(missing):
+                    texts[f"{column.name}_lacking"] = [str(count) for count in missing]
             if any(isinstance(cell, Effect) for cell in cells):
                 parts = zip(*map(_parts_of_effect, cells))
-                texts |= {f"{column.name}_{part}": list(own) for part, own in zip(EFFECT_PARTS, parts)}
+                texts |= {f"{column.name}_{part}": list(cell) for part, cell in zip(EFFECT_PARTS, parts)}
         with replacing(path) as temporary:
             pd.DataFrame(texts).to_csv(temporary, index=False, lineterminator="\n")
         return path
 
 
 def metric_column(metric: Metric) -> Column:
+    """Return the column of a metric."""
     return Column(metric.name, metric.title, "" if metric.unit == "1" else metric.unit)
 
 
 def table(
-    name: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], caption: str = "", **more
+    name: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], caption: str = "", **more: Any
 ) -> list[Table]:
-    """The table in a list; an empty one where it has no rows."""
+    """Return the table in a list, which is empty where the table has no rows."""
     return [Table(name, tuple(columns), tuple(rows), caption, **more)] if rows else []
 
 
@@ -111,7 +114,7 @@ def _csv_text(cell: Cell) -> str:
 
 
 def _parts_of_effect(cell: Cell) -> tuple[str, ...]:
-    """The texts of EFFECT_PARTS."""
+    """Return the texts of EFFECT_PARTS."""
     if not isinstance(cell, Effect):
         return (CSV_DASH,) * len(EFFECT_PARTS)
     low, high = cell.interval or (None, None)

@@ -206,9 +206,9 @@ def read_header(path: Path) -> None:
 
 def read_rows(path: Path, name: str = "results.csv") -> None:
     """That file of a run beside whole other ones; up to the tables of the report."""
-    from reports.document.document import document
-    from reports.run.read import read_run
-    from reports.tables.tables import make_tables
+    from reports.document.content import document
+    from reports.run.reading import read_run
+    from reports.tables.pivots import make_tables
 
     folder = RunFolder(path.parent / "run")
     folder.write_rows(all_rows())

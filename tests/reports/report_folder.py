@@ -13,8 +13,8 @@ import numpy as np
 from benchmarks.results.row import Row
 from benchmarks.results.run_config import FORMAT
 from reference_sim import Trajectory
-from reports.run.rows import Run, run_data
-from snug.training.kinds import find_kind
+from reports.run.finished_run import Run, run_data
+from snug.networks.trained_model import find_kind
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
 METHODS = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}

@@ -9,11 +9,11 @@ import shutil
 import zlib
 
 import pytest
+from reports.check_numbers import CONTENT, printed, strangers
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.run_folder import RunFolder
 from reports import build, check
-from reports.check_numbers import CONTENT, printed, strangers
 from tests.reports.report_folder import declaration, row
 
 SCENES = ("tshirt/walk", "tshirt/jump")

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reports.figures.equal_data import equal_data, error_against_frames, held_out_curves, members
 
 from benchmarks.results.run_folder import RunFolder
 from reports.figures import styles
-from reports.figures.equal_data import equal_data, error_against_frames, held_out_curves, members
-from reports.figures.training import History, curves_table, read_histories
+from reports.run.training_histories import History, curves_table, read_histories
 from tests.reports.report_folder import row, run_of, write_model
 
 COSTS = {"cost/data": 60.0, "cost/setup": 5.0, "cost/train": 100.0, "cost/train_steps": 5300.0}

@@ -13,7 +13,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
 from reports import film
 from reports.pictures.render import camera_axes, vertex_normals
-from reports.run.kept_roll_outs import Kept
+from reports.run.selected_roll_outs import Kept
 from tests.reports.report_folder import declaration, row, run_of, sheet, write_mesh
 
 SCENE = "tshirt/walk"
@@ -77,7 +77,7 @@ def test_an_mp4_has_every_frame(run, tmp_path):
 
 @needs_opengl
 def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monkeypatch):
-    from reports.run.kept_roll_outs import read_kept
+    from reports.run.selected_roll_outs import read_kept
 
     said: list[str] = []
     monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: said.append(label) or label)

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reports.tables.pivots import make_tables
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_config import FORMAT
 from benchmarks.results.run_folder import RunFolder
 from reports import build
-from reports.document.document import document
+from reports.document.content import document
 from reports.figures import training
-from reports.run.read import read_run, read_trajectory
-from reports.run.rows import run_data
-from reports.statistics.means import Mean
-from reports.tables.tables import make_tables
+from reports.run.finished_run import run_data
+from reports.run.reading import read_run, read_trajectory
+from reports.statistics.means_and_spreads import Mean
 from tests.reports.report_folder import (
     FRAMES,
     METHODS,

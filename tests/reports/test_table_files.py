@@ -8,14 +8,14 @@ import re
 
 import pytest
 from matplotlib.mathtext import MathTextParser
+from reports.tables.pivots import make_tables
 
 from benchmarks.results import run_folder as results
 from benchmarks.results.run_folder import RunFolder
 from reports import build
-from reports.run.read import read_run
-from reports.run.rows import run_data
+from reports.run.finished_run import run_data
+from reports.run.reading import read_run
 from reports.tables import dictionary, latex
-from reports.tables.tables import make_tables
 from tests.reports.report_folder import all_rows, declaration, row
 
 TOP = r"\begin{tabular}[t]{@{}r@{}}"

@@ -35,8 +35,8 @@ from benchmarks.tasks.task import Outcome
 from reference_sim import simulate
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 from reports.figures.convergence import convergence_curve
-from reports.run.rows import run_data
-from reports.tables.tables import make_tables
+from reports.run.finished_run import run_data
+from reports.tables.pivots import make_tables
 from snug.motion.library import TEST, TRAIN
 from snug.networks.trained_model import TrainedModel
 from tests.snug.training.dressing import swaying, tube_dress

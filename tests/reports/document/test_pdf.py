@@ -6,12 +6,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from reports.tables.pivots import make_tables
 
 from benchmarks.results.run_folder import RunFolder
 from reports import build
-from reports.document.document import document
-from reports.run.read import read_run
-from reports.tables.tables import make_tables
+from reports.document.content import document
+from reports.run.reading import read_run
 from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, declaration, row, sheet, write_mesh
 
 pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installed")

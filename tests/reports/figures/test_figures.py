@@ -13,7 +13,7 @@ from reports.figures.plotting import file_name, printable
 from reports.pictures import chosen_roll_outs as roll_outs
 from reports.pictures import render
 from reports.pictures import sheets as pictures
-from reports.run.rows import shown_seeds
+from reports.run.finished_run import shown_seeds
 from reports.statistics.pareto import Point
 from tests.reports.report_folder import FRAMES, mesh, row, run_of, sheet, write_model
 
@@ -246,7 +246,7 @@ def test_a_map_of_every_outcome_is_drawn_from_what_its_cases_declare(tmp_path):
     other = row("another", "simulation", "outcome", 1.0, suite="extremes")
     cases["another"] = {"suite": "extremes", "map_point": None}
     run = run_of([*rows, other], cases=cases)
-    from reports.tables.tables import map_points, stress_tests
+    from reports.tables.pivots import map_points, stress_tests
 
     assert set(map_points(run).values()) >= {(1.0, 1e-4), (1e4, 1 / 30)} and len(map_points(run)) == 10
     assert list(stress_tests(run)["scene"]) == ["another"]

@@ -5,16 +5,17 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
+from reports.document.narrative import summary
+from reports.tables.pivots import make_tables
 
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from reports import build
+from reports.blocks.page_one_sentences import verdict
 from reports.document import narrative
-from reports.document.narrative import summary
-from reports.document.verdict import verdict
 from reports.figures.break_even import Cost, break_even, compared_scenes, cost_of, crossing, crossings, rivals
+from reports.figures.error_against_time import error_against_time
 from reports.figures.plotting import _columns
-from reports.figures.work_precision import error_against_time
 from reports.statistics.pareto import (
     Point,
     beaten_by,
@@ -27,7 +28,6 @@ from reports.statistics.pareto import (
     solvers,
     truncated,
 )
-from reports.tables.tables import make_tables
 from tests.reports.report_folder import declaration, run_of
 from tests.reports.report_folder import row as any_row
 

@@ -15,15 +15,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reports.tables.pivots import make_tables
 
 from benchmarks.metrics.surface import curvature
 from benchmarks.results.run_folder import RunFolder
-from reports.page.choice import groups
-from reports.page.pack import Pack
-from reports.page.vertex_values import area_change, depth, distance, mean_curvature, skin_of
-from reports.page.write import write_page
-from reports.run.read import read_run, read_trajectory
-from reports.tables.tables import make_tables
+from reports.page.packed_arrays import Pack
+from reports.page.roll_out_choice import groups
+from reports.page.write_page import write_page
+from reports.run.reading import read_run, read_trajectory
+from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
 from tests.reports.report_folder import declaration, row, sheet, skipped, write_mesh
 
 NASTY = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">\'" & мантия 裾'

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from reports.tables.pivots import make_tables
 
 from benchmarks.methods import METHODS
 from reports.document.layout import table_blocks
-from reports.statistics.by_frame import share_of_frames, with_shares
-from reports.statistics.claims import BEFORE, CLAIMS, counts, findings, in_words, judged, with_before
-from reports.tables.paper import PRINTED
-from reports.tables.tables import make_tables
+from reports.statistics.frame_shares import share_of_frames, with_shares
+from reports.statistics.paper_claims import BEFORE, CLAIMS, counts, findings, in_words, judged, with_before
+from reports.tables.paper_values import PRINTED
 from tests.reports.report_folder import SCENES, row, run_of
 
 

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from reports.statistics import significance
-from reports.statistics.means import Mean, mean_of, pair
+from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.statistics.significance import (
     MORE,
     OPEN,

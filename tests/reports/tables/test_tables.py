@@ -9,21 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reports.document.narrative import summary
+from reports.tables.pivots import make_tables, map_points, merged
 
 from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
-from reports.document.document import document
+from reports.blocks.page_one_sentences import endings, failures, verdict
+from reports.document.content import document
 from reports.document.layout import row_block, shortened, table_blocks
-from reports.document.narrative import summary
-from reports.document.verdict import endings, failures, verdict
 from reports.figures.plotting import Picture
-from reports.run.rows import run_data
-from reports.statistics.means import Mean, mean_of, pair
+from reports.run.finished_run import run_data
+from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.tables import numbers
 from reports.tables.ablations import ablation_effects, ablations
-from reports.tables.overview import ROWS, leads
+from reports.tables.page_one_table import ROWS, leads
 from reports.tables.table import Column, Table
-from reports.tables.tables import make_tables, map_points, merged
 from tests.benchmarks.tasks.test_cell_tasks import plan_of
 from tests.reports.report_folder import SCENES, all_rows, row, run_of, skipped
 

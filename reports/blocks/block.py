@@ -1,0 +1,97 @@
+"""Kinds of report blocks, and the report that they are filled from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from reports.blocks.printed_tables import of_suite, unchanged
+from reports.figures.figure import Picture
+from reports.run.finished_run import Run
+from reports.tables.table import Table
+
+ROWS = 12  # of a printed table; the CSV has all
+
+
+@dataclass(frozen=True)
+class Report:
+    """Material of a report: the run, its tables and its pictures, both by name."""
+
+    run: Run
+    tables: Mapping[str, Table]
+    pictures: Mapping[str, Sequence[Picture]]
+
+    @property
+    def subtitle(self) -> str:
+        """Preset, commit and day of the run."""
+        config = self.run.config
+        parts = [f"preset {config['preset']}"] if config.get("preset") else []
+        parts += [f"commit {config['commit']}"] if config.get("commit") else []
+        parts += [str(config["started"])[:10]] if config.get("started") else []
+        return " · ".join(parts)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading; it stands only where a block below it has content."""
+
+    title: str
+
+
+@dataclass(frozen=True)
+class SentenceBlock:
+    """Sentences, each with the topic it begins with; small: in small print."""
+
+    make: Callable[[Run], list[tuple[str, str]]]
+    small: bool = False
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """Pictures of a figure; of several figures the first of each, side by side.
+
+    fills_last_page: shown only where the last page of the PDF has room.
+    """
+
+    name: str
+    beside: str = ""
+    fills_last_page: bool = False
+
+    def pictures(self, report: Report) -> list[Picture]:
+        """Return the pictures that were drawn."""
+        if not self.beside:
+            return list(report.pictures.get(self.name, ()))
+        return [picture for name in (self.name, self.beside) for picture in report.pictures.get(name, ())[:1]]
+
+
+@dataclass(frozen=True)
+class TableBlock:
+    """A table; printed: gives the part of it that the PDF prints, at most so many lines."""
+
+    name: str
+    most: int = ROWS
+    printed: Callable[[Run, Table], Table] = unchanged
+
+    def tables(self, report: Report) -> list[Table]:
+        """Return the whole table, in a list that is empty where the run has none."""
+        return [report.tables[self.name]] if self.name in report.tables else []
+
+
+@dataclass(frozen=True)
+class TablesOfSuite:
+    """Rows of one suite in all tables that are scene by scene."""
+
+    suite: str
+    most: int = ROWS
+
+    def tables(self, report: Report) -> list[Table]:
+        """Return these tables with the lines of the suite and the columns that have a number there."""
+        parts = (of_suite(table, self.suite) for table in report.tables.values())
+        return [table for table in parts if table.rows]
+
+    def printed(self, run: Run, table: Table) -> Table:
+        """Return the table as it is."""
+        return table
+
+
+Block = Heading | SentenceBlock | FigureBlock | TableBlock | TablesOfSuite

@@ -1,0 +1,92 @@
+"""Stability maps: for which stiffness and time step a scene's step converges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from reports.figures.figure import Drawing, Figure
+from reports.figures.method_styles import STATUS_COLOURS
+from reports.figures.plotting import PAGE_WIDTH, new_figure, power_text
+from reports.run.finished_run import Run
+from reports.statistics.outcomes import map_points
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FEW, MANY = 2.0, 300.0  # iterations at the ends of the colour scale
+PALE, DEEP = (0.90, 0.95, 0.99), (0.03, 0.27, 0.49)
+
+
+class StabilityMaps(Figure):
+    """All maps side by side: a cell per step, coloured by its iterations or by how it failed."""
+
+    name = "stability_maps"
+
+    def needs(self, run: Run) -> bool:
+        """Return whether the run has points of a map."""
+        return not _rows(run).empty
+
+    def draw(self, run: Run) -> Iterator[Drawing]:
+        """Draw a panel for each scene."""
+        points, rows = map_points(run), _rows(run)
+        rows = rows.assign(
+            factor=rows["case"].map(lambda case: points[case][0]),
+            dt=rows["case"].map(lambda case: points[case][1]),
+        )
+        maps = dict(tuple(rows.groupby("scene", sort=False)))
+        widths = [of_scene["dt"].nunique() for of_scene in maps.values()]
+        height = max(of_scene["factor"].nunique() for of_scene in maps.values())
+        figure = new_figure(PAGE_WIDTH if len(maps) > 1 else 0.55 * PAGE_WIDTH, 1.0 + 0.27 * height)
+        panels = figure.subplots(1, len(maps), squeeze=False, width_ratios=widths)[0]
+        for axes, (scene, of_scene) in zip(panels, maps.items()):
+            _panel(axes, of_scene)
+            axes.set_title(str(scene).replace("_", " "))
+        panels[0].set_ylabel("stiffness, as a multiple of cotton's")
+        caption = (
+            "Stiffness and time step: one step from a noisy start. Blue: converged, with its number of "
+            "iterations, deeper for more. Other colours: not converged, by how it ended; "
+            "a cross: a false claim, a crash or a hang."
+        )
+        yield Drawing(figure, self.name, caption)
+
+
+def _rows(run: Run) -> pd.DataFrame:
+    rows = run.suite("extremes")
+    return rows[rows["case"].isin(map_points(run))]
+
+
+def _panel(axes: Axes, rows: pd.DataFrame) -> None:
+    factors, steps = sorted(set(rows["factor"])), sorted(set(rows["dt"]))
+    for row in rows.itertuples():
+        _cell(axes, steps.index(row.dt), factors.index(row.factor), str(row.status), float(row.value))  # type: ignore[arg-type]
+    axes.set_xlim(-0.5, len(steps) - 0.5)
+    axes.set_ylim(-0.5, len(factors) - 0.5)
+    axes.set_xticks(range(len(steps)), [power_text(dt) for dt in steps])
+    axes.set_yticks(range(len(factors)), [power_text(factor) for factor in factors])
+    axes.set_xlabel("time step [s]")
+    axes.tick_params(length=0)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+def _cell(axes: Axes, column: int, line: int, status: str, iterations: float) -> None:
+    """Draw a filled cell with the iterations, or with the word for how the step ended."""
+    from matplotlib.patches import Rectangle
+
+    converged = status == "ok"
+    colour = shade(iterations) if converged else STATUS_COLOURS[status]
+    axes.add_patch(Rectangle((column - 0.48, line - 0.46), 0.96, 0.92, facecolor=colour, linewidth=0))
+    word = f"{iterations:.0f}" if converged else "✕" if status == "failed" else status
+    text = axes.text(column, line, word, ha="center", va="center", fontsize=7.5)
+    text.set_color("white" if not converged or iterations > 40.0 else "#222222")
+
+
+def shade(iterations: float) -> tuple[float, float, float]:
+    """Return a colour from pale to deep blue, by the logarithm of the iterations."""
+    place = min(math.log(max(iterations, FEW) / FEW) / math.log(MANY / FEW), 1.0)
+    red, green, blue = (a + place * (b - a) for a, b in zip(PALE, DEEP))
+    return red, green, blue

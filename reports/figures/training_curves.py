@@ -1,0 +1,50 @@
+"""Training curves: loss against training time, a panel for each kind of loss."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from reports.figures.figure import Drawing, Figure
+from reports.figures.method_styles import leading, style
+from reports.figures.plotting import PAGE_WIDTH, file_name, grid, legend_above, log_axis, new_figure
+from reports.run.finished_run import Run
+from reports.run.training_histories import PANELS, History
+
+
+class TrainingCurves(Figure):
+    """Loss of every training, a figure for each garment."""
+
+    name, files = "training", ("training.*", "training_*")
+
+    def needs(self, run: Run) -> bool:
+        """Return whether a model of the run carries its history."""
+        return bool(run.histories)
+
+    def draw(self, run: Run) -> Iterator[Drawing]:
+        """Draw the garments, the first under the plain name."""
+        for place, garment in enumerate(dict.fromkeys(history.garment for history in run.histories)):
+            name = f"{self.name}_{file_name(garment)}" if place else self.name
+            histories = [history for history in run.histories if history.garment == garment]
+            shown = leading(run, {history.method for history in histories})
+            histories = [history for history in histories if history.method in shown]
+            if histories:
+                yield _draw_garment(run, name, garment, histories)
+
+
+def _draw_garment(run: Run, name: str, garment: str, histories: Sequence[History]) -> Drawing:
+    panels = dict.fromkeys((*PANELS.values(), *(h.panel for h in histories)))
+    titles = [title for title in panels if any(h.panel == title for h in histories)]
+    figure = new_figure(PAGE_WIDTH * (1.0 if len(titles) > 1 else 0.6), 2.2)
+    for axes, title in zip(np.atleast_1d(figure.subplots(1, len(titles))), titles):
+        for history in (h for h in histories if h.panel == title):
+            look, seconds = style(run, history.method), history.column("seconds")
+            axes.plot(seconds, history.column("loss"), color=look.colour, linestyle=look.line, linewidth=1.1)
+        axes.set(xlabel="training time [s]", title=title)
+        log_axis(axes, "y")
+        grid(axes)
+    shown = leading(run, {history.method for history in histories})
+    legend_above(figure, [style(run, method) for method in shown], lines=True)
+    caption = f"{garment}: training loss against wall time; one curve per model and seed. "
+    return Drawing(figure, name, caption + "Numbers: tables/training_curves.csv.")

@@ -1,0 +1,155 @@
+"""Roll-outs embedded in the page: cloths, their colours and curves, and a coarser body."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.obstacle import Obstacle
+from reference_sim.trajectory.trajectory import Trajectory
+from reports.page.packed_arrays import Pack
+from reports.page.roll_out_choice import groups
+from reports.run.finished_run import STEP, Run
+from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
+
+SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
+BLOCK = 32  # frames at a time, to bound memory
+ROOM = 1500  # bytes beside a text: its tags, and what the content says of it
+NOTE = 400  # bytes to say that roll-outs of a scene were left out
+
+
+@dataclass
+class Embedded:
+    """Roll-outs as texts of the page.
+
+    scenes: scene -> its body and methods, each the id of a text and what lies in it. texts: id -> text.
+    missing: scene -> how many roll-outs did not fit.
+    """
+
+    scenes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    missing: dict[str, int] = field(default_factory=dict)
+
+    def left_out(self, rule: str) -> str:
+        """Say how many roll-outs the page has, by what rule, and which it lacks."""
+        have = sum(len(scene["methods"]) for scene in self.scenes.values())
+        left_out = sum(self.missing.values())
+        if not left_out:
+            return f"All {have} roll-outs that this run kept can be shown: the first seed of each method."
+        names = ", ".join(f"{scene} ({count})" for scene, count in self.missing.items())
+        return f"{have} of {have + left_out} roll-outs can be shown: {rule}. Left out for size, by scene: {names}."
+
+
+def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
+    """Embed roll-outs in the order of groups() until the next would exceed the budget [bytes]."""
+    embedded, references = Embedded(), {}
+    wanted = list(groups(folder, run))
+    budget -= NOTE * len(wanted)
+    for group in wanted:
+        if embedded.missing:
+            embedded.missing[group.scene] = embedded.missing.get(group.scene, 0) + len(group.seeds)
+            continue
+        stored = {
+            method: run.roll_outs.cloth(group.scene, method, seed) for method, seed in group.seeds.items()
+        }
+        whole = {method: cloth.finite() for method, cloth in stored.items() if cloth is not None}
+        cloths = {method: cloth for method, cloth in whole.items() if cloth.frames}
+        if run.reference in cloths:
+            references[group.scene] = cloths[run.reference]
+        body = run.roll_outs.body(group.scene)
+        skin = skin_of(body.positions, body.faces) if body else None
+        depths = _depths(cloths, skin) if skin else {}
+        rest = run.roll_outs.rest_areas(group.scene)
+        for method, cloth in cloths.items():
+            scene = dict(embedded.scenes.get(group.scene) or {"body": None, "methods": {}})
+            texts: dict[str, str] = {}
+            if body and scene["body"] is None:
+                scene["body"] = _kept(texts, _body(body))
+            pack = _cloth(cloth, rest, references.get(group.scene), depths.get(method), run.metrics)
+            scene["methods"] = {**scene["methods"], method: _kept(texts, pack) | {"ending": _ending(cloth)}}
+            new = {name: text for name, text in texts.items() if name not in embedded.texts}
+            budget -= sum(ROOM + len(text) for text in new.values())
+            if budget < 0:
+                embedded.missing[group.scene] = embedded.missing.get(group.scene, 0) + 1
+            else:
+                embedded.texts |= new
+                embedded.scenes[group.scene] = scene
+    return embedded
+
+
+def _kept(texts: dict[str, str], pack: Pack) -> dict[str, Any]:
+    """Keep a pack under a name of its content, so that one body of two garments is kept once."""
+    text = pack.text()
+    name = "b" + hashlib.sha256(text.encode()).hexdigest()[:16]
+    texts[name] = text
+    return {"text": name, "arrays": pack.entries}
+
+
+def _ending(cloth: Trajectory) -> str:
+    """Say how a roll-out ended that did not end well."""
+    return "" if cloth.status in ("ok", "converged") else f"{cloth.status}: {cloth.reason}"
+
+
+def _cloth(
+    cloth: Trajectory, rest: np.ndarray | None, reference: Trajectory | None, depths: np.ndarray | None,
+    curves: Container[str],
+) -> Pack:  # fmt: skip
+    """Pack positions, times, colours, and those numbers per frame that `curves` holds, of a roll-out."""
+    pack, faces = Pack(), cloth.faces
+    pack.indices("faces", faces)
+    pack.numbers("times", cloth.times)
+    pack.positions("positions", cloth.positions)
+    pack.values("curvature", mean_curvature(cloth.positions, faces))
+    if rest is not None and rest.shape == (len(faces),):
+        blocks = [cloth.positions[k : k + BLOCK] for k in range(0, cloth.frames, BLOCK)]
+        strain = np.concatenate([area_change(block, faces, rest) for block in blocks])
+        pack.values("area", strain, signed=True)
+    if reference is not None and _comparable(cloth, reference):
+        pack.values("distance", distance(cloth.positions, reference.positions))
+    if depths is not None:
+        pack.values("depth", depths)
+    if STEP in cloth.frame_fields:
+        pack.values("step", cloth.frame_fields[STEP])
+    for name, curve in cloth.frame_fields.items():
+        if name in curves:
+            pack.numbers(name, curve)
+    return pack
+
+
+def _comparable(cloth: Trajectory, reference: Trajectory) -> bool:
+    same = cloth.positions.shape[1] == reference.positions.shape[1] and cloth.frames <= reference.frames
+    return same and np.allclose(cloth.times, reference.times[: cloth.frames])
+
+
+def _depths(cloths: Mapping[str, Trajectory], skin: Obstacle) -> dict[str, np.ndarray]:
+    """Return method -> penetration (T,V) [mm]; all of a frame at once, for its search tree is the cost."""
+    depths = {method: np.zeros(cloth.positions.shape[:2]) for method, cloth in cloths.items()}
+    for frame in range(skin.frames):
+        methods = [method for method, cloth in cloths.items() if frame < cloth.frames]
+        if methods:
+            points = [cloths[method].positions[frame] for method in methods]
+            deep = depth(np.concatenate(points), skin, frame)
+            for method, values in zip(methods, np.split(deep, np.cumsum([len(x) for x in points])[:-1])):
+                depths[method][frame] = values
+    return depths
+
+
+def _body(body: Trajectory) -> Pack:
+    """Pack the body with few faces, the same vertices in every frame; whole where its faces do not close."""
+    import igl
+
+    kept, faces = np.arange(body.positions.shape[1]), body.faces.astype(np.int64)
+    if len(faces) > SKIN_FACES:
+        first = np.ascontiguousarray(body.positions[0], dtype=float)
+        _, fewer, _, birth = igl.decimate(first, np.ascontiguousarray(faces), SKIN_FACES)
+        kept, faces = (birth, fewer) if len(fewer) else (kept, faces)
+    pack = Pack()
+    pack.indices("faces", faces)
+    pack.numbers("times", body.times)
+    pack.positions("positions", body.positions[:, kept])
+    return pack

@@ -1,0 +1,137 @@
+"""Data of the page besides roll-outs: methods, plots, sentences and tables, as plain values."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pandas as pd
+
+from reports.blocks import BLOCKS
+from reports.blocks.block import Report, SentenceBlock, TableBlock
+from reports.figures.method_styles import style
+from reports.run.finished_run import Run
+from reports.statistics.means_and_spreads import Mean, value_of
+from reports.statistics.pareto import ERRORS, error_points, indistinct, run_time, time_label
+from reports.statistics.significance import Effect
+from reports.tables.cell_texts import column_texts, remarks_below
+from reports.tables.outcomes import merged
+from reports.tables.table import Cell, Column, Table
+
+MEANING = {"stalled": "with frames left unconverged"}
+WRONG = ("failed", "timeout", "out-of-memory", "diverged")
+
+
+def methods_of(run: Run) -> dict[str, dict[str, Any]]:
+    """Return method -> label, role, colour, and the family of those that differ by one number."""
+    return {
+        name: {
+            "label": method.label, "role": method.role, "colour": style(run, name).colour,
+            "family": method.family if method.level is not None else "", "level": method.level,
+        }
+        for name, method in run.methods.items()
+    }  # fmt: skip
+
+
+def plots_of(run: Run) -> dict[str, dict[str, Any]]:
+    """Return scene -> the points of its plots of error against run time, where there are two or more."""
+    cells = run.cells("speed", "garments")
+    plots = {}
+    for scene, rows in cells.groupby("scene", sort=False):
+        panels = {name: panel for name in ERRORS if (panel := _panel(run, rows, name))}
+        if panels:
+            time = run_time(rows)
+            plots[str(scene)] = {
+                "time": time_label(time),
+                "reference": value_of(rows, run.reference, time),
+                "panels": panels,
+            }
+    return plots
+
+
+def _panel(run: Run, rows: pd.DataFrame, metric: str) -> dict[str, Any] | None:
+    points = [] if metric not in run.metrics else error_points(run, rows, metric)
+    if len(points) < 2:
+        return None
+    return {
+        "title": run.metrics[metric].heading, "definition": run.metrics[metric].definition,
+        "band": indistinct(run, rows, metric),
+        "points": [[p.method, p.time, p.error, p.time_spread, p.error_spread] for p in points],
+    }  # fmt: skip
+
+
+def tables_of(report: Report) -> list[dict[str, Any]]:
+    """Return the tables of the report blocks, then all others with a caption; cells as texts that sort.
+
+    A table without a caption is a file to plot from, and too long for a page.
+    """
+    blocks = [block for block in BLOCKS if isinstance(block, TableBlock)]
+    first = {table.name: table for block in blocks for table in block.tables(report)}
+    return [_table(report.run, table) for table in (first | dict(report.tables)).values() if table.caption]
+
+
+def sentences_of(report: Report) -> list[tuple[str, str]]:
+    """Return (topic, sentence) of the report blocks."""
+    blocks = [block for block in BLOCKS if isinstance(block, SentenceBlock) and not block.small]
+    return [pair for block in blocks for pair in block.make(report.run)]
+
+
+def _table(run: Run, table: Table) -> dict[str, Any]:
+    printed = [_printed(table, reference) for reference in table.references]
+    texts = [
+        column_texts(run, column, [row[place] for row in table.rows], [row[place] for row in printed])
+        for place, column in enumerate(table.columns)
+    ]
+    lines = [list(line) for line in zip(*texts)]
+    rows = [[_cell(text, cell) for text, cell in zip(line, row)] for line, row in zip(lines, table.rows)]
+    return {
+        "name": table.name, "caption": table.caption or table.name, "note": remarks_below(table, lines),
+        "columns": [_column(run, column) for column in table.columns], "rows": rows,
+        "printed": [[text["text"] for text in line] for line in lines[len(rows) :]],
+    }  # fmt: skip
+
+
+def _printed(table: Table, reference: tuple[str, dict[str, str]]) -> list[str]:
+    """Return a row of the paper's values: its label stands in the last column of texts."""
+    label, values = reference
+    texts = [column.name for column in table.columns if column.text]
+    return [label if column.name == texts[-1] else values.get(column.name, "") for column in table.columns]
+
+
+def _column(run: Run, column: Column) -> dict[str, Any]:
+    metric = run.metrics.get(column.name)
+    definition = metric.definition if metric else ""
+    better = metric.lower_is_better if metric else None
+    if better is not None:
+        definition += f"; {'lower' if better else 'higher'} is better"
+    return {"title": column.title, "unit": column.unit, "words": column.text, "definition": definition}
+
+
+def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
+    """Return a text that sorts by itself, or a number as [text, value, spread, mark]."""
+    value = cell.value if isinstance(cell, Mean | Effect) else cell
+    if isinstance(value, str):
+        return text["text"]
+    number = None if value is None or math.isnan(value) else max(min(float(value), 1e300), -1e300)
+    return [text["text"], number, text["spread"], text["mark"]]
+
+
+def unfinished_cells(report: Report) -> tuple[str, bool, list[str]]:
+    """Say what did not run to its end: a sentence of counts, whether anything went wrong, and each cell."""
+    if "unfinished" not in report.tables:
+        return "", False, []
+    table = report.tables["unfinished"]
+    names = [column.name for column in table.columns]
+    rows = [dict(zip(names, row)) for row in table.rows]
+    cells: dict[tuple, str] = {}
+    for row in rows:
+        cells.setdefault((row["suite"], row["scene"], row["method"], row["seed"]), str(row["status"]))
+    counts = pd.Series(list(cells.values())).value_counts()
+    order = [*(status for status in WRONG if status in counts), *(s for s in counts.index if s not in WRONG)]
+    text = ", ".join(f"{counts[status]} {MEANING.get(status, status)}" for status in order)
+    lines = []
+    cells_by_reason = (dict(zip(names, line)) for line in merged(table, ("suite", "scene")).rows)
+    for cell in sorted(cells_by_reason, key=lambda cell: order.index(cell["status"])):
+        label = report.run.label(str(cell["method"]))
+        lines.append(f"{cell['status']}: {label}, seed {cell['seed']}, {cell['scene']}: {cell['reason']}")
+    return f"Not every cell ended well: {text}.", any(status in counts for status in WRONG), lines

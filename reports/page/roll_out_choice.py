@@ -1,0 +1,43 @@
+"""Choice of the roll-outs that go into the page, and their order, where not all of them fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from benchmarks.results.run_folder import RunFolder
+from reports.run.finished_run import SUITES, Run, shown_seeds
+
+BUDGET = 25_000_000  # bytes of the whole page
+FIRST = ("reference", "bound", "baseline", "network")  # roles of the methods of page one
+RULE = (
+    "clips of garments first, then whole motions, then scenes without a body; in each of these the "
+    "simulation, baselines and networks before all others; the first seed of each method"
+)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Roll-outs of one scene that are taken one after the other: method -> seed."""
+
+    scene: str
+    seeds: dict[str, int]
+
+
+def groups(folder: RunFolder, run: Run) -> Iterator[Group]:
+    """Yield all roll-outs on disk, the most wanted first; those of a scene come in one or two groups."""
+    cells = run.cells(*SUITES)
+    seeds = shown_seeds(cells)
+    traits = cells.drop_duplicates("scene").set_index("scene")[["garment", "part"]]
+    kinds: list[list[str]] = [[], [], []]
+    for scene, garment, part in traits.itertuples():
+        kinds[0 if part == "clip" else 1 if garment else 2].append(str(scene))
+    for scenes in kinds:
+        for leading in (True, False):
+            for scene in scenes:
+                methods = run.ordered(seeds[scene].index)
+                methods = [m for m in methods if (run.methods[m].role in FIRST) is leading]
+                chosen = {m: int(seeds[scene, m]) for m in methods}
+                stored = {m: s for m, s in chosen.items() if folder.trajectory_path(scene, m, s).is_file()}
+                if stored:
+                    yield Group(scene, stored)

@@ -1,0 +1,224 @@
+"""A finished run: its rows as one table, and the metrics, methods and cases that run.json declares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.results.run_folder import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row, as_right
+from reports.run.training_histories import History
+
+if TYPE_CHECKING:
+    from reference_sim.trajectory.trajectory import Trajectory
+
+STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
+SUITES = ("garments", "speed", "validation", "extremes", "shapes", "performance")
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A metric as run.json declares it, see benchmarks.metric.Metric.
+
+    title and definition: head of its column and a sentence on it; table: the one that has the column.
+    arbitrary_zero: its zero is a choice, so only differences mean something. of: what it is a number of, an
+    answer, a method or the machine.
+    """
+
+    name: str
+    unit: str = ""
+    title: str = ""
+    definition: str = ""
+    table: str = ""
+    lower_is_better: bool | None = None
+    arbitrary_zero: bool = False
+    of: str = "answer"
+
+    @property
+    def heading(self) -> str:
+        """Title, and unit where it has one, for a column or an axis."""
+        return f"{self.title} [{self.unit}]" if self.unit not in ("", "1") else self.title
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method as its rows declare it, see benchmarks.results.run_folder.Row; label: its name for people."""
+
+    name: str
+    label: str
+    role: str = ""
+    family: str = ""
+    level: float | None = None
+    base: str = ""
+
+
+class NoRollOuts:
+    """Stored roll-outs of a run that kept none; reports.run.reading.RollOuts reads those of a folder."""
+
+    def cloth(self, scene: str, method: str, seed: int) -> Trajectory | None:
+        """Return a method's roll-out of the scene, None where there is none to be read."""
+        return None
+
+    def body(self, scene: str) -> Trajectory | None:
+        """Return the moving body of the scene, None where there is none to be read."""
+        return None
+
+    def rest_areas(self, scene: str) -> np.ndarray | None:
+        """Return areas (F,) [m^2] at rest of the faces of the scene's garment, None where unknown."""
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Rows of a run, their declarations, and what else its folder holds.
+
+    frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table` (of
+    its metric) and `case` (the check or stress test that it is, else empty). changed: files that are not as
+    the run wrote them. frame_energies: lines of frame_energies.csv, empty without the file. histories: of the
+    trainings. roll_outs: reads stored roll-outs when they are asked for. problems: a sentence for each file
+    that could not be read, added to while roll-outs are read.
+    """
+
+    config: Mapping[str, Any]
+    frame: pd.DataFrame
+    metrics: Mapping[str, Metric]
+    methods: Mapping[str, Method]
+    changed: Sequence[str] = ()
+    frame_energies: pd.DataFrame = field(default_factory=pd.DataFrame)
+    histories: Sequence[History] = ()
+    roll_outs: NoRollOuts = field(default_factory=NoRollOuts)
+    problems: list[str] = field(default_factory=list)
+
+    def suite(self, *names: str) -> pd.DataFrame:
+        """Return the rows of these suites."""
+        return self.frame[self.frame["suite"].isin(names)]
+
+    def cells(self, *suites: str) -> pd.DataFrame:
+        """Return the rows of these suites that are no case, each cell from the first suite that has it."""
+        kept = self.suite(*suites)
+        kept = kept[kept["case"] == ""].sort_values("suite", key=lambda s: s.map(suites.index), kind="stable")
+        return kept.drop_duplicates(["scene", "method", "seed", "metric"])
+
+    @property
+    def garment_rows(self) -> pd.DataFrame:
+        """Rows of suite garments, which are averaged over the scenes of a garment.
+
+        Only motions that no network has trained on count, unless there are no others.
+        """
+        rows = self.suite("garments")
+        rows = rows[rows["garment"] != ""]
+        unseen = rows[~rows["scene"].isin(self.trained_on)]
+        return rows if unseen.empty else unseen
+
+    @property
+    def trained_on(self) -> list[str]:
+        """Scenes whose motion networks trained on, as a user can name them."""
+        scenes = self.config.get("scenes") or {}
+        return [name for name, scene in scenes.items() if scene.get("role") == "training"]
+
+    def garments(self, frame: pd.DataFrame) -> dict[str, list[str]]:
+        """Return garment -> its scenes among these rows, in the order in which run.json declares them."""
+        declared = {name: place for place, name in enumerate(self.config.get("scenes") or ())}
+        pairs = frame[frame["garment"] != ""][["garment", "scene"]].drop_duplicates()
+        scenes: dict[str, list[str]] = {}
+        for garment, scene in sorted(pairs.itertuples(index=False), key=lambda p: declared.get(p[1], 0)):
+            scenes.setdefault(garment, []).append(scene)
+        return scenes
+
+    @property
+    def first_garment(self) -> str:
+        """Garment that page one and the claims are about; empty for a run without garments."""
+        return next(iter(self.garments(self.garment_rows)), "")
+
+    def ordered(self, methods: Iterable[str]) -> list[str]:
+        """Return the methods without repeats: by role, then as declared, members of a family by level."""
+        places = list(self.methods)
+        first: dict[str, int] = {}
+        for method in self.methods.values():
+            first.setdefault(method.family, places.index(method.name))
+
+        def rank(name: str) -> tuple[int, int, float, str]:
+            method = self.methods[name]
+            return ROLES.index(method.role), first[method.family], method.level or 0.0, name
+
+        return sorted(set(methods), key=rank)
+
+    def with_role(self, *roles: str) -> list[str]:
+        """Return the methods that have one of the roles, as declared."""
+        return [name for name, method in self.methods.items() if method.role in roles]
+
+    @property
+    def reference(self) -> str:
+        """Name of the simulation that others are measured against; empty where it did not run."""
+        return next(iter(self.with_role("reference")), "")
+
+    @property
+    def reference_ensemble(self) -> list[str]:
+        """Perturbed references: simulations as valid as the reference, which show its uncertainty."""
+        return [name for name, method in self.methods.items() if as_right(method.family, method.level)]
+
+    def label(self, method: str) -> str:
+        """Return the method's name for people."""
+        return self.methods[method].label if method in self.methods else method
+
+    def standing_apart(self, frame: pd.DataFrame) -> set[str]:
+        """Return the ablations among these rows whose base has a usable number: they have their own table."""
+        usable = set(frame[frame["usable"]]["method"])
+        return {name for name in self.with_role("ablation") if self.methods[name].base in usable}
+
+
+def shown_seeds(rows: pd.DataFrame) -> pd.Series:
+    """Return (scene, method) -> first seed whose roll-out came to its end; the first where none did."""
+    good = rows[rows["usable"]].groupby(["scene", "method"])["seed"].min()
+    return good.combine_first(rows.groupby(["scene", "method"])["seed"].min()).astype(int)
+
+
+def make_run(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[str] = ()) -> Run:
+    """Make the run of these rows; a metric that run.json does not declare has no table."""
+    frame = pd.DataFrame.from_records(
+        [[getattr(row, name) for name in COLUMNS] for row in rows], columns=list(COLUMNS)
+    )
+    frame[list(OPTIONAL_NUMBERS)] = frame[list(OPTIONAL_NUMBERS)].astype(float)
+    finite = frame["value"].abs() < float("inf")
+    frame["usable"] = frame["status"].isin(USABLE) & finite
+    declared = config.get("metrics") or {}
+    units = dict(zip(frame["metric"], frame["unit"]))
+    names = [*(name for name in declared if name in units), *(name for name in units if name not in declared)]
+    metrics = {name: _metric(name, units[name], declared.get(name) or {}) for name in names}
+    frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
+    frame["case"] = _cases(frame, config.get("cases") or {})
+    methods = _methods(frame, config.get("methods") or {})
+    return Run(config, frame, metrics, methods, changed)
+
+
+def _metric(name: str, unit: str, declared: Mapping[str, Any]) -> Metric:
+    lower = declared.get("lower_is_better")
+    return Metric(
+        name, unit, str(declared.get("title") or name), str(declared.get("definition") or ""),
+        str(declared.get("table") or ""), None if lower is None else bool(lower),
+        bool(declared.get("arbitrary_zero")), str(declared.get("of") or "answer"),
+    )  # fmt: skip
+
+
+def _methods(frame: pd.DataFrame, declared: Mapping[str, Any]) -> dict[str, Method]:
+    """Return the methods in the order of run.json, those that it does not know behind."""
+    columns = ["method", "role", "family", "level", "base"]
+    rows = frame[frame["method"] != ""][columns].drop_duplicates("method")
+    by_name = {
+        name: Method(
+            name, str((declared.get(name) or {}).get("label") or name), role, family or name,
+            None if pd.isna(level) else level, base,
+        )
+        for name, role, family, level, base in rows.itertuples(index=False)
+    }  # fmt: skip
+    return {name: by_name[name] for name in dict.fromkeys([*declared, *by_name]) if name in by_name}
+
+
+def _cases(frame: pd.DataFrame, declared: Mapping[str, Any]) -> list[str]:
+    """Return the case of each row: declared by scene and metric, or else by the scene as its name."""
+    places = {(case.get("scene") or name, case.get("metric") or ""): name for name, case in declared.items()}
+    pairs = zip(frame["scene"], frame["metric"])
+    return [places.get(pair) or places.get((pair[0], "")) or "" for pair in pairs]

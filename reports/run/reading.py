@@ -1,0 +1,111 @@
+"""Reading of a run's folder: the one module of the reports that opens what a run has left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.results import frame_energies
+from benchmarks.results.run_folder import ResultsError, RunFolder, model_path
+from reference_sim.files.array_file import read_arrays
+from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
+from reports.run.finished_run import NoRollOuts, Run, make_run
+from reports.run.training_histories import History, ModelHeaderError, read_history
+
+
+def read_run_with_trainings(folder: RunFolder) -> Run:
+    """Read a run and how its networks were trained. Raises ResultsError for a folder that holds no run."""
+    run = read_run(folder)
+    return replace(run, histories=_read_histories(folder, run))
+
+
+def read_run(folder: RunFolder) -> Run:
+    """Read rows and declarations of a run; its roll-outs are read when they are asked for.
+
+    Raises:
+        ResultsError: when run.json or results.csv is absent, broken or of an earlier version.
+    """
+    if not folder.path.is_dir():
+        raise ResultsError(f"{folder.path}: no such folder")
+    config, rows = folder.read_config(), folder.read_rows()
+    if not rows:
+        raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
+    run = make_run(config, rows, folder.changed(config))
+    return replace(
+        run,
+        frame_energies=_read_frame_energies(folder.frame_energies_path),
+        roll_outs=RollOuts(folder, run.problems),
+    )
+
+
+def _read_frame_energies(path: Path) -> pd.DataFrame:
+    """Return the lines of frame_energies.csv, none without the file. Raises ResultsError."""
+    if not path.is_file():
+        return pd.DataFrame()
+    columns, lines = frame_energies.read(path)
+    return pd.DataFrame(lines, columns=columns)
+
+
+def _read_histories(folder: RunFolder, run: Run) -> list[History]:
+    """Read the training of every network in the run's folder, garment by garment."""
+    histories: list[History] = []
+    networks = run.frame[run.frame["garment"] != ""][["garment", "method", "seed"]].drop_duplicates()
+    for garment, rows in networks.groupby("garment", sort=False):
+        for _, method, seed in rows.itertuples(index=False):
+            path = model_path(folder.models_of(str(garment)), method, seed)
+            if not path.is_file():
+                continue
+            try:
+                history = read_history(path, method)
+            except ModelHeaderError as error:
+                run.problems.append(_without_folder(folder, error))
+            else:
+                histories += [replace(history, garment=str(garment), seed=int(seed))] if history else []
+    return histories
+
+
+@dataclass(frozen=True)
+class RollOuts(NoRollOuts):
+    """Stored roll-outs of a run's folder; one that cannot be read adds a sentence to `problems`."""
+
+    folder: RunFolder
+    problems: list[str]
+
+    def cloth(self, scene: str, method: str, seed: int) -> Trajectory | None:
+        """Return a method's roll-out of the scene, None where there is none to be read."""
+        return self.read(self.folder.trajectory_path(scene, method, seed))
+
+    def body(self, scene: str) -> Trajectory | None:
+        """Return the moving body of the scene, None where there is none to be read."""
+        return self.read(self.folder.trajectory_path(scene, "body"))
+
+    def rest_areas(self, scene: str) -> np.ndarray | None:
+        """Return areas (F,) [m^2] at rest of the faces of the scene's garment, None where unknown."""
+        try:
+            return np.load(self.folder.rest_areas_path(scene))
+        except (OSError, ValueError):
+            return None
+
+    def read(self, path: Path) -> Trajectory | None:
+        """Return the trajectory in a file with the curves that lie beside it, None without one."""
+        try:
+            if not path.is_file():
+                return None
+            trajectory = Trajectory.load(path)
+            if (curves := path.with_suffix(".npz")).is_file():
+                trajectory = replace(trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves))
+            if trajectory.frames:
+                return trajectory
+            problem = f"{path.relative_to(self.folder.path)}: holds no whole frame"
+        except (TrajectoryError, ValueError, OSError) as error:
+            problem = _without_folder(self.folder, error)
+        if problem not in self.problems:  # the page reads again what was drawn
+            self.problems.append(problem)
+        return None
+
+
+def _without_folder(folder: RunFolder, error: Exception) -> str:
+    return str(error).replace(f"{folder.path}/", "")

@@ -1,0 +1,165 @@
+"""Means of rows over scenes and seeds, and ±, the spread over seeds or the uncertainty of the reference.
+
+Only finite values of cells that ended ok, or stalled at some frames, enter a mean; a mean says when one
+of its cells stalled. Nothing is filled in for a cell that failed.
+The mean is first taken over the scenes of one seed, then over seeds; the spread is the standard
+deviation over seeds (n - 1), absent for a single seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import pandas as pd
+
+
+@dataclass(frozen=True)
+class Mean:
+    """Mean of a metric, its spread over seeds, and the cells it was taken over.
+
+    scenes, seeds: how many have the metric. asked: number of cells that should have it, every seed in every
+    scene in which any method has the metric; where fewer have, the mean is not `complete` and the table must
+    say so. stalled: a solver left some frames of some cell unconverged. seeded: another seed would give
+    another value. cells: value of each (scene, seed). pairing_group: means of one group are compared seed by
+    seed; empty for none. uncertainty: in the metric's unit, how far an equally valid reference would move the
+    mean; None if unknown. moved: change of a cell's value by each of those references, where it is known.
+    """
+
+    value: float
+    spread: float | None
+    scenes: int
+    seeds: int
+    asked: int
+    stalled: bool = False
+    seeded: bool = True
+    cells: Mapping[tuple[str, int], float] = field(default_factory=dict, compare=False)
+    pairing_group: str = field(default="", compare=False)
+    uncertainty: float | None = None
+    moved: Mapping[tuple[str, int], Mapping[str, float]] = field(default_factory=dict, compare=False)
+
+    @property
+    def spread_or_uncertainty(self) -> float | None:
+        """Number printed behind ±: the larger of spread and uncertainty, None where there is neither."""
+        return max((x for x in (self.spread, self.uncertainty) if x is not None), default=None)
+
+    @property
+    def lacking(self) -> int:
+        """Number of cells without the metric: they failed, or belong to a network that diverged."""
+        return max(self.asked - len(self.cells), 0)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every cell that should have the metric has it."""
+        return self.lacking == 0
+
+    @property
+    def fewer(self) -> str:
+        """Remark behind a number on how many roll-outs it is over; empty where these are all."""
+        return "" if self.complete else f" ({len(self.cells)} of {self.asked} roll-outs)"
+
+
+def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
+    """Compute a Mean for each group of the usable rows, in the order of the rows.
+
+    Args:
+        frame: rows as Run.frame has them.
+        keys: columns that make a group, such as "garment", "method", "metric"; the last two are among them.
+    """
+    names = list(keys)
+    places, ends = ([key for key in names if key != name] for name in ("method", "metric"))
+    tried = frame[frame["status"] != "skipped"]
+    asked = tried.groupby(places)["scene"].nunique()
+    failed = tried[~tried["usable"]].groupby(ends)["seed"].agg(set)
+    usable = frame.assign(stalled=frame["status"] == "stalled")[frame["usable"]]
+    of_seed, of_all = (usable.groupby(group, sort=False) for group in ([*names, "seed"], names))
+    seeds = of_seed["value"].mean()
+    cells: dict[tuple, dict[tuple[str, int], float]] = {}
+    changes: dict[tuple, dict[tuple[str, int], dict[str, float]]] = {}
+    if "moved" not in usable:
+        usable = usable.assign(moved=[()] * len(usable))
+    for *key, scene, seed, value, moved in usable[[*names, "scene", "seed", "value", "moved"]].itertuples(
+        index=False
+    ):
+        cells.setdefault(tuple(key), {})[scene, int(seed)] = float(value)
+        if moved:
+            changes.setdefault(tuple(key), {})[scene, int(seed)] = dict(moved)
+    across = seeds.groupby(names, sort=False)
+    unsure = of_all["uncertainty"].mean() if "uncertainty" in frame else [None] * len(cells)
+    columns = (
+        across.mean(), across.std(), of_all["scene"].nunique(), of_all["stalled"].any(),
+        of_all["seeded"].any(), of_all["pairing_group"].first(), unsure,
+    )  # fmt: skip
+    result = {}
+    for key, value, spread, scenes, stalled, seeded, pairing_group, moved in zip(cells, *columns):
+        group = dict(zip(names, key))
+        seeds_here = {seed for _, seed in cells[key]}
+        every_seed = seeds_here | failed.get(_key(group, ends), set())
+        result[key] = Mean(
+            value=float(value),
+            spread=None if pd.isna(spread) else float(spread),
+            scenes=int(scenes),
+            seeds=len(seeds_here),
+            asked=int(asked[_key(group, places)]) * len(every_seed),
+            stalled=bool(stalled),
+            seeded=bool(seeded),
+            cells=cells[key],
+            pairing_group=pairing_group,
+            uncertainty=None if pd.isna(moved) else float(moved),
+            moved=changes.get(key, {}),
+        )
+    index = pd.MultiIndex.from_arrays(
+        [list(column) for column in zip(*result)] or [[]] * len(names), names=names
+    )
+    return pd.Series(list(result.values()), index=index, dtype=object)
+
+
+def _key(group: Mapping[str, str], names: Sequence[str]) -> tuple | str:
+    return group[names[0]] if len(names) == 1 else tuple(group[name] for name in names)
+
+
+def mean_of(
+    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
+) -> Mean | None:
+    """Return the mean over the scenes (all by default) and seeds that have the metric, None without any."""
+    rows = frame if scenes is None else frame[frame["scene"].isin(list(scenes))]
+    rows = rows[(rows["metric"] == metric) | ~rows["usable"]]
+    return means(rows, "method", "metric").get((method, metric))
+
+
+def value_of(
+    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
+) -> float | None:
+    """Return the value of `mean_of`, or None."""
+    mean = mean_of(frame, method, metric, scenes)
+    return None if mean is None else mean.value
+
+
+def shared_scenes(frame: pd.DataFrame, methods: Iterable[str], metric: str) -> list[str]:
+    """Return the scenes in which each of the methods has the metric with all of its seeds."""
+    rows = frame[frame["usable"] & (frame["metric"] == metric)]
+    kept = list(dict.fromkeys(frame["scene"]))
+    for method in methods:
+        of_method = rows[rows["method"] == method]
+        seeds = of_method.groupby("scene")["seed"].nunique()
+        full = set(seeds[seeds == of_method["seed"].nunique()].index)
+        kept = [scene for scene in kept if scene in full]
+    return kept
+
+
+def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean | None, Mean | None]:
+    """Return both means over the scenes that the two methods share, None where they share none.
+
+    Where one of them was not measured at all, the other's mean is over its own scenes.
+    """
+    rows = frame[frame["method"].isin((one, other)) & ((frame["metric"] == metric) | ~frame["usable"])]
+    both = shared_scenes(rows, (one, other), metric)
+    by_method = means(rows[rows["scene"].isin(both)] if both else rows, "method", "metric")
+    first, second = (by_method.get((method, metric)) for method in (one, other))
+    if first is None or second is None:
+        return first, second
+    if not both:
+        return None, None
+    asked = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
+    first, second = (replace(m, asked=asked * (m.asked // len(both))) for m in (first, second))
+    return first, second

@@ -1,0 +1,121 @@
+"""Tables on run time: the points of the plots, break-even of trainings, rivals, the reference's uncertainty."""
+
+from __future__ import annotations
+
+import itertools
+
+import pandas as pd
+
+from reports.run.finished_run import Run
+from reports.statistics.break_even import NETWORK, compared_costs, compared_scenes, crossing, rivals
+from reports.statistics.means_and_spreads import value_of
+from reports.statistics.pareto import (
+    ERRORS,
+    SMALLER_STEPS,
+    TIME,
+    WHOLE,
+    beaten_by,
+    fastest,
+    indistinct,
+    points_of,
+    truncated,
+)
+from reports.tables.pivot import Pivot
+from reports.tables.table import GARMENT, Cell, Column, Table, metric_column, table
+
+RIVAL_ERRORS = ("gap/energy", "curvature/error")
+UNCERTAIN = ("curvature/error", "distance/rms")
+
+
+def _cells_of_speed(run: Run) -> pd.DataFrame:
+    cells = run.cells("speed", "garments")
+    return cells[cells["scene"].isin(run.suite("speed")["scene"])]
+
+
+SPEED = Pivot(
+    "speed",
+    "Run time of a frame and errors, scene by scene: the points of the plots.",
+    metrics=(TIME, WHOLE, *ERRORS),
+    of_table="speed",
+    select=_cells_of_speed,
+    grouped_by=("scene",),
+    required=TIME,
+)
+
+
+def crossings(run: Run) -> list[Table]:
+    """Tabulate from how many frames on each trained network is cheaper than its rival solvers."""
+    frame = run.cells("speed", "garments")
+    lines: list[tuple[Cell, ...]] = []
+    for garment, scenes in compared_scenes(run, frame).items():
+        reasons = rivals(run, frame, scenes)
+        for network, rival in itertools.product(*compared_costs(run, frame, scenes, reasons)):
+            frames = crossing(network, rival)
+            total = None if frames is None else network.total(frames)
+            rounded = None if frames is None else float(f"{frames:.1e}")
+            times = rival.frame / network.frame if network.frame else None
+            names = (garment, network.method, rival.method, reasons[rival.method])
+            lines.append((*names, rounded, total, network.before, times))
+    columns = (
+        GARMENT,
+        Column("method", "Network", text=True, method=True),
+        Column("solver", "Overtakes", text=True, method=True),
+        Column("as_good", "As good by", text=True),
+        Column("crossing", "From frames on", digits=2, trim=True),
+        Column("total_time", "Total time by then", "s"),
+        Column("before", "Network's before its first frame", "s"),
+        Column("frame_ratio", "Its run time over the network's", digits=2),
+    )
+    caption = (
+        "From how many frames on training pays, against the converged simulation and the fastest solvers "
+    )
+    caption += "as good as SNUG; a dash: never."
+    return table("crossings", columns, lines, caption, grouped_by=("garment",))
+
+
+def error_rivals(run: Run) -> list[Table]:
+    """Tabulate, for each error, the best method no slower than SNUG and the fastest solver as accurate."""
+    frame = run.cells("speed", "garments")
+    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    lines: list[tuple[Cell, ...]] = []
+    for metric in RIVAL_ERRORS:
+        points = points_of(run, frame, scenes, metric) if metric in run.metrics else []
+        network = next((p for p in points if p.method == NETWORK), None)
+        if network is None:
+            continue
+        best, solver = beaten_by(points, network), fastest(truncated(run, points), network.error)
+        no_slower = (best.method, best.error, best.time) if best else ("", None, None)
+        as_accurate = (solver.method, solver.time) if solver else ("", None)
+        lines.append((run.metrics[metric].heading, network.error, *no_slower, *as_accurate))
+    columns = (
+        Column("error", "Error", text=True),
+        Column("network", "Of SNUG", mixed=True),
+        Column("no_slower", "Best that is no slower", text=True, method=True),
+        Column("no_slower_error", "Its error", mixed=True),
+        Column("no_slower_time", "Its run time", "ms"),
+        Column("as_accurate", "Fastest solver as accurate", text=True, method=True),
+        Column("as_accurate_time", "Its run time", "ms"),
+    )
+    caption = (
+        f"Who beats SNUG, over {', '.join(scenes)}: the best method no slower within repeats, and the fastest "
+        "solver stopped early that is as accurate; a dash: none."
+    )
+    return table("error_rivals", columns, lines, caption)
+
+
+def reference_uncertainty(run: Run) -> list[Table]:
+    """Tabulate how far equally valid references, and smaller time steps, lie from the reference."""
+    frame = run.cells("speed", "garments")
+    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    rows = frame[frame["scene"].isin(scenes)]
+    metrics = [run.metrics[name] for name in UNCERTAIN if name in run.metrics]
+    ensemble = [indistinct(run, rows, metric.name) or None for metric in metrics]
+    lines: list[tuple[Cell, ...]] = [("equally valid references, the farthest", *ensemble)]
+    steps = [m for m in run.methods.values() if m.family == SMALLER_STEPS and m.level]
+    for method in sorted(steps, key=lambda m: m.level or 0.0):
+        distances = [value_of(rows, method.name, metric.name) for metric in metrics]
+        lines.append((f"{method.level:g} steps a frame", *distances))
+    lines = [line for line in lines if any(value is not None for value in line[1:])]
+    columns = (Column("of", "Simulation", text=True), *map(metric_column, metrics))
+    caption = "Distance of other simulations from the reference: differences below it are inconclusive."
+    return table("reference_uncertainty", columns, lines, caption)
