@@ -13,7 +13,10 @@ import numpy as np
 from benchmarks.results.row import Row
 from benchmarks.results.run_config import FORMAT
 from reference_sim import Trajectory
-from reports.run.finished_run import Run, run_data
+from reports.blocks.block import Report
+from reports.figures.figure import Drawing, Figure
+from reports.run.finished_run import NoRollOuts, Run, make_run
+from reports.tables import make_tables
 from snug.networks.trained_model import find_kind
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
@@ -120,7 +123,28 @@ def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
 
 
 def run_of(rows: Sequence[Row], **more) -> Run:
-    return run_data(declaration(rows, **more), rows)
+    return make_run(declaration(rows, **more), rows)
+
+
+def report_of(rows: Sequence[Row], **more) -> Report:
+    """The report of these rows, without pictures."""
+    run = run_of(rows, **more)
+    return Report(run, make_tables(run), {})
+
+
+def drawn(figure: Figure, run: Run) -> list[Drawing]:
+    """The parts of a figure, none where the run has nothing for it."""
+    return list(figure.draw(run)) if figure.needs(run) else []
+
+
+class Stored(NoRollOuts):
+    """The same roll-out for every method of every scene."""
+
+    def __init__(self, cloth: Trajectory) -> None:
+        self.stored = cloth
+
+    def cloth(self, scene: str, method: str, seed: int) -> Trajectory:
+        return self.stored
 
 
 def write_mesh(path: Path, positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]) -> None:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import dataclasses
-import re
 import shutil
-import zlib
 
 import pytest
-from reports.check_numbers import CONTENT, printed, strangers
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.run_folder import RunFolder
@@ -58,13 +54,13 @@ def lines(folder, capsys) -> list[str]:
     status = check.main([str(folder.path)])
     found = capsys.readouterr().out.splitlines()[:-1]
     assert status == (1 if found else 0)
-    return [line for line in found if "report.pdf" not in line]
+    return found
 
 
 def of_rows(rows, tmp_path, capsys) -> list[str]:
     """Without those on files of the report, which is not made."""
     found = lines(write(tmp_path / "run", rows), capsys)
-    return [line for line in found if not line.startswith(("files", "numbers"))]
+    return [line for line in found if not line.startswith("files")]
 
 
 def test_a_sound_run_has_no_finding(copy, capsys):
@@ -131,75 +127,18 @@ def test_tables_that_were_edited_are_found(copy, capsys):
     said = f"run python -m reports.build {copy.path}"
     assert f"files     tables/energies.csv is not what results.csv gives: {said}" in found
     assert f"files     tables/cost.csv is absent: {said}" in found
-    assert "numbers   report.html: table energies has what tables/energies.csv has not: Total 1.25" in found
-    assert any("table cost has" in line and "tables/cost.csv 0" in line for line in found)
-
-
-def edited_page(folder, old: str, new: str) -> None:
-    page = folder.page_path.read_text(encoding="utf-8")
-    found = CONTENT.search(page)
-    content = zlib.decompress(base64.b64decode(found[1])).decode()
-    assert old in content
-    packed = base64.b64encode(zlib.compress(content.replace(old, new).encode())).decode()
-    folder.page_path.write_text(page.replace(found[1], packed), encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ('["1.25",', '["1.26",', "Total 1.26"),
-        ('"± 0.07"', '"± 0.08"', "Total 0.08"),
-        ('["72.0 min"', '["72.2 min"', "Train 72.2 min"),
-    ],
-)
-def test_a_number_of_the_page_that_no_csv_has_is_found(copy, capsys, old, new, said):
-    edited_page(copy, old, new)
-    found = lines(copy, capsys)
-    assert found and all(said in line and line.startswith("numbers   report.html: table") for line in found)
+    assert len(found) == 2
 
 
 def test_a_report_that_is_not_there_is_a_finding(copy, capsys):
     copy.page_path.unlink()
-    assert lines(copy, capsys) == ["numbers   report.html is absent"]
-
-
-def test_a_number_of_the_pdf_that_no_csv_has_is_found(copy, capsys):
-    pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
-    assert check.main([str(copy.path)]) == 0
-    rows = [dataclasses.replace(r, value=(r.value or 0.0) * 1.0173) for r in sound_rows() if r.value]
-    other = write(copy.path.parent / "other", rows)
-    build.main([str(other.path)])
-    shutil.copy(other.report_path, copy.report_path)
-    capsys.readouterr()
-    assert check.main([str(copy.path)]) == 1
-    assert re.search(r"report.pdf, page 1: in no CSV: .*1\.27", capsys.readouterr().out)
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [("0.0201", 0.02012), ("−4.10", -4.1034), ("1,730", 1730.4), ("2.50×10⁻⁷", 2.504e-7), ("2.41 min", 144.7),
-     ("3.1 h", 11200.0), ("127", 127.3)],
-)  # fmt: skip
-def test_a_printed_number_is_what_rounds_to_it(text, value):
-    (number,) = printed(f"say {text}, or")
-    assert number.text == text and number.among([value])
-    assert not number.among([1.02 * value]) and not number.among([-value])
-
-
-def test_a_printed_zero_is_zero():
-    (number,) = printed("0")
-    assert number.among([0.0]) and not number.among([1e-3])
-
-
-def test_names_versions_and_dates_are_no_numbers():
-    assert strangers("snug-seed1 lbfgs-40 v2.13.0 2026-11-21 in 2022, 12 of 34, x2.345", []) == []
-    assert strangers("it takes 6.28 1/m and 53.0 mm, 1,234 times", [53.01]) == ["6.28", "1,234"]
+    copy.report_path.unlink()
+    again = f"run python -m reports.build {copy.path}"
+    missing = ["report.html", "report.pdf"]
+    assert lines(copy, capsys) == [f"files     {name} is absent: {again}" for name in missing]
 
 
 def test_a_folder_that_is_no_run_is_one_line_and_status_2(built, tmp_path, capsys):
     assert check.main([str(tmp_path)]) == 2
     error = capsys.readouterr().err
     assert error.startswith("reports.check: ") and error.count("\n") == 1
-    broken = RunFolder(shutil.copytree(built.path, tmp_path / "run"))
-    broken.page_path.write_text("<html>")
-    assert check.main([str(broken.path)]) == 2 and "report.html: holds no tables" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
 from reports import film
 from reports.pictures.render import camera_axes, vertex_normals
-from reports.run.selected_roll_outs import Kept
+from reports.run.selected_roll_outs import SelectedRollOuts
 from tests.reports.report_folder import declaration, row, run_of, sheet, write_mesh
 
 SCENE = "tshirt/walk"
@@ -77,19 +77,19 @@ def test_an_mp4_has_every_frame(run, tmp_path):
 
 @needs_opengl
 def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monkeypatch):
-    from reports.run.selected_roll_outs import read_kept
+    from reports.run.selected_roll_outs import select_roll_outs
 
     said: list[str] = []
     monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: said.append(label) or label)
-    frames = list(film.pictures(read_kept(run, SCENE, ["simulation", "snug"]), 100, 25.0))
+    frames = list(film.pictures(select_roll_outs(run, SCENE, ["simulation", "snug"]), 100, 25.0))
     names = ["Simulation", "SNUG"]
     assert len(frames) == 5 and said == names + names + 3 * [*names, "ended at 0.03 s: ok"]
 
 
-def kept_of(*positions: np.ndarray) -> Kept:
+def kept_of(*positions: np.ndarray) -> SelectedRollOuts:
     faces = np.array([[0, 1, 2]])
     cloths = {str(k): Trajectory(x, faces, np.arange(len(x)) / 30.0) for k, x in enumerate(positions)}
-    return Kept(run_of([row(SCENE, "simulation")]), cloths, None)
+    return SelectedRollOuts(run_of([row(SCENE, "simulation")]), cloths, None)
 
 
 def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reports.tables.pivots import make_tables
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_config import FORMAT
 from benchmarks.results.run_folder import RunFolder
 from reports import build
-from reports.document.content import document
-from reports.figures import training
-from reports.run.finished_run import run_data
-from reports.run.reading import read_run, read_trajectory
+from reports.document.content import changed_files
+from reports.run import training_histories as training
+from reports.run.finished_run import make_run
+from reports.run.reading import read_run
 from reports.statistics.means_and_spreads import Mean
+from reports.tables import make_tables
 from tests.reports.report_folder import (
     FRAMES,
     METHODS,
@@ -163,14 +163,16 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
 
 def test_curves_beside_a_trajectory_are_its_own(tmp_path):
     run = RunFolder(tmp_path)
+    run.write_rows(all_rows())
+    run.write_config(declaration(all_rows()))
     path = run.trajectory_path(SCENES[0], "snug")
     write_mesh(path, *sheet(0.1), {"energy/strain": np.zeros(FRAMES), "iterations": np.ones(FRAMES)})
     np.savez(run.curves_path(SCENES[0], "snug"), **{"energy/strain": np.ones(FRAMES)})
-    fields = read_trajectory(run, path, []).frame_fields
+    fields = read_run(run).roll_outs.cloth(SCENES[0], "snug", 0).frame_fields
     assert fields["energy/strain"].tolist() == fields["iterations"].tolist() == [1.0] * FRAMES
     run.curves_path(SCENES[0], "snug").write_bytes(b"no archive")
-    problems = []
-    assert read_trajectory(run, path, problems) is None and "snug.npz" in problems[0]
+    read = read_run(run)
+    assert read.roll_outs.cloth(SCENES[0], "snug", 0) is None and "snug.npz" in read.problems[0]
 
 
 def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
@@ -179,9 +181,9 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     digests = {"results.csv": digest_of_file(run.rows_path), "trajectories/gone.vtkhdf": "0"}
     run.write_config(declaration(all_rows(), digests=digests))
     assert read_run(run).changed == []
-    assert document(read_run(run), {}, [], [])["first"]["changed"] == ""
+    assert changed_files(read_run(run)) == ""
     run.write_rows(all_rows()[:-1])
-    said = document(read_run(run), {}, [], [])["first"]["changed"]
+    said = changed_files(read_run(run))
     assert said.startswith("Not as the run wrote them: results.csv.")
 
 
@@ -211,7 +213,7 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
         "table": "energies",
         "definition": "warmth",
     }
-    found = make_tables(run_data(said, rows))
+    found = make_tables(make_run(said, rows))
     assert found["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1, 1)),)
     found["acoustics"].write_csv(tmp_path)
     assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"

@@ -6,12 +6,15 @@ import dataclasses
 
 import numpy as np
 import pytest
-from reports.tables.pivots import make_tables
 
 from benchmarks.results.run_folder import RunFolder
-from reports import build
-from reports.document.content import document
+from reports.blocks.block import Report
+from reports.document.typeset import write_pdf
+from reports.figures import FIGURES
+from reports.figures.figure import draw_figures
+from reports.pictures import PICTURES
 from reports.run.reading import read_run
+from reports.tables import make_tables
 from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, declaration, row, sheet, write_mesh
 
 pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installed")
@@ -73,10 +76,10 @@ def report(request, tmp_path_factory):
         for method in {r.method for r in rows} & {*METHODS, *HOSTILE}:
             fields = {f"energy/{t}": np.linspace(0, v, 5) for t, v in TERMS.items()}
             write_mesh(run.trajectory_path(scene, method), *sheet(0.1), fields)
-    read, problems = read_run(run), []
-    made = make_tables(read)
-    build.typeset(run, document(read, made, build.draw(run, read, [], problems), problems))
-    assert not problems
+    read = read_run(run)
+    pictures = draw_figures(read, run.figures, (*PICTURES, *FIGURES))
+    write_pdf(run, Report(read, make_tables(read), pictures))
+    assert not read.problems
     found = pdfium.PdfDocument(run.report_path)
     yield found
     found.close()

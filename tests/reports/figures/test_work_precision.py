@@ -5,17 +5,18 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
-from reports.document.narrative import summary
-from reports.tables.pivots import make_tables
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from reports import build
-from reports.blocks.page_one_sentences import verdict
-from reports.document import narrative
-from reports.figures.break_even import Cost, break_even, compared_scenes, cost_of, crossing, crossings, rivals
-from reports.figures.error_against_time import error_against_time
+from reports.blocks import page_one_sentences
+from reports.blocks.page_one_sentences import headline
+from reports.figures.break_even import BreakEven
+from reports.figures.error_against_time import ErrorOfPageOne, ErrorsOfScene, ErrorsOfScenes
+from reports.figures.figure import save_drawing
 from reports.figures.plotting import _columns
+from reports.statistics.break_even import Cost, compared_scenes, cost_of, crossing, rivals
 from reports.statistics.pareto import (
     Point,
     beaten_by,
@@ -28,7 +29,9 @@ from reports.statistics.pareto import (
     solvers,
     truncated,
 )
-from tests.reports.report_folder import declaration, run_of
+from reports.tables import make_tables
+from reports.tables.speed import crossings, error_rivals, reference_uncertainty
+from tests.reports.report_folder import declaration, drawn, run_of
 from tests.reports.report_folder import row as any_row
 
 # method: ms a frame, relative gap, curvature error
@@ -50,8 +53,12 @@ def row(scene, method, metric, value, unit="1") -> Row:
     return any_row(scene, method, metric, value, suite="speed", unit=unit)
 
 
-def plain(run):
-    return {topic: words.replace("\u00a0", " ") for topic, words in summary(run)}
+FIGURES = (ErrorOfPageOne(), ErrorsOfScene(), ErrorsOfScenes(), BreakEven())
+
+
+def cost_sentence(run) -> str:
+    """The sentence of page one on cost, without which nothing is said of rivals."""
+    return dict(headline(run)).get("At what cost", "").replace("\u00a0", " ")
 
 
 def all_rows() -> list[Row]:
@@ -116,7 +123,7 @@ def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_p
         )
         assert point.time == pytest.approx(0.1 + shift) and point.time_spread == pytest.approx(0.05)
         assert run_time(scene) == ("cost/whole" if shift else "cost/frame")
-        assert error_against_time(tmp_path, run)
+        assert drawn(ErrorOfPageOne(), run)
 
 
 def test_break_even_is_where_the_total_costs_cross():
@@ -163,7 +170,7 @@ def test_a_training_whose_data_nobody_can_price_has_no_break_even():
     run = run_of(rows)
     frame = run.cells("speed")
     assert cost_of(frame, "snug", SCENES) is None and cost_of(frame, "newton-1", SCENES) is not None
-    assert crossings(run) == [] and "When training pays" not in dict(summary(run))
+    assert crossings(run) == []
 
 
 def test_as_fast_is_within_the_scatter_of_run_times():
@@ -187,8 +194,8 @@ def test_a_rival_is_no_faster_for_repeats_that_scatter():
         for method, time, gap in (("snug", 1.0, 0.3), ("pbns", 1.05, 0.2), ("newton-1", 12.0, 0.1))
         for metric, value in (("cost/frame", time), ("gap/energy", gap))
     ]
-    said = plain(run_of(rows))["Error against time"]
-    assert "PBNS is nearer and no slower within repeats (0.200 in 1.05 ms)" in said
+    rows += [row(SCENES[0], "simulation", "cost/frame", 100.0, "ms")]
+    assert "PBNS is nearer and no slower within repeats (0.200 in 1.05 ms)" in cost_sentence(run_of(rows))
 
 
 def test_a_solver_in_a_whole_motion_takes_no_clip_off_page_one():
@@ -200,7 +207,8 @@ def test_a_solver_in_a_whole_motion_takes_no_clip_off_page_one():
     run, alone = run_of([*all_rows(), *whole]), run_of(all_rows())
     frame = run.cells("speed", "garments")
     assert compared_scenes(run, frame) == {"tshirt": sorted(SCENES, reverse=True)}
-    assert plain(run)["Error against time"] == plain(alone)["Error against time"]
+    assert cost_sentence(run) == cost_sentence(alone)
+    assert error_rivals(run) == error_rivals(alone)
     assert compared_scenes(run_of(whole), run_of(whole).frame) == {"tshirt": ["tshirt/kick"]}
 
 
@@ -218,16 +226,15 @@ def test_a_point_is_of_the_seeds_that_did_every_scene():
     assert (found.time, found.error, found.fewer) == (2.0, 2.0, " (2 of 4 roll-outs)")
 
 
-def test_a_training_without_rivals_has_no_sentence():
+def test_a_training_without_rivals_has_no_crossings():
     rows = [r for r in all_rows() if r.method in ("snug", "snug+lbfgs-1") and r.metric != "gap/energy"]
     rows = [r for r in rows if r.metric != "curvature/error"]
-    assert "When training pays" not in plain(run_of(rows))
+    assert crossings(run_of(rows)) == []
 
 
 def test_run_times_on_page_one_are_of_the_garment_compared():
     rows = all_rows() + [row("skirt/stop", m, "cost/frame", 500.0, "ms") for m in ("snug", "simulation")]
-    said = dict(verdict(run_of(rows)))["At what cost"].replace("\u00a0", " ")
-    assert said.startswith(
+    assert cost_sentence(run_of(rows)).startswith(
         "SNUG takes 0.250 ms a frame, the simulation 100: 400 times as long; by energy gap"
     )
 
@@ -245,14 +252,14 @@ def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_ro
     assert {line[1] for line in table.rows} == {"snug", *more}
 
 
-def test_ablations_are_drawn_where_the_full_recipe_is_not(tmp_path):
+def test_ablations_are_drawn_where_the_full_recipe_is_not():
     costs = (("cost/frame", 1.0), ("gap/energy", 0.1))
     rows = [row("tshirt/walk", m, k, v) for m in ("snug-springs", "newton-1") for k, v in costs]
-    (picture,) = error_against_time(tmp_path, run_of(rows))
-    assert picture.kind == "lead"
+    (drawing,) = (part for figure in FIGURES for part in drawn(figure, run_of(rows)))
+    assert drawing.name == "error_against_time"
     rows += [row("tshirt/walk", "snug", *cost) for cost in costs]
     kept = [r for r in rows if r.method != "newton-1"]
-    assert error_against_time(tmp_path, run_of(kept)) == []  # one point is no plot
+    assert [drawn(figure, run_of(kept)) for figure in FIGURES] == [[]] * 4  # one point is no plot
 
 
 def test_every_network_has_its_crossings_in_a_table():
@@ -264,7 +271,7 @@ def test_every_network_has_its_crossings_in_a_table():
     assert {line[2]: line[6:] for line in table.rows}["simulation"] == (pytest.approx(200.0), 400.0)
     assert found["lbfgs-20"][0] == 13000.0 and set(found) == {"simulation", "lbfgs-20", "lbfgs-5"}
     others = run_of([r for r in all_rows() if "snug" not in r.method])
-    assert crossings(others) == [] and summary(others) == []
+    assert crossings(others) == error_rivals(others) == []
 
 
 def test_garments_have_crossings_by_themselves():
@@ -281,20 +288,33 @@ def test_garments_have_crossings_by_themselves():
     (table,) = crossings(run)
     found = {line[0]: line[4] for line in table.rows if line[2] == "simulation"}
     assert found == {"tshirt": 2000.0, "tunic": 2000.0}
-    assert "after 2,000 frames against Simulation" in plain(run)["When training pays"]
 
 
-def test_the_summary_says_what_beats_the_network_and_when_training_pays():
+def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():
     run = run_of(all_rows())
-    assert plain(run)["Error against time"] == (
-        "By energy gap (0.100 in 0.250 ms) nothing as fast as SNUG is nearer; the fastest solver as near is "
-        "L-BFGS, 20 iterations, 16.0 ms. By curvature error (5.00 in 0.250 ms) Skinning alone is nearer "
-        "and no slower (4.50 in 0.100 ms); the fastest solver as near is L-BFGS, 5 iterations, 4.00 ms."
+    assert cost_sentence(run).endswith(
+        "; by energy gap (0.100 in 0.250 ms) nothing as fast as SNUG is nearer; the fastest solver as near is "
+        "L-BFGS, 20 iterations, 16.0 ms."
     )
-    assert plain(run)["When training pays"] == (
-        "SNUG's 3.33 min of training pay after 2,000 frames against Simulation, after 13,000 frames against "
-        "L-BFGS, 20 iterations, after 53,000 frames against L-BFGS, 5 iterations."
+    (table,) = error_rivals(run)
+    assert table.rows == (
+        ("Energy gap", 0.1, "", None, None, "lbfgs-20", 16.0),
+        ("Curvature error [1/m]", 5.0, "skinning", 4.5, 0.1, "lbfgs-5", 4.0),
     )
+    (table,) = crossings(run)
+    paid = {line[2]: (line[4], line[6]) for line in table.rows}
+    assert paid == {method: (frames, 200.0) for method, frames in
+                    (("simulation", 2000.0), ("lbfgs-20", 13000.0), ("lbfgs-5", 53000.0))}  # fmt: skip
+
+
+def test_the_reference_has_its_uncertainty_and_its_error_in_time_in_a_table():
+    more = {"role": "reference-variant", "family": "simulation-dt", "level": 4.0}
+    rows = [dataclasses.replace(row(SCENES[0], "simulation-dt-4", "distance/rms", 30.0, "mm"), **more)]
+    (table,) = reference_uncertainty(run_of(all_rows() + rows))
+    assert [column.name for column in table.columns] == ["of", "curvature/error", "distance/rms"]
+    assert table.rows == (
+        ("equally valid references, the farthest", None, 21.0), ("4 steps a frame", None, 30.0),
+    )  # fmt: skip
 
 
 def test_nothing_is_nearer_of_those_that_were_looked_at():
@@ -306,36 +326,38 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
         for metric, value in (("gap/energy", 2.0), ("cost/frame", 4.0))
     ]
     run = run_of(rows)
-    said = narrative.fronts(run, run.cells("speed"), ["a", "b"], first_only=True)
-    assert said.endswith("nothing as fast as SNUG is nearer, of those that have it in all scenes.")
-    assert "PBNS is nearer" in narrative.fronts(run, run.cells("speed"), ["a"], first_only=True)
+    frame = run.cells("speed", "garments")
+    sentence = page_one_sentences._rivals(run, frame, ["a", "b"])
+    assert sentence.endswith("nothing as fast as SNUG is nearer, of those that have it in all scenes.")
+    assert "PBNS is nearer" in page_one_sentences._rivals(run, frame, ["a"])
 
 
 def test_every_figure_of_the_suite_is_drawn(tmp_path):
     run = run_of(all_rows())
-    pictures = [picture for make in (error_against_time, break_even) for picture in make(tmp_path, run)]
-    assert [p.kind for p in pictures] == ["lead", "speed", "scenes", "break_even"] and all(
-        p.path.is_file() for p in pictures
-    )
-    assert "Grey: within the reference's uncertainty." in pictures[0].caption
+    drawings = [drawing for figure in FIGURES for drawing in drawn(figure, run)]
+    names = [
+        "error_against_time",
+        "error_against_time_tshirt-walk",
+        "error_against_time_scenes",
+        "break_even",
+    ]
+    assert [drawing.name for drawing in drawings] == names
+    assert all(save_drawing(tmp_path, drawing).path.is_file() for drawing in drawings)
+    assert "Grey: within the reference's uncertainty." in drawings[0].caption
     walk = run.frame[run.frame["scene"] == "tshirt/walk"]
     assert indistinct(run, walk, "distance/rms") == 21.0  # no rival of whom it may be said who is nearer
     assert indistinct(run, walk, "gap/energy") == 0.015 and indistinct(run, walk, "curvature/error") == 0.0
 
 
-def test_no_axis_is_labelled_in_markup(tmp_path, monkeypatch):
+def test_no_axis_is_labelled_in_markup():
     """Names may hold dollars, so that no text is taken for a formula: neither are an axis's numbers."""
-    drawn = []
-    for module in ("break_even", "work_precision"):
-        monkeypatch.setattr(f"reports.{module}.save", lambda figure, *_, **more: drawn.append(figure))
-    for make in (error_against_time, break_even):
-        make(tmp_path, run_of(all_rows()))
-    assert len(drawn) == 4
-    for figure in drawn:
-        figure.canvas.draw()
+    drawings = [drawing for figure in FIGURES for drawing in drawn(figure, run_of(all_rows()))]
+    assert len(drawings) == 4
+    for canvas in (drawing.canvas for drawing in drawings):
+        FigureCanvasAgg(canvas).draw()
         labels = [
             label.get_text()
-            for axes in figure.axes
+            for axes in canvas.axes
             for label in (*axes.get_xticklabels(), *axes.get_yticklabels())
         ]
         assert any(labels) and not [label for label in labels if "$" in label]
@@ -382,12 +404,13 @@ def test_a_rival_within_the_uncertainty_of_the_reference_is_as_near():
             row(SCENES[0], method, metric, value), uncertainty=None if metric == "cost/frame" else 0.3
         )
         for method, time, error in (("snug", 1.0, 5.3), ("pbns", 0.5, 5.0), ("newton-1", 12.0, 1.0))
-        for metric, value in (("cost/frame", time), ("curvature/error", error))
+        for metric, value in (("cost/frame", time), ("gap/energy", error))
     ]
-    said = plain(run_of(rows))["Error against time"]
-    assert "PBNS is as near, within the scatter of seeds and of right simulations, and no slower" in said
+    rows += [row(SCENES[0], "simulation", "cost/frame", 100.0, "ms")]
+    sentence = cost_sentence(run_of(rows))
+    assert "PBNS is as near, within the scatter of seeds and of right simulations, and no slower" in sentence
     sure = [dataclasses.replace(r, uncertainty=0.1 if r.uncertainty else None) for r in rows]
-    assert "PBNS is nearer and no slower" in plain(run_of(sure))["Error against time"]
+    assert "PBNS is nearer and no slower" in cost_sentence(run_of(sure))
 
 
 def test_a_run_of_suite_speed_alone_has_its_methods_on_page_one():

@@ -15,15 +15,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reports.tables.pivots import make_tables
 
 from benchmarks.metrics.surface import curvature
 from benchmarks.results.run_folder import RunFolder
+from reports.blocks.block import Report
 from reports.page.packed_arrays import Pack
 from reports.page.roll_out_choice import groups
 from reports.page.write_page import write_page
-from reports.run.reading import read_run, read_trajectory
+from reports.run.reading import read_run
 from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
+from reports.tables import make_tables
 from tests.reports.report_folder import declaration, row, sheet, skipped, write_mesh
 
 NASTY = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">\'" & мантия 裾'
@@ -96,11 +97,9 @@ def folder(tmp_path_factory) -> RunFolder:
 
 def write(run: RunFolder, **options) -> list[str]:
     """The page alone, without a PDF; returns what could not be read."""
-    problems: list[str] = []
     data = read_run(run)
-    tables = make_tables(data)
-    write_page(run, data, tables, problems, lambda path: read_trajectory(run, path, problems), **options)
-    return problems
+    write_page(run, Report(data, make_tables(data), {}), **options)
+    return data.problems
 
 
 def texts_of(page: str) -> dict[str, str]:
@@ -225,7 +224,7 @@ def test_scenes_of_one_motion_share_the_body(folder):
 
 
 def test_clips_come_first_and_leading_methods_before_others(folder):
-    order = [(group.scene, list(group.paths)) for group in groups(folder, read_run(folder))]
+    order = [(group.scene, list(group.seeds)) for group in groups(folder, read_run(folder))]
     leading = ["simulation", "skinning", "snug", "pbns"]
     assert order == [
         *((scene, leading) for scene in CLIPS), *((scene, ["newton-4"]) for scene in CLIPS),

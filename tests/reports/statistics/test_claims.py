@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from reports.tables.pivots import make_tables
 
 from benchmarks.methods import METHODS
-from reports.document.layout import table_blocks
+from reports.document.layout import lay_out_table
 from reports.statistics.frame_shares import share_of_frames, with_shares
-from reports.statistics.paper_claims import BEFORE, CLAIMS, counts, findings, in_words, judged, with_before
+from reports.statistics.paper_claims import BEFORE, CLAIMS, counts, in_words, judged, with_before
+from reports.tables import make_tables
+from reports.tables.findings import findings
 from reports.tables.paper_values import PRINTED
 from tests.reports.report_folder import SCENES, row, run_of
 
@@ -204,7 +205,7 @@ def test_the_table_says_effect_and_interval_and_what_the_interval_leaves_out(tmp
     rows = seeds("snug", (0.5, 0.51, 0.52)) + seeds("pbns", (1.0, 1.01, 1.0))
     run = run_of([*rows, *seeds("snug", (0.0,), "energy/bending"), *seeds("pbns", (1.0,), "energy/bending")])
     (made,) = findings(run)
-    (block,) = table_blocks(run, made)
+    (block,) = lay_out_table(run, made)
     (group,) = block["groups"]
     assert group["title"] == "Table 1: lower energies than PBNS"
     strain, bending = (
@@ -262,7 +263,7 @@ def test_a_claim_of_frames_is_judged_by_the_share_of_them(snug, verdict):
     assert claim not in {(f.claim.metric, f.claim.lower, f.claim.higher) for f in judged(run)}
     ten = [snug] * 9 + [2.5]  # the second's share is what is left: one sample, not two
     frames = frame_table(snug=[ten, ten[::-1]], pbns=[[2.0] * 10] * 2)
-    (line,) = (f for f in judged(replace(run, frames=frames)) if f.claim.metric == claim[0])
+    (line,) = (f for f in judged(replace(run, frame_energies=frames)) if f.claim.metric == claim[0])
     assert (line.claim.lower, line.claim.higher, line.verdict) == (*claim[1:], verdict)
     assert line.one.value == pytest.approx(10.0 if verdict == "holds" else 100.0)
     assert line.claim.relation == "< in most frames" and "%" in line.metric.heading

@@ -9,23 +9,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reports.document.narrative import summary
-from reports.tables.pivots import make_tables, map_points, merged
 
 from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
-from reports.blocks.page_one_sentences import endings, failures, verdict
-from reports.document.content import document
-from reports.document.layout import row_block, shortened, table_blocks
-from reports.figures.plotting import Picture
-from reports.run.finished_run import run_data
+
+from reports.blocks import BLOCKS
+from reports.blocks.block import FigureBlock, Report
+from reports.blocks.page_one_sentences import headline
+from reports.blocks.printed_tables import shortened
+from reports.blocks.what_went_wrong import endings, failures
+from reports.document.content import content
+from reports.document.layout import lay_out, lay_out_table
+from reports.figures import FIGURES
+from reports.figures.figure import Picture
+from reports.pictures import PICTURES
+from reports.run.finished_run import make_run
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
-from reports.tables import numbers
+from reports.statistics.outcomes import map_points
+from reports.statistics.page_one_methods import leads
+from reports.tables import make_tables, number_texts
 from reports.tables.ablations import ablation_effects, ablations
-from reports.tables.page_one_table import ROWS, leads
+from reports.tables.outcomes import merged
+from reports.tables.page_one_table import ROWS
 from reports.tables.table import Column, Table
 from tests.benchmarks.tasks.test_cell_tasks import plan_of
-from tests.reports.report_folder import SCENES, all_rows, row, run_of, skipped
+from tests.reports.report_folder import SCENES, all_rows, report_of, row, run_of, skipped
 
 
 def seeds_of(method, metric, values, **more):
@@ -38,7 +46,7 @@ def column(table, name):
 
 def test_every_declared_case_has_its_place_in_the_tables(tmp_path):
     rows = [case.row(1.0, "ok") for case in CASES]
-    run = run_data(described(plan_of(tmp_path, cases=CASES), rows), rows)
+    run = make_run(described(plan_of(tmp_path, cases=CASES), rows), rows)
     tables = make_tables(run)
     maps = {case.name for case in CASES if case.map_point}
     tested = {case.name for case in CASES if case.suite == "extremes"} - maps
@@ -74,7 +82,7 @@ def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
     lines = {line[1]: line[2] for line in table.rows}
     assert lines["snug"].value == 1.0 and not lines["snug"].complete
     assert lines["simulation"].value == 5.0 and lines["simulation"].complete and lines["simulation"].stalled
-    (block,) = table_blocks(run, table)
+    (block,) = lay_out_table(run, table)
     assert [line[1]["mark"] for line in block["groups"][0]["rows"]] == ["†", "*"]
     assert "fewer scenes" in block["note"] and "unconverged" in block["note"]
 
@@ -87,14 +95,17 @@ def test_a_seed_that_is_lost_is_said_wherever_the_mean_of_the_others_stands():
         line[2] for line in make_tables(run_of(rows))["energies"].rows if line[:2] == ("tshirt", "snug")
     )
     assert (mean.lacking, mean.complete, mean.fewer) == (1, False, " (2 of 3 roll-outs)")
-    assert mean_of(run_of(rows).worn, "snug", "energy/total", ["tshirt/walk"]) == mean
+    assert mean_of(run_of(rows).garment_rows, "snug", "energy/total", ["tshirt/walk"]) == mean
 
 
 def test_garments_have_their_own_means_and_stand_as_they_are_declared():
     rows = [row("tunic/stop", value=9.0), row("tshirt/walk", value=1.0), row("tshirt/kick", value=3.0)]
     run = run_of(rows)
-    assert run.garments(run.worn) == {"tshirt": ["tshirt/walk", "tshirt/kick"], "tunic": ["tunic/stop"]}
-    assert list(run.garments(run.worn[run.worn["garment"] == "tunic"])) == ["tunic"]
+    assert run.garments(run.garment_rows) == {
+        "tshirt": ["tshirt/walk", "tshirt/kick"],
+        "tunic": ["tunic/stop"],
+    }
+    assert list(run.garments(run.garment_rows[run.garment_rows["garment"] == "tunic"])) == ["tunic"]
     found = [(line[0], line[2].value) for line in make_tables(run)["energies"].rows]
     assert found == [("tshirt", 2.0), ("tunic", 9.0)]
 
@@ -122,7 +133,7 @@ def test_what_is_judged_outside_of_the_checks_stands_with_them():
         "tshirt/walk: Momentum_worst", "falls_freely", "zero_modes", "sag",
     ]  # fmt: skip
     assert [line[-1] for line in table.rows] == ["pass", "pass", "pass", "failed"]
-    assert "3 of 4 checks pass; failed: sag." in dict(summary(run_of(rows)))["Known answers"]
+    assert "of 4 checks 1 failed" in endings(run_of(rows))
 
 
 def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
@@ -134,14 +145,14 @@ def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
     rows += [row("off", value=7.0, tolerance=0.0, **numbers_of), row("told", value=7.0, **numbers_of)]
     table = make_tables(run_of(rows))["validation"]
     assert [line[column(table, "away")] for line in table.rows] == [0.0, 0.25, float("inf"), None]
-    (block,) = table_blocks(run_of(rows), table)
+    (block,) = lay_out_table(run_of(rows), table)
     assert block["groups"][0]["rows"][2][column(table, "away")]["text"] == "∞"
 
 
 def test_a_wide_table_goes_on_below_with_its_heads():
     rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(13)]
     run = run_of(rows)
-    blocks = list(table_blocks(run, make_tables(run)["energies"]))
+    blocks = list(lay_out_table(run, make_tables(run)["energies"]))
     heads = [[column["title"] for column in block["columns"]] for block in blocks]
     assert [len(head) for head in heads] == [8, 7] and {head[0] for head in heads} == {"Method"}
     assert blocks[1]["caption"].endswith("(continued)")
@@ -152,7 +163,7 @@ def test_a_wide_table_goes_on_below_with_its_heads():
 
 def test_a_duration_has_its_own_unit_and_none_over_its_column():
     run = run_of([row("tshirt/walk", "snug", "cost/train", 160.0, unit="s")])
-    (block,) = table_blocks(run, make_tables(run)["cost"])
+    (block,) = lay_out_table(run, make_tables(run)["cost"])
     assert [column["unit"] for column in block["columns"]][1:] == [""]
     assert [cell["text"] for cell in block["groups"][0]["rows"][0]][1:] == ["2.67 min"]
 
@@ -178,7 +189,7 @@ def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     assert error.interval[0] > 1.0 > drift.interval[1] and error.covers == "seeds"
     assert lines["snug-window6"][1] is None
     # They are described: no word says which of them is better.
-    (block,) = table_blocks(run_of(rows), made["ablation_effects"])
+    (block,) = lay_out_table(run_of(rows), made["ablation_effects"])
     assert not re.search("better|worse|significant", json.dumps(block))
 
 
@@ -231,20 +242,26 @@ def test_pairs_share_their_scenes_or_have_their_own():
     ],
 )
 def test_numbers_as_text(value, text):
-    assert numbers.number(value) == text
+    assert number_texts.number(value) == text
 
 
 def test_other_texts():
-    assert numbers.number(0.2835, 7, trim=True) == "0.2835" and numbers.number(6.0, 7, trim=True) == "6"
-    assert numbers.with_spread(0.5, 0.012) == "0.500 ± 0.012" and numbers.with_spread(0.5, None) == "0.500"
-    assert [numbers.duration(s) for s in (0.0, 61.0, 402.0, 104400.0, None)] == [
+    assert (
+        number_texts.number(0.2835, 7, trim=True) == "0.2835"
+        and number_texts.number(6.0, 7, trim=True) == "6"
+    )
+    assert (
+        number_texts.with_spread(0.5, 0.012) == "0.500 ± 0.012"
+        and number_texts.with_spread(0.5, None) == "0.500"
+    )
+    assert [number_texts.duration(s) for s in (0.0, 61.0, 402.0, 104400.0, None)] == [
         "0 s", "61.0 s", "6.70 min", "29.0 h", "–",
     ]  # fmt: skip
-    assert numbers.csv_number(None) == "-" and numbers.csv_number(0.0) == "0"
+    assert number_texts.csv_number(None) == "-" and number_texts.csv_number(0.0) == "0"
 
 
 def test_decimal_points_stand_in_a_column():
-    padded = numbers.aligned(["0.123", "18.2", "400", "–"])
+    padded = number_texts.aligned(["0.123", "18.2", "400", "–"])
     assert len({len(text) - text.index(".") for text in padded[:2]}) == 1
     assert len(padded[2]) - 3 == len(padded[0]) - 1 and padded[3] == "–"
 
@@ -253,7 +270,7 @@ def test_decimal_points_stand_in_a_column():
 
 
 def near(rows) -> str:
-    return dict(verdict(run_of(rows)))["How near"].replace("\u00a0", " ")
+    return dict(headline(run_of(rows)))["How near"].replace("\u00a0", " ")
 
 
 def test_the_verdict_compares_means_over_the_scenes_that_all_have():
@@ -279,7 +296,7 @@ def test_a_training_motion_is_in_no_mean_of_unseen_ones():
 
     def said(*trained):
         scenes = {name: {"role": "training" if name in trained else "test"} for name in SCENES}
-        return dict(verdict(run_of(rows, scenes=scenes)))["How near"].replace("\u00a0", " ")
+        return dict(headline(run_of(rows, scenes=scenes)))["How near"].replace("\u00a0", " ")
 
     assert said(SCENES[1]).startswith("On 1 unseen motion SNUG's total energy is 1.00 J")
     assert said(*SCENES).startswith("On 2 training motions SNUG's total energy is 5.00 J")
@@ -297,7 +314,7 @@ def test_run_times_are_of_the_scenes_that_both_have():
     times = [(SCENES[0], "snug", 9.0), (SCENES[1], "snug", 0.25), (SCENES[1], "simulation", 100.0)]
     run = run_of([row(s, m, "cost/frame", t, unit="ms") for s, m, t in times])
     assert (
-        dict(verdict(run))["At what cost"]
+        dict(headline(run))["At what cost"]
         .replace("\u00a0", " ")
         .startswith("SNUG takes 0.250 ms a frame, the simulation 100: 400 times as long (1 of 2 roll-outs)")
     )
@@ -330,43 +347,41 @@ def test_page_one_counts_every_kind_of_ending():
     [(None, ""), (1, "one after another, "), (4, "up to 4 side by side, ")],
 )
 def test_times_say_what_ran_beside(workers, said):
-    run = run_of(all_rows()[-5:], workers=workers)
-    assert document(run, {}, [], [])["workers"] == f"{said}one thread each."
+    assert content(report_of(all_rows()[-5:], workers=workers))["workers"] == f"{said}one thread each."
 
 
 def test_sections_exist_only_for_what_ran():
     check = row("falls", "simulation", "check", 0.5, suite="validation", expected=0.0, tolerance=1.0)
     failed = dataclasses.replace(check, scene="sag", status="failed", reason="off")
-    run = run_of([check, failed])
-    made_tables = make_tables(run)
-    content = document(run, made_tables, [], [])
-    assert [section["title"] for section in content["sections"]] == ["Findings", "Validation"]
-    assert content["definitions"] == content["first"]["verdict"] == content["first"]["blocks"] == []
-    assert set(made_tables) == {"validation", "metrics", "endings"}
-    (block,) = content["sections"][1]["blocks"]
+    report = report_of([check, failed])
+    made = content(report)
+    endings_title = "How cells, checks and stress tests ended"
+    assert [section["title"] for section in made["sections"]] == ["Validation", endings_title]
+    (worst,) = made["first"]
+    assert made["definitions"] == [] and worst["small"] and worst["pairs"][0][0] == "What went worst"
+    assert set(report.tables) == {"validation", "metrics", "endings"}
+    (block,) = made["sections"][0]["blocks"]
     assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
 
 
 def test_every_metric_of_a_printed_table_is_defined_as_it_defines_itself():
-    run = run_of(all_rows())
-    definitions = dict(document(run, make_tables(run), [], [])["definitions"])
+    definitions = dict(content(report_of(all_rows()))["definitions"])
     assert (
         definitions["Strain [J]"] == "definition of energy/strain" and "Curvature error [1/m]" in definitions
     )
 
 
 def test_the_report_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
-    run = run_of(all_rows())
-    made = make_tables(run)
-    assert [line[:3] for line in made["extremes"].rows] == [
+    report = report_of(all_rows())
+    assert [line[:3] for line in report.tables["extremes"].rows] == [
         ("stiff", "simulation", "converged"), ("teleport", "simulation", "timeout"),
     ]  # fmt: skip
-    sections = {s["title"]: s["blocks"] for s in document(run, made, [], [])["sections"]}
+    sections = {s["title"]: s["blocks"] for s in content(report)["sections"]}
     (block,) = sections["Stress"]
     assert [[cell["text"] for cell in line[:3]] for line in block["groups"][0]["rows"]] == [
         ["teleport", "Simulation", "timeout"]
     ]
-    assert dict(summary(run))["Known answers"].endswith("1 of 2 stress tests converged; 1 timeout.")
+    assert endings(report.run).endswith("of 2 stress tests 1 timeout.")
 
 
 def test_page_one_names_the_worst_of_each_kind():
@@ -395,22 +410,22 @@ def test_the_verdict_says_tie_only_within_the_uncertainty():
 
 def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():
     run = run_of(all_rows())
-    assert leads(run, run.worn) == ["simulation", "snug", "pbns", "skinning"]
+    assert leads(run, run.garment_rows) == ["simulation", "snug", "pbns", "skinning"]
     better = run_of(
         [*all_rows(), *(row(s, "supervised", "curvature/error", 0.1, unit="1/m") for s in SCENES)]
     )
-    assert leads(better, better.worn)[2] == "supervised"
-    assert leads(run, run.worn, ["pbns", "simulation"]) == ["simulation", "pbns"]
+    assert leads(better, better.garment_rows)[2] == "supervised"
+    assert leads(run, run.garment_rows, ["pbns", "simulation"]) == ["simulation", "pbns"]
 
 
 def test_changed_networks_are_networks_where_a_run_has_no_others():
     rows = on_two_scenes("snug-springs", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
     changed = [dataclasses.replace(r, role="ablation", base="snug") for r in rows[:2]] + rows[2:]
     run = run_of(changed)
-    assert leads(run, run.worn) == ["simulation", "snug-springs"]
+    assert leads(run, run.garment_rows) == ["simulation", "snug-springs"]
     assert "5.00 J, the simulation's 3.75" in near(changed)
     both = run_of(changed + on_two_scenes("snug", 1.0, 9.0))
-    assert leads(both, both.worn) == ["simulation", "snug"]
+    assert leads(both, both.garment_rows) == ["simulation", "snug"]
 
 
 def test_the_table_of_page_one_stays_short():
@@ -431,26 +446,31 @@ def test_a_shortened_table_has_rows_of_each_garment():
 
 
 def test_a_figure_alone_in_its_row_keeps_its_width():
-    picture = Picture(Path("half.svg"), "said", "break_even", 0.5)
-    assert row_block([picture]) == {
-        "kind": "figure",
-        "path": "figures/half.svg",
-        "caption": "said",
-        "width": 0.5,
+    run, picture = run_of(all_rows()), Picture(Path("half.svg"), "said", 0.5)
+    block = FigureBlock("break_even", "against_vertices")
+    assert lay_out(Report(run, {}, {"break_even": [picture]}), block) == [
+        {"kind": "figure", "path": "figures/half.svg", "caption": "said", "width": 0.5}
+    ]
+    both = {"break_even": [picture], "against_vertices": [picture]}
+    assert [values["kind"] for values in lay_out(Report(run, {}, both), block)] == ["row"]
+
+
+def test_every_block_names_a_figure_or_table_that_is_declared():
+    figures = {figure.name for figure in (*FIGURES, *PICTURES)}
+    named = {
+        name for block in BLOCKS if isinstance(block, FigureBlock) for name in (block.name, block.beside)
     }
-    assert row_block([picture, picture])["kind"] == "row"
+    assert named - {""} == figures
 
 
 def test_no_number_of_the_report_is_infinite_or_nan():
-    run = run_of(all_rows())
-    content = document(run, make_tables(run), [], [])
-    assert not re.search(r"\b(nan|inf|NaN|None)\b", json.dumps(content, allow_nan=False))
+    made = json.dumps(content(report_of(all_rows())), allow_nan=False)
+    assert not re.search(r"\b(nan|inf|NaN|None)\b", made)
 
 
 def test_the_page_says_how_many_seeds_there_were():
     rows = seeds_of("snug", "energy/strain", (1.0, 1.1, 1.2)) + seeds_of("pbns", "energy/strain", (2.0, 2.1))
-    run = run_of(rows + seeds_of("simulation", "energy/strain", (1.0,)))
-    sections = document(run, make_tables(run), [], [])["sections"]
+    sections = content(report_of(rows + seeds_of("simulation", "energy/strain", (1.0,))))["sections"]
     block = sections[0]["blocks"][0]
     assert "±: standard deviation over 2 or 3 seeds. Without it: one seed" in block["note"]
 

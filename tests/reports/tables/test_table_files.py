@@ -8,14 +8,13 @@ import re
 
 import pytest
 from matplotlib.mathtext import MathTextParser
-from reports.tables.pivots import make_tables
 
 from benchmarks.results import run_folder as results
 from benchmarks.results.run_folder import RunFolder
 from reports import build
-from reports.run.finished_run import run_data
+from reports.run.finished_run import make_run
 from reports.run.reading import read_run
-from reports.tables import dictionary, latex
+from reports.tables import dictionary, latex, make_tables
 from tests.reports.report_folder import all_rows, declaration, row
 
 TOP = r"\begin{tabular}[t]{@{}r@{}}"
@@ -128,7 +127,7 @@ def test_two_columns_of_one_heading_keep_their_own_numbers(tmp_path):
     ]
     said = declaration(rows)
     said["metrics"]["energy/own"]["title"] = said["metrics"]["energy/strain"]["title"]
-    run = run_data(said, rows)
+    run = make_run(said, rows)
     (line,) = [line for line in latex.latex(run, make_tables(run)["energies"]).splitlines() if "SNUG" in line]
     assert "1.00" in line and "5.00" in line
 

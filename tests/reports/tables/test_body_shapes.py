@@ -1,0 +1,55 @@
+"""Body shapes in the report: tables and the sentence of page one."""
+
+from __future__ import annotations
+
+import pytest
+
+from reports.blocks.page_one_sentences import headline
+from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
+from tests.reports.report_folder import row, run_of
+
+
+def on_other_bodies(run) -> str:
+    return dict(headline(run)).get("On other bodies", "")
+
+
+def shaped(method, metric, values, **more):
+    rows = [row(f"shapes/{place}", method, metric, value, suite="shapes", garment="tshirt", **more)
+            for place, value in enumerate(values)]  # fmt: skip
+    return rows
+
+
+def test_energies_are_listed_by_body_shape():
+    rows = shaped("simulation", "body/shape", (0.0, 6.0, 4.0), unit="1")
+    rows += shaped("simulation", "energy/total", (0.3, 0.5, 0.4))
+    twin = {"family": "simulation-perturbed", "level": 1e-6}
+    rows += shaped("simulation-perturbed-1e-6", "energy/total", (0.3, 0.5, 0.4), **twin)
+    rows += shaped("snug", "energy/total", (0.35, 0.8, 0.6)) + shaped(
+        "snug", "energy/strain", (0.1, 0.4, 0.2)
+    )
+
+    (together,), (each,) = shapes(run_of(rows)), SHAPES_BY_SCENE(run_of(rows))
+    names = [column.name for column in together.columns]
+    assert names == ["scene", "method", "above", "energy/total", "energy/strain"]
+    found = {(line[0], line[1]): (None, *line[1:]) for line in together.rows}
+    assert list(found) == [(s, m) for s in ("other shapes", "mean shape") for m in ("simulation", "snug")]
+    together = found["other shapes", "snug"]
+    assert together[2] == pytest.approx(0.7 - 0.45) and together[3].value == pytest.approx(0.7)
+    assert (
+        found["mean shape", "snug"][2] == pytest.approx(0.05) and found["mean shape", "simulation"][2] is None
+    )
+    assert [column.name for column in each.columns][:4] == ["scene", "method", "body/shape", "energy/total"]
+    alone = {(line[0], line[1]): line[2:] for line in each.rows}
+    assert len(alone) == 6 and alone["shapes/2", "simulation"][0].value == 4.0
+    assert alone["shapes/2", "simulation"][2] is None and alone["shapes/2", "snug"][1].value == 0.6
+
+    said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.250."
+    assert on_other_bodies(run_of(rows)) == said
+    # A method that failed on a body is compared on the others, and the sentence says so.
+    last = [row("shapes/1", "snug", "cost/frame", None, suite="shapes", status="diverged", reason="no end")]
+    kept = [r for r in rows if (r.scene, r.method) != ("shapes/1", "snug")]
+    said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.200 (1 of 2 roll-outs)."
+    assert on_other_bodies(run_of(kept + last)) == said
+    one = [r for r in rows if r.scene == "shapes/0"]
+    assert on_other_bodies(run_of(one)) == ""
+    assert shapes(run_of(one)) == SHAPES_BY_SCENE(run_of(one)) == []
