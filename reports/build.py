@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.results.run_folder import ResultsError, RunFolder
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 
 if TYPE_CHECKING:

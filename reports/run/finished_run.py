@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.results.run_folder import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row, as_right
+from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row, as_right
 from reports.run.training_histories import History
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Metric:
 
 @dataclass(frozen=True)
 class Method:
-    """A method as its rows declare it, see benchmarks.results.run_folder.Row; label: its name for people."""
+    """A method as its rows declare it, see benchmarks.results.row.Row; label: its name for people."""
 
     name: str
     label: str

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.results import frame_energies
-from benchmarks.results.run_folder import ResultsError, RunFolder, model_path
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder, model_path
 from reference_sim.files.array_file import read_arrays
 from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
 from reports.run.finished_run import NoRollOuts, Run, make_run

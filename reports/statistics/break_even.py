@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from benchmarks.results.run_folder import BEFORE_FRAMES
+from benchmarks.results.row import BEFORE_FRAMES
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import mean_of, value_of
 from reports.statistics.pareto import TIME, fastest, points_of, run_time, solvers

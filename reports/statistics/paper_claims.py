@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from benchmarks.results.run_folder import BEFORE_FRAMES
+from benchmarks.results.row import BEFORE_FRAMES
 from reports.run.finished_run import Metric, Run
 from reports.statistics.frame_shares import half_of, share_of_frames, with_shares
 from reports.statistics.means_and_spreads import Mean, pair

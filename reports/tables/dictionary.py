@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.results.run_folder import ROLES, STATUSES
+from benchmarks.results.row import ROLES, STATUSES
 from reports.run.finished_run import Run
 from reports.tables.table import Column, Table
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from benchmarks.results.run_folder import BEFORE_FRAMES
+from benchmarks.results.row import BEFORE_FRAMES
 from reports.run.finished_run import Run
 from reports.tables.pivot import Pivot
 

@@ -206,16 +206,17 @@ def read_header(path: Path) -> None:
 
 def read_rows(path: Path, name: str = "results.csv") -> None:
     """That file of a run beside whole other ones; up to the tables of the report."""
-    from reports.document.content import document
+    from reports.blocks.block import Report
+    from reports.document.content import content
     from reports.run.reading import read_run
-    from reports.tables.pivots import make_tables
+    from reports.tables import make_tables
 
     folder = RunFolder(path.parent / "run")
     folder.write_rows(all_rows())
     folder.config_path.write_bytes(Path("run.json").read_bytes())
     (folder.path / name).write_bytes(path.read_bytes())
     run = read_run(folder)
-    json.dumps(document(run, make_tables(run), [], []), allow_nan=False)
+    json.dumps(content(Report(run, make_tables(run), {})), allow_nan=False)
 
 
 def read_config(path: Path) -> None:

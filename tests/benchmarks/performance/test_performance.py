@@ -34,9 +34,8 @@ from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Outcome
 from reference_sim import simulate
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reports.figures.convergence import convergence_curve
-from reports.run.finished_run import run_data
-from reports.tables.pivots import make_tables
+from reports.run.finished_run import make_run
+from reports.tables import make_tables
 from snug.motion.library import TEST, TRAIN
 from snug.networks.trained_model import TrainedModel
 from tests.snug.training.dressing import swaying, tube_dress
@@ -154,7 +153,7 @@ def test_a_run_measures_in_a_process_of_its_own_and_reuses_the_rows(tmp_path, wi
     config = RunFolder(tmp_path).read_config()
     assert config["metrics"]["performance/iteration"]["table"] == "performance_scaling"
     assert config["methods"]["simulation"]["role"] == "reference"
-    tables = make_tables(run_data(config, list(rows.values())))
+    tables = make_tables(make_run(config, list(rows.values())))
     assert tables["performance_scaling_by_scene"].rows[0][:3] == ("performance", "sheet/4x4", "simulation")
     assert execution.execute(plan) == 0  # the times of the first run, to the last digit
     assert {row.metric: row.value for row in RunFolder(tmp_path).read_rows()} == {
@@ -346,14 +345,3 @@ def test_arrival_is_for_good():
 
 def test_the_held_out_motion_is_one_to_train_on():
     assert HELD_OUT in TRAIN and HELD_OUT not in TEST
-
-
-def test_the_curve_is_drawn_and_a_broken_one_is_one_line(tmp_path):
-    folder, problems = RunFolder(tmp_path), []
-    assert convergence_curve(folder, problems) == [] and problems == []
-    curve = tmp_path / "convergence.csv"
-    curve.write_text("step,seconds,loss,validation\n10,1.5,2.0,1.9\n20,2.5,0.6,0.7\n")
-    (picture,) = convergence_curve(folder, problems)
-    assert picture.path.with_suffix(".png").stat().st_size > 5000
-    curve.write_text("step,seconds\n10,1\n")
-    assert convergence_curve(folder, problems) == [] and len(problems) == 1

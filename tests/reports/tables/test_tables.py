@@ -12,7 +12,6 @@ import pytest
 
 from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
-
 from reports.blocks import BLOCKS
 from reports.blocks.block import FigureBlock, Report
 from reports.blocks.page_one_sentences import headline
