@@ -31,7 +31,7 @@ EXAMPLES = """examples:
   python -m reports.compare before after --without-times         beside other work on the machine
 
 What counts as a change:
-  a mean   p below .05, corrected by Holm for all means compared, the 95 % interval not within 5 % of
+  a mean   p below 0.05, corrected by Holm for all means compared, the 95 % interval not within 5 % of
            equality, and more than the uncertainties of both runs together (column uncertainty; of run
            times, the range of repeats). Where nothing was repeated, 5 % decide in place of p. Of total and
            gravity, whose zero is a choice, 5 % are of what skinning has more than the simulation.
@@ -39,26 +39,28 @@ What counts as a change:
            memory likewise.
   a check  one that passed fails, or the other way round; so with stress tests, whatever --metrics says.
   a cell   one that came to its end no longer does, or the other way round; likewise.
-What is trained with one seed in common is not judged: how far another seed moves it is unknown.
-Worse is what a metric's declaration says; a metric that has no better side is at most changed.
+A network with one seed in common is not judged: how far another seed moves it is unknown. A metric's
+declaration says which side is worse; a metric without a better side is at most changed.
 exit status: 0 nothing got worse; 1 something did; 2 a folder is no run, or the two share nothing."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """One line of the comparison: where, of what, which way, and how far in words."""
+    """One line of the comparison: verdict, garment or scene, method, metric, and size of the change."""
 
     verdict: str
     place: str
     method: str
     metric: str
-    said: str
+    size: str
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """The changes, worse ones first; how many means were compared; how many differ that one seed each cannot
-    judge; cells that one run lacks.
+    """Result of a comparison of two runs.
+
+    changes: worse ones first. compared: number of means. one_seed: number of means that differ and cannot be
+    judged, for they have one seed. only_one, only_other: cells that the other run lacks.
     """
 
     changes: tuple[Change, ...]
@@ -71,9 +73,17 @@ class Comparison:
 def compare(
     one: Run, other: Run, metrics: str = "*", methods: str = "*", *, times: bool = True
 ) -> Comparison:
-    """All that both runs have. metrics, methods: patterns, joined by commas; times: run times and memory too.
+    """Compare all that both runs have.
 
-    Raises ResultsError where the presets differ or nothing is shared.
+    Args:
+        one: the earlier run.
+        other: the later run.
+        metrics: patterns joined by commas.
+        methods: likewise.
+        times: compare run times and memory too.
+
+    Raises:
+        ResultsError: where the presets differ or nothing is shared.
     """
     presets = [run.config.get("preset") for run in (one, other)]
     if presets[0] != presets[1]:
@@ -93,12 +103,12 @@ def compare(
     judged, compared, one_seed = _means(one, *kept)
     order = (WORSE, BETTER, OTHER)
     changes = sorted([*endings, *judged], key=lambda change: order.index(change.verdict))
-    lacking = [len(key.difference(rest)) for key, rest in zip(keys, reversed(keys))]
-    return Comparison(tuple(changes), compared, one_seed, *lacking)
+    unshared = [len(key.difference(rest)) for key, rest in zip(keys, reversed(keys))]
+    return Comparison(tuple(changes), compared, one_seed, *unshared)
 
 
 def _chosen(run: Run, methods: str) -> pd.DataFrame:
-    """Each cell once, with what its means are over, and the range of repeats as a time's uncertainty."""
+    """Return each cell once, with its garment or scene, and the range of repeats as a time's uncertainty."""
     cases = run.frame[run.frame["case"] != ""].drop_duplicates(CELL)
     frame = pd.concat([run.cells(*SUITES), cases], ignore_index=True)
     frame = frame[(frame["status"] != "skipped") & _matching(frame["method"], methods)]
@@ -109,7 +119,7 @@ def _chosen(run: Run, methods: str) -> pd.DataFrame:
     timed = frame["metric"].isin((TIME, WHOLE))
     apart = repeats.reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell])).to_numpy()
     frame.loc[timed, "uncertainty"] = frame.loc[timed, "value"] * apart
-    # The reference of another run need not move as this one's: uncertainties add up.
+    # Another run has another reference ensemble: uncertainties add up.
     return frame[frame["metric"] != REPEATS].drop(columns="moved")
 
 
@@ -119,7 +129,7 @@ def _matching(names: pd.Series, patterns: str) -> pd.Series:
 
 
 def _endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
-    """Cells, checks and stress tests of both that ended well in one run alone; once for a cell's metrics."""
+    """Find cells, checks and stress tests that ended well in one run alone; each cell once."""
     both = one.merge(other, on=CELL, suffixes=("", "_other"))
     # A cell that failed has one row, of a metric that it need not have where it ends well.
     cells = _worst(one).merge(_worst(other), on=CELL[:3], suffixes=("", "_other"))
@@ -137,35 +147,35 @@ def _endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
 
 
 def _worst(frame: pd.DataFrame) -> pd.DataFrame:
-    """A row of each cell: one that is not ok, where there is one."""
+    """Return a row of each cell: one that is not ok, where there is one."""
     ordered = frame.iloc[(frame["status"] == "ok").argsort(kind="stable")]
     return ordered.drop_duplicates(CELL[:3])
 
 
 def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
-    """Means beyond noise; how many were compared, one family; how many differ that have one seed."""
+    """Return changes of means beyond noise, how many were compared, and how many of one seed differ."""
     first, second = (means(frame, *GROUP) for frame in _over_the_same(*frames))
     cells = run.cells(*SUITES)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
-    found = [
+    judged = [
         (place, method, metric := run.metrics[name], mean, new, effect_on(metric, new, mean, run, cells))
         for (place, method, name), (mean, new) in differ.items()
         if not mean.seeded or mean.seeds > 1
     ]
-    p_values = [far.p_value() for *_, far in found]
+    p_values = [far.p_value() for *_, far in judged]
     corrected = iter(holm([p for p in p_values if p is not None]))
     changes = []
-    for (place, method, metric, mean, new, far), alone in zip(found, p_values):
+    for (place, method, metric, mean, new, far), alone in zip(judged, p_values):
         p = None if alone is None else next(corrected)
         noise = standing(new, mean, far, p) in (TIED, OPEN) or far.equal()
         if not noise and not (metric.of == "machine" and _machine(mean, far)):
             verdict = _side(metric, far)
-            changes.append(Change(verdict, place, method, metric.name, _said(metric, mean, new, far, p)))
-    return changes, len(first), len(differ) - len(found)
+            changes.append(Change(verdict, place, method, metric.name, _size(metric, mean, new, far, p)))
+    return changes, len(first), len(differ) - len(judged)
 
 
 def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
-    """The usable rows of both, without cases, of scenes that have all seeds of their group."""
+    """Return the usable rows of both, without cases, of scenes that have all seeds of their group."""
     rows = [frame[frame["usable"] & (frame["case"] == "")] for frame in (one, other)]
     keys = [frame.set_index(CELL).index for frame in rows]
     rows = [frame[key.isin(rest)] for frame, key, rest in zip(rows, keys, reversed(keys))]
@@ -178,7 +188,7 @@ def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]
 
 
 def _machine(mean: Mean, far: Effect) -> bool:
-    """Whether a change of time or memory may be the machine's: not repeated, or within MOST_SLACK."""
+    """Return whether a change of time or memory may be the machine's: not repeated, or within MOST_SLACK."""
     if mean.uncertainty is None and "seeds" not in far.covers:
         return True
     low, high = far.interval or (far.shown, far.shown)
@@ -191,8 +201,8 @@ def _side(metric: Metric, far: Effect) -> str:
     return WORSE if (far.value > 0.0) is metric.lower_is_better else BETTER
 
 
-def _said(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
-    """As "0.21 ± 0.01 -> 0.26 ± 0.01 J, × 1.24 (1.2 to 1.28), p .003"."""
+def _size(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
+    """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
     unit = "" if metric.unit in ("", "1") else f" {metric.unit}"
     before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
     text = f"{before} -> {after}{unit}, {'×' if far.ratio else 'by'} {number(far.shown)}"
@@ -203,10 +213,10 @@ def _said(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -
 
 @command("reports.compare")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     parser = Parser(
         prog="python -m reports.compare",
-        description="What changed from one run to another beyond the noise of both.",
+        description="Find changes between two runs beyond the noise of both; fail if results got worse.",
         epilog=EXAMPLES,
     )
     parser.add_argument("one", metavar="A", help="folder of the earlier run")
@@ -216,20 +226,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--without-times", action="store_true", help="neither run times nor memory")
     options = parser.parse_args(arguments)
     runs = [read_run(RunFolder(path)) for path in (options.one, options.other)]
-    found = compare(runs[0], runs[1], options.metrics, options.methods, times=not options.without_times)
-    for change in found.changes:
-        print(f"{change.verdict:8}{change.place}  {change.method}  {change.metric}  {change.said}")
-    print("\n".join(_summary(found, runs)))
-    return 1 if any(change.verdict == WORSE for change in found.changes) else 0
+    comparison = compare(*runs, options.metrics, options.methods, times=not options.without_times)
+    for change in comparison.changes:
+        print(f"{change.verdict:8}{change.place}  {change.method}  {change.metric}  {change.size}")
+    print("\n".join(_summary(comparison, runs)))
+    return 1 if any(change.verdict == WORSE for change in comparison.changes) else 0
 
 
-def _summary(found: Comparison, runs: Sequence[Run]) -> Iterator[str]:
-    counts = [f"{sum(c.verdict == v for c in found.changes)} {v}" for v in (WORSE, BETTER, OTHER)]
-    yield f"{found.compared} means compared: {', '.join(counts)}."
-    if found.one_seed:
-        yield f"Not judged: {found.one_seed} means differ that have one seed; run both with --seeds 0,1,2."
-    if found.only_one or found.only_other:
-        yield f"Not compared: {found.only_one} numbers of A alone, {found.only_other} of B alone."
+def _summary(comparison: Comparison, runs: Sequence[Run]) -> Iterator[str]:
+    counts = [f"{sum(c.verdict == v for c in comparison.changes)} {v}" for v in (WORSE, BETTER, OTHER)]
+    yield f"{comparison.compared} means compared: {', '.join(counts)}."
+    if count := comparison.one_seed:
+        yield f"Not judged: {count} means differ that have one seed; run both with --seeds 0,1,2."
+    if comparison.only_one or comparison.only_other:
+        yield f"Not compared: {comparison.only_one} numbers of A alone, {comparison.only_other} of B alone."
     machines = [", ".join(sorted(set(run.frame["hardware"]))) for run in runs]
     if machines[0] != machines[1]:
         yield f"No times compared: A ran on {machines[0]}, B on {machines[1]}."

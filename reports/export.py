@@ -1,6 +1,6 @@
-"""python -m reports.export RUN: a roll-out of a run and its body, for programs that animate and render.
+"""python -m reports.export RUN: write a roll-out of a run and its body for programs that animate and render.
 
-A whole scene to be simulated elsewhere is what python -m benchmarks.export writes.
+To simulate a whole scene elsewhere, see python -m benchmarks.export.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Meshes = dict[str, "Trajectory"]
 
 
 def write_alembic(path: Path, meshes: Meshes) -> None:
-    """One polygon mesh for each name. Faces are turned round: Alembic's wind clockwise seen from outside."""
+    """Write a polygon mesh for each name, faces turned round: Alembic's wind clockwise seen from outside."""
     import imath
     import numpy as np
     from alembic3d.Abc import OArchive
@@ -60,7 +60,7 @@ def write_alembic(path: Path, meshes: Meshes) -> None:
 
 
 def write_usd(path: Path, meshes: Meshes) -> None:
-    """A stage of metres with y up: one mesh for each name, its points at each frame."""
+    """Write a stage of metres with y up: a mesh for each name, its points at each frame."""
     import numpy as np
     from pxr import Usd, UsdGeom, Vt
 
@@ -75,11 +75,11 @@ def write_usd(path: Path, meshes: Meshes) -> None:
     stage.SetStartTimeCode(0.0)
     stage.SetEndTimeCode(max(round(rate * float(mesh.times[-1]), 6) for mesh in meshes.values()))
     for name, mesh in meshes.items():
-        made = UsdGeom.Mesh.Define(stage, f"/roll_out/{name}")
-        made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        made.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.faces), 3, dtype=np.int32)))
-        made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.faces.ravel().astype(np.int32)))
-        points, extent = made.CreatePointsAttr(), made.CreateExtentAttr()
+        prim = UsdGeom.Mesh.Define(stage, f"/roll_out/{name}")
+        prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.faces), 3, dtype=np.int32)))
+        prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.faces.ravel().astype(np.int32)))
+        points, extent = prim.CreatePointsAttr(), prim.CreateExtentAttr()
         for time, frame in zip(mesh.times * rate, mesh.positions.astype(np.float32)):
             code = Usd.TimeCode(round(float(time), 6))
             points.Set(Vt.Vec3fArray.FromNumpy(frame), code)
@@ -95,7 +95,7 @@ ARCHIVES: dict[str, tuple[Callable[[Path, Meshes], None], str, str]] = {
 
 
 def demand_writable(path: Path) -> None:
-    """Raises ValueError for a name or an installation that nothing can come of, before anything is read."""
+    """Raise ValueError for a name or an installation that cannot be written, before anything is read."""
     from importlib.util import find_spec
 
     if path.suffix in ARCHIVES:
@@ -141,7 +141,7 @@ def _write_frames(folder: Path, meshes: Meshes) -> None:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Make the parser of the command."""
     parser = Parser(
         prog="python -m reports.export",
         description="Write a roll-out of a run, and the body, as Alembic, USD, PC2 or OBJ files.",
@@ -159,15 +159,15 @@ def make_parser() -> argparse.ArgumentParser:
 
 @command("reports.export")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     options = make_parser().parse_args(arguments)
     path = Path(options.out)
     demand_writable(path)
-    from reports.run.selected_roll_outs import select_roll_outs
+    from reports.run.selected_roll_outs import select_roll_outs  # heavy: not needed for --help
 
-    kept = select_roll_outs(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
-    cloth = kept.cloths[options.method]
-    meshes = {"garment": cloth} | ({"body": kept.body.first(cloth.frames)} if kept.body else {})
+    selected = select_roll_outs(RunFolder(options.run_dir), options.scene, [options.method], options.seed)
+    cloth = selected.cloths[options.method]
+    meshes = {"garment": cloth} | ({"body": selected.body.first(cloth.frames)} if selected.body else {})
     write(path, meshes)
     sizes = ", ".join(f"{name} of {mesh.positions.shape[1]} vertices" for name, mesh in meshes.items())
     print(f"{path}: {cloth.frames} frames, {sizes}")

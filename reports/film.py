@@ -1,4 +1,4 @@
-"""python -m reports.film RUN: methods side by side in a scene, from one camera, as a film."""
+"""python -m reports.film RUN: a film of methods side by side in a scene, from one camera."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.mp4
   python -m reports.film reports/runs/NAME --scene flag --methods simulation,newton-1,xpbd-40 -o flag.gif
-  python -m reports.film reports/runs/NAME --scene tshirt/punch --methods snug,pbns --speed .25 -o punch.mp4
+  python -m reports.film reports/runs/NAME --scene tshirt/punch --methods snug,pbns --speed 0.25 -o punch.mp4
 
 An .mp4 needs pip install 'neural-garment-benchmark[film]'; a .gif does not. No screen is needed.
 The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.
@@ -38,7 +38,7 @@ SWATCH = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).s
 
 
 class Stage:
-    """Cloths and body in one scene, of which one cloth is shown at a time: every view has the same camera."""
+    """Stage with all cloths and the body, one cloth shown at a time: every view has the same camera."""
 
     def __init__(self, kept: SelectedRollOuts, width: int, azimuth: float) -> None:
         import pyvista
@@ -62,7 +62,7 @@ class Stage:
         self.away = half / np.tan(np.radians(ANGLE / 2.0))
 
     def _added(self, cloth: Trajectory, colour: str) -> tuple[Any, Any]:
-        """The mesh of a cloth or body and what draws it."""
+        """Add a cloth or body; return its mesh and its actor."""
         import pyvista
 
         mesh = pyvista.PolyData.from_regular_faces(cloth.positions[0], cloth.faces)
@@ -73,7 +73,7 @@ class Stage:
         return mesh, actor
 
     def view(self, method: str, frame: int) -> np.ndarray:
-        """(height, width, 3) bytes: the cloth of that method on the body; past its end, its last frame."""
+        """Return (height,width,3) bytes: that method's cloth on the body; past its end, its last frame."""
         for name, (_, actor) in self.meshes.items():
             actor.visibility = name == method
         _move(self.meshes[method][0], self.kept.cloths[method].positions, frame)
@@ -88,6 +88,7 @@ class Stage:
         return np.asarray(self.plotter.screenshot(return_img=True))
 
     def close(self) -> None:
+        """Free the renderer."""
         self.plotter.close()
 
 
@@ -97,7 +98,7 @@ def _move(mesh, positions: np.ndarray, frame: int) -> None:
 
 
 def camera_path(kept: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Where the camera looks in each frame (T,3) [m], smoothed, and half the height that it must see [m]."""
+    """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
     cloths = kept.cloths.values()
     frames = max(cloth.frames for cloth in cloths)
     seen = [cloth.positions @ axes for cloth in cloths]
@@ -116,7 +117,7 @@ def camera_path(kept: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, f
 
 
 def pictures(kept: SelectedRollOuts, width: int, azimuth: float) -> Iterator[np.ndarray]:
-    """Every frame of the film: all views with their names, and the time."""
+    """Yield every frame of the film: all views with their names, and the time."""
     stage = Stage(kept, width, azimuth)
     try:
         longest = max(kept.cloths.values(), key=lambda cloth: cloth.frames)
@@ -128,7 +129,7 @@ def pictures(kept: SelectedRollOuts, width: int, azimuth: float) -> Iterator[np.
 
 
 def _composed(kept: SelectedRollOuts, views: dict[str, np.ndarray], frame: int, time: float) -> np.ndarray:
-    """Views in rows, each under its method's name, and the time [s] below them."""
+    """Compose views in rows, each under its method's name, with the time [s] below them."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
@@ -154,14 +155,14 @@ def _composed(kept: SelectedRollOuts, views: dict[str, np.ndarray], frame: int, 
 
 
 def _fitting(draw, label: str, font, width: int) -> str:
-    """The label, cut where it is wider than a view."""
+    """Cut the label where it is wider than a view."""
     while draw.textlength(label, font) > 0.96 * width and len(label) > 1:
         label = label.rstrip("…")[:-1] + "…"
     return label
 
 
 def write_mp4(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
-    """H.264, at so many frames a second."""
+    """Write H.264 at `rate` frames a second."""
     from fractions import Fraction
 
     import av
@@ -179,7 +180,7 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
 
 
 def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
-    """Of hundredths of a second that add up to the right time, in shades of the colours of a film."""
+    """Write a GIF whose hundredths of a second add up to the right time, in shades of the film's colours."""
     from PIL import Image, ImageColor
 
     # Of all frames at once: one picture's own palette has no place for what the others show.
@@ -198,7 +199,7 @@ WRITERS = {".mp4": write_mp4, ".gif": write_gif}
 
 
 def demand_possible(path: Path) -> None:
-    """Raises ValueError where no such film can be made here."""
+    """Raise ValueError where no such film can be made here."""
     from importlib.util import find_spec
 
     if path.suffix not in WRITERS:
@@ -213,7 +214,7 @@ def demand_possible(path: Path) -> None:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Make the parser of the command."""
     parser = Parser(
         prog="python -m reports.film",
         description="A film of methods side by side in a scene of a run.",
@@ -233,11 +234,11 @@ def make_parser() -> argparse.ArgumentParser:
 
 @command("reports.film")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command; return its exit status."""
     options = make_parser().parse_args(arguments)
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
-        raise ValueError("--speed is .01 to 10, --width 64 to 2000")
+        raise ValueError("--speed is 0.01 to 10, --width 64 to 2000")
     demand_possible(path)
     from reports.run.selected_roll_outs import select_roll_outs
 

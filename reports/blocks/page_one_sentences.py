@@ -80,7 +80,8 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     if network is None or reference is None or not network.value:
         return ""
     text = f"{run.label(NETWORK)} takes {number(network.value)} ms a frame, the simulation "
-    text += f"{number(reference.value)}: {number(reference.value / network.value, 2)} times as long{network.fewer}"
+    ratio = number(reference.value / network.value, 2)
+    text += f"{number(reference.value)}: {ratio} times as long{network.fewer}"
     more = _rivals(run, run.cells("speed", "garments"), scenes) if scenes else ""
     return f"{text}; {more}" if more else f"{text}."
 

@@ -100,7 +100,7 @@ def long_motion(run: Run) -> Motion | None:
 
 
 def read_scene(run: Run, rows: pd.DataFrame, methods: Iterable[str]) -> SceneRollOuts:
-    """Read the first good seed of each method in the one scene of these rows; the first where none is good."""
+    """Read the first good seed of each method, or else its first, in the one scene of these rows."""
     scene = str(rows["scene"].iloc[0])
     seeds = shown_seeds(rows).loc[scene]
     cloths = {method: run.roll_outs.cloth(scene, method, int(seeds[method])) for method in methods}

@@ -69,7 +69,7 @@ def _curves(run: Run, roll_outs: SceneRollOuts) -> dict[str, dict[str, np.ndarra
 
 
 def _log_energy_axis(axes: Axes) -> None:
-    """Make the axis logarithmic, cut four decades below the top so that frames at rest do not squeeze the rest."""
+    """Make the axis logarithmic, cut four decades below the top: frames at rest would squeeze it."""
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines()])
     values = values[np.isfinite(values)]
     if len(values):

@@ -81,7 +81,7 @@ _SPARE_MARKERS = ("h", "8", "d", "v", "p")
 
 
 def family_style(run: Run, method: Method) -> Style:
-    """Return the style of a method's family; an unknown one has a spare colour that depends on its name alone.
+    """Return the style of a method's family; an unknown one has a spare colour that depends on its name.
 
     A method that starts from another has the colour of that one, whether it ran or not; an ablation has the
     marker of its base.

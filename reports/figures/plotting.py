@@ -105,7 +105,7 @@ def printable(text: str) -> str:
 
 @cache
 def _letters() -> frozenset[str]:
-    """Return the letters of DejaVu Sans Mono, the widest of the typesetter's fonts, which matplotlib has too."""
+    """Return the letters of DejaVu Sans Mono, the typesetter's widest font, which matplotlib has too."""
     from matplotlib.font_manager import findfont, get_font
 
     return frozenset(map(chr, get_font(findfont("DejaVu Sans Mono")).get_charmap()))

@@ -42,7 +42,8 @@ class Embedded:
         if not left_out:
             return f"All {have} roll-outs that this run kept can be shown: the first seed of each method."
         names = ", ".join(f"{scene} ({count})" for scene, count in self.missing.items())
-        return f"{have} of {have + left_out} roll-outs can be shown: {rule}. Left out for size, by scene: {names}."
+        count = f"{have} of {have + left_out} roll-outs can be shown"
+        return f"{count}: {rule}. Left out for size, by scene: {names}."
 
 
 def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:

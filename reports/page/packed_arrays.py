@@ -32,7 +32,7 @@ class Pack:
         self.entries[name] = {"at": start, "shape": list(array.shape), **how}
 
     def positions(self, name: str, positions: np.ndarray) -> None:
-        """Add positions (T,V,3) [m], finite: low bytes, then high ones, of their difference from linear motion."""
+        """Add finite positions (T,V,3) [m]: low bytes, then high ones, of differences from linear motion."""
         low = positions.reshape(-1, 3).min(axis=0)
         step = max(float((positions - low).max()) / STEPS, FINEST)
         steps = np.rint((positions - low) / step).astype(np.uint16)

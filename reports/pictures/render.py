@@ -33,7 +33,7 @@ class Camera:
     turn: float = -25.0
 
     def seen(self, positions: np.ndarray) -> np.ndarray:
-        """Return positions (V,3) [m] as right, up and towards the camera, from the middle of the picture [m]."""
+        """Return positions (V,3) [m] as right, up and towards the camera, from the picture's middle [m]."""
         return (positions - self.centre) @ camera_axes(self.turn)
 
 

@@ -1,1 +1,1 @@
-"""Numbers computed from the rows of a run: means and spreads, significance, the paper's claims, break-even."""
+"""Numbers computed from rows: means and spreads, significance, the paper's claims, break-even."""

@@ -40,7 +40,7 @@ def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
 
 
 def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]) -> list[CellText]:
-    """Return text, spread or interval, and marks for each cell of a column; `printed`: rows of others below."""
+    """Return text, spread or interval, and marks of a column's cells; `printed`: the paper's rows below."""
     texts = [*(_text(run, column, cell) for cell in cells), *printed]
     texts = texts if column.text or column.mixed else aligned(texts)
     lines = []

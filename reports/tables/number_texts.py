@@ -12,7 +12,7 @@ _FIGURE_SPACE, _POINT_SPACE = "\u2007", "\u2008"
 
 
 def number(value: float | None, digits: int = 3, *, trim: bool = False) -> str:
-    """Return `value` to `digits` significant digits: "0.0643", "12.3", "1,730", "2.50×10⁻⁷"; a dash if absent.
+    """Return `value` to `digits` significant digits: "0.0643", "1,730", "2.50×10⁻⁷"; a dash if absent.
 
     `trim` leaves out zeros at the end, for numbers that are exact.
     """

@@ -1,4 +1,4 @@
-"""Tables of outcomes: checks, stress tests, cells that did not run to their end; and of everything measured."""
+"""Tables of outcomes: checks, stress tests, cells that did not end well; and of everything measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables on run time: the points of the plots, break-even of trainings, rivals, the reference's uncertainty."""
+"""Tables on run time: points of the plots, break-even of trainings, rivals, the reference's uncertainty."""
 
 from __future__ import annotations
 
@@ -97,8 +97,8 @@ def error_rivals(run: Run) -> list[Table]:
         Column("as_accurate_time", "Its run time", "ms"),
     )
     caption = (
-        f"Who beats SNUG, over {', '.join(scenes)}: the best method no slower within repeats, and the fastest "
-        "solver stopped early that is as accurate; a dash: none."
+        f"Who beats SNUG, over {', '.join(scenes)}: the best method no slower within repeats, and the "
+        "fastest solver stopped early that is as accurate; a dash: none."
     )
     return table("error_rivals", columns, lines, caption)
 

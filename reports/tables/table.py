@@ -66,8 +66,8 @@ class Table:
     def write_csv(self, folder: Path) -> Path:
         """Write <folder>/<name>.csv whole or not at all; return its path.
 
-        A mean gets a column for its spread over seeds and, where there is any, one for its uncertainty and one
-        for the roll-outs that it lacks; an effect gets columns for its kind and its interval.
+        A mean gets a column for its spread over seeds and, where there is any, one for its uncertainty and
+        one for the roll-outs that it lacks; an effect gets columns for its kind and its interval.
         """
         path = folder / f"{self.name}.csv"
         texts: dict[str, list[str]] = {}

@@ -126,8 +126,8 @@ def test_normals_of_a_sphere_point_outwards():
     [
         (["--methods", "snug,simulatoin"], "no method in tshirt/walk is called 'simulatoin'"),
         (["-o", "x.avi"], "x.avi: a film ends in .mp4 or .gif"),
-        (["--speed", "0"], "--speed is .01 to 10"),
-        (["--speed", "nan"], "--speed is .01 to 10"),
+        (["--speed", "0"], "--speed is 0.01 to 10"),
+        (["--speed", "nan"], "--speed is 0.01 to 10"),
         (["--width", "7"], "--width 64 to 2000"),
     ],
 )

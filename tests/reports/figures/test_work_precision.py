@@ -293,8 +293,8 @@ def test_garments_have_crossings_by_themselves():
 def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():
     run = run_of(all_rows())
     assert cost_sentence(run).endswith(
-        "; by energy gap (0.100 in 0.250 ms) nothing as fast as SNUG is nearer; the fastest solver as near is "
-        "L-BFGS, 20 iterations, 16.0 ms."
+        "; by energy gap (0.100 in 0.250 ms) nothing as fast as SNUG is nearer; the fastest solver as near "
+        "is L-BFGS, 20 iterations, 16.0 ms."
     )
     (table,) = error_rivals(run)
     assert table.rows == (
