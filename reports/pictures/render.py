@@ -116,19 +116,19 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     ]
     starts = [(slope * (low + 0.5 - first)).sum(axis=1) for slope in slopes]
     counts = spans.prod(axis=1)
-    own = np.repeat(np.arange(len(seen)), counts)
+    triangle = np.repeat(np.arange(len(seen)), counts)
     place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    y, x = np.divmod(place, spans[own, 0])
+    y, x = np.divmod(place, spans[triangle, 0])
     weights: list[np.ndarray] = []
     for slope, start in zip(slopes, starts):
-        weight = start[own] + slope[own, 0] * x + slope[own, 1] * y
+        weight = start[triangle] + slope[triangle, 0] * x + slope[triangle, 1] * y
         kept = weight >= 0.0
-        own, x, y = own[kept], x[kept], y[kept]
+        triangle, x, y = triangle[kept], x[kept], y[kept]
         weights = [one[kept] for one in (*weights, weight)]
     weights.insert(0, 1.0 - weights[0] - weights[1])
     kept = weights[0] >= 0.0
-    own, x, y = own[kept], x[kept] + low[own[kept], 0], y[kept] + low[own[kept], 1]
-    return y * w + x, seen[own], np.stack([weight[kept] for weight in weights], axis=1)
+    triangle, x, y = triangle[kept], x[kept] + low[triangle[kept], 0], y[kept] + low[triangle[kept], 1]
+    return y * w + x, seen[triangle], np.stack([weight[kept] for weight in weights], axis=1)
 
 
 def vertex_normals(seen: np.ndarray, faces: np.ndarray) -> np.ndarray:

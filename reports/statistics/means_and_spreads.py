@@ -44,14 +44,14 @@ class Mean:
         return max((x for x in (self.spread, self.uncertainty) if x is not None), default=None)
 
     @property
-    def lacking(self) -> int:
+    def missing(self) -> int:
         """Number of cells without the metric: they failed, or belong to a network that diverged."""
         return max(self.asked - len(self.cells), 0)
 
     @property
     def complete(self) -> bool:
         """Whether every cell that should have the metric has it."""
-        return self.lacking == 0
+        return self.missing == 0
 
     @property
     def fewer(self) -> str:

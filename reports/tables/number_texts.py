@@ -12,9 +12,12 @@ _FIGURE_SPACE, _POINT_SPACE = "\u2007", "\u2008"
 
 
 def number(value: float | None, digits: int = 3, *, trim: bool = False) -> str:
-    """Return `value` to `digits` significant digits: "0.0643", "1,730", "2.50×10⁻⁷"; a dash if absent.
+    """Return `value` to `digits` significant digits; a dash if absent or not finite.
 
     `trim` leaves out zeros at the end, for numbers that are exact.
+
+    >>> number(0.064349), number(1734.0), number(2.5e-7), number(None)
+    ('0.0643', '1,734', '2.50×10⁻⁷', '–')
     """
     if value is None or not math.isfinite(value):
         return DASH
@@ -34,14 +37,22 @@ def _trimmed(text: str) -> str:
 
 
 def with_spread(value: float | None, spread: float | None) -> str:
-    """Return a number as "0.064 ± 0.0021", without ± where there is no spread."""
+    """Return a number with its spread to two digits, without ± where there is no spread.
+
+    >>> with_spread(0.5, 0.0123)
+    '0.500 ± 0.012'
+    """
     if spread is None or not math.isfinite(spread) or number(value) == DASH:
         return number(value)
     return f"{number(value)} ± {number(spread, 2)}"
 
 
 def duration(seconds: float | None) -> str:
-    """Return a duration as "0.4 s", "75 s", "12.5 min" or "3.1 h"; a dash if absent."""
+    """Return a duration in s, min or h; a dash if absent.
+
+    >>> duration(75.0), duration(402.0), duration(104400.0)
+    ('75.0 s', '6.70 min', '29.0 h')
+    """
     if seconds is None or not math.isfinite(seconds):
         return DASH
     if seconds == 0.0:

@@ -80,7 +80,7 @@ class Table:
                 moved = [cell.uncertainty if isinstance(cell, Mean) else None for cell in cells]
                 if any(x is not None for x in moved):
                     texts[f"{column.name}_uncertainty"] = [csv_number(x) for x in moved]
-                missing = [cell.lacking if isinstance(cell, Mean) else 0 for cell in cells]
+                missing = [cell.missing if isinstance(cell, Mean) else 0 for cell in cells]
                 if any(missing):
                     texts[f"{column.name}_lacking"] = [str(count) for count in missing]
             if any(isinstance(cell, Effect) for cell in cells):

@@ -212,7 +212,7 @@ def test_over_scenes_and_seeds_that_are_left_in_both():
     assert set(one.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(3)}
     assert set(other.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(2)} and (
         other.asked,
-        other.lacking,
+        other.missing,
     ) == (9, 5)
     found = effect(one, other)
     assert found.covers == "motions and seeds" and not found.complete

@@ -93,7 +93,7 @@ def test_a_seed_that_is_lost_is_said_wherever_the_mean_of_the_others_stands():
     (mean,) = (
         line[2] for line in make_tables(run_of(rows))["energies"].rows if line[:2] == ("tshirt", "snug")
     )
-    assert (mean.lacking, mean.complete, mean.fewer) == (1, False, " (2 of 3 roll-outs)")
+    assert (mean.missing, mean.complete, mean.fewer) == (1, False, " (2 of 3 roll-outs)")
     assert mean_of(run_of(rows).garment_rows, "snug", "energy/total", ["tshirt/walk"]) == mean
 
 

@@ -29,7 +29,7 @@ def test_how_trainings_ended_is_a_mean_over_seeds():
     assert decrease.value == 37.5 and decrease.spread == pytest.approx(12.5 * 2**0.5)
     assert decrease.complete and loss.complete
     (made,) = trainings(replace(run_of([row()]), histories=[history(0, 3.0), history(1, float("nan"))]))
-    assert made.rows[0][6].lacking == 1
+    assert made.rows[0][6].missing == 1
     (made,) = trainings(replace(run_of([row()]), histories=[history(0, 3.0, best_step=20.0)]))
     assert [column.name for column in made.columns][5] == "best" and made.rows[0][5] == 20.0
     assert np.isnan(history(0, 3.0, count=45).decrease)  # nine losses at its end are no ten
