@@ -78,14 +78,14 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
 @command(PROGRAM, goes_on="the same command goes on from there")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    command_line = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
-    options = make_parser().parse_args(words)
+    options = make_parser().parse_args(command_line)
     from benchmarks.datasets.build import build  # loads the simulator
     from benchmarks.tasks.task import RunStopped
 
     try:
-        return _report(build(options, words))
+        return _report(build(options, command_line))
     except RunStopped as error:  # as of a full disk
         print(f"{PROGRAM}: {error}; the same command goes on from there", file=sys.stderr)
         return 1

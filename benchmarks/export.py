@@ -48,9 +48,8 @@ def make_export_parser() -> argparse.ArgumentParser:
 @command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
-    options = make_export_parser().parse_args(words)
+    options = make_export_parser().parse_args(arguments)
     from reference_sim.files.atomic_files import demand_new
 
     folder = Path(options.out)
@@ -60,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
         from benchmarks.external.exported_scene import write_scene  # loads the simulator
 
-        chosen = ["--scene", options.scene, *words_of_scene(options)]
+        chosen = ["--scene", options.scene, *scene_arguments(options)]
         score = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
         simulation = find_method("simulation").make(models=folder, seed=0) if options.reference else None
         write_scene(
@@ -82,16 +81,16 @@ def plan_of(options: argparse.Namespace) -> Plan:
     return replace(plan, cells=(replace(first, entry=replace(first.entry, trained=None)),))
 
 
-def words_of_scene(options: argparse.Namespace) -> list[str]:
-    """Return the options of a scene that were given, as words of another command; the preset always."""
-    parser, words = make_export_parser(), ["--preset", options.preset]
+def scene_arguments(options: argparse.Namespace) -> list[str]:
+    """Return the options of a scene that were given, as arguments of another command; the preset always."""
+    parser, arguments = make_export_parser(), ["--preset", options.preset]
     for name, value in vars(options).items():
         if name in ("scene", "out", "reference", "preset") or value == parser.get_default(name):
             continue
         values = value if isinstance(value, list) else [value]
         for each in values:
-            words += [f"--{name.replace('_', '-')}", *([] if each is True else [str(each)])]
-    return words
+            arguments += [f"--{name.replace('_', '-')}", *([] if each is True else [str(each)])]
+    return arguments
 
 
 if __name__ == "__main__":

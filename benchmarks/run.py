@@ -1,7 +1,7 @@
 """python -m benchmarks.run: the main job, from a body and motions to a report.
 
-This file is the command alone: words in, a checked plan, stages run in order, an exit status. Nothing
-heavy is imported before the plan stands, so that --help and --list answer at once.
+This file is the command alone: a request, its plan, stages in order, an exit status. Nothing heavy is
+imported before the plan is made, so that --help and --list answer at once.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from benchmarks.tasks.task import RunStopped
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    command_line = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     try:
-        options = make_parser().parse_args(words)
+        options = make_parser().parse_args(command_line)
         if options.list:
             from benchmarks.plan.list_names import list_names
 
             print(list_names())
             return 0
-        plan = make_plan(request_of_run(options, words))
+        plan = make_plan(request_of_run(options, command_line))
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2

@@ -70,11 +70,11 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    command_line = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     try:
-        command = shlex.join(["python", "-m", PROGRAM, *words])
-        plan = plan_roll_out(make_parser().parse_args(words), command)
+        command = shlex.join(["python", "-m", PROGRAM, *command_line])
+        plan = plan_roll_out(make_parser().parse_args(command_line), command)
     except (ValueError, OSError) as error:  # as in benchmarks.run
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2

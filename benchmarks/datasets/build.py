@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 LONGEST = 1_000_000  # frames of a sequence
 
 
-def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
+def build(options: argparse.Namespace, command_line: Sequence[str]) -> DataSet:
     """Simulate what the folder lacks. Raises ValueError, one line, before anything is written."""
-    plan, entry = plan_sequences(options, words)
+    plan, entry = plan_sequences(options, command_line)
     _existing(plan.folder)  # a folder of other things is refused before any work
     garment = plan.motions.first_garment
     motions = plan.inputs.motions.values()
@@ -72,7 +72,7 @@ def build(options: argparse.Namespace, words: Sequence[str]) -> DataSet:
     return data
 
 
-def plan_sequences(options: argparse.Namespace, words: Sequence[str]) -> tuple[Plan, Any]:
+def plan_sequences(options: argparse.Namespace, command_line: Sequence[str]) -> tuple[Plan, Any]:
     """Return the plan of these motions, and the method that simulates them. Raises ValueError, one line."""
     for name, least in (
         ("sequences", 1),
@@ -114,7 +114,7 @@ def plan_sequences(options: argparse.Namespace, words: Sequence[str]) -> tuple[P
         inputs=replace(inputs, motions=motions), only=choose_states(split(options.only), fresh=False),
         scheduler=options.scheduler or "",
         workers=options.workers or min(WORKERS, provenance.usable_cores()),
-        command=shlex.join(["python", "-m", "benchmarks.dataset", *rest.parse_known_args(words)[1]]),
+        command=shlex.join(["python", "-m", "benchmarks.dataset", *rest.parse_known_args(command_line)[1]]),
     )  # fmt: skip
     return plan, methods[options.method]
 

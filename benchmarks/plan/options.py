@@ -79,7 +79,7 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="NAME,...",
         help=f"only these; patterns allowed{file}",
     )
-    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; the same words")
+    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; named likewise")
     add("--metrics", action="append", default=[], metavar="FILE,...",
         help="files of metrics of your own, measured besides all others")  # fmt: skip
     add("--rollout", action="append", default=[], metavar="NAME=FILE", help=ROLL_OUT_HELP)
@@ -126,18 +126,18 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
     add_garment_options(parser)
 
 
-def request_of_run(options: argparse.Namespace, words: Sequence[str]) -> Request:
+def request_of_run(options: argparse.Namespace, command_line: Sequence[str]) -> Request:
     """Return the request of benchmarks.run.
 
     Args:
         options: of `make_parser`.
-        words: the command line that they were parsed from.
+        command_line: the command line that they were parsed from.
 
     Raises:
         ValueError: one line for an option that means nothing.
     """
     return Request(
-        command=shlex.join(["python", "-m", PROGRAM, *words]),
+        command=shlex.join(["python", "-m", PROGRAM, *command_line]),
         suites=split(options.suite),
         scenes=split(options.scenes),
         methods=split(options.methods),
@@ -174,7 +174,7 @@ def scene_fields(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def split(values: Sequence[str]) -> tuple[str, ...]:
-    """Return repeated and comma-separated words one by one.
+    """Return repeated and comma-separated values one by one.
 
     >>> split(["snug,pbns", "skinning"])
     ('snug', 'pbns', 'skinning')

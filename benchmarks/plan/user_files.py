@@ -50,19 +50,19 @@ METRICS = Kind("metrics", "METRICS", "measure")
 KINDS = (METHODS, SCENES, METRICS)
 
 
-def resolve(kind: Kind, words: Sequence[str]) -> tuple[list[str], list[Any]]:
-    """Return the names that the words of an option mean, and the entries that files among them declare.
+def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[list[str], list[Any]]:
+    """Return the names that an option means, and the entries that files among them declare.
 
     Args:
         kind: what is declared.
-        words: names, and paths that end with ".py"; a path stands for the names that its file declares.
+        names_and_paths: names, and paths that end with ".py"; a path stands for the names that its file declares.
 
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
     """
     names: list[str] = []
     entries: dict[str, list[Any]] = {}
-    for word in words:
+    for word in names_and_paths:
         if not word.endswith(".py"):
             names.append(word)
             continue
