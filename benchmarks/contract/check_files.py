@@ -12,7 +12,9 @@ from benchmarks.cell import Cell
 from benchmarks.contract.check_method import CheckMethod
 from benchmarks.contract.check_metric import CheckMetrics
 from benchmarks.contract.check_scene import CheckScene
+from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
+from benchmarks.metric import Metric
 from benchmarks.plan import user_files
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.presets import find_preset
@@ -22,21 +24,38 @@ from benchmarks.runner.cache import Cache
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import NoLog, Runner
 from benchmarks.runner.schedule import Schedule
+from benchmarks.scene import Scene
 from benchmarks.scenes import SCENES, find_scene, of_garment
 from benchmarks.tasks.task import Task
 
 SECONDS = 120.0
 BARE = ("hanging_sheet", "sheet_on_sphere", "flag")  # pins at rest, an obstacle, pins that move
 GARMENT, TRAIN, TEST = "tshirt", "arm_raise", "kick"
-SIZES: dict[str, Any] = {
-    "garment_vertices": 300, "frames": 8, "clip_frames": 8, "warm_up_frames": 2, "settle_frames": 4,
-    "sheet_cells": 4, "sheet_frames": 6, "cell_seconds": SECONDS,
-}  # fmt: skip
+SIZES = dataclasses.replace(
+    find_preset("smoke"),
+    garment_vertices=300,
+    frames=8,
+    clip_frames=8,
+    warm_up_frames=2,
+    settle_frames=4,
+    sheet_cells=4,
+    sheet_frames=6,
+    cell_seconds=SECONDS,
+)
 
 
-def read_files(paths: Sequence[str]) -> dict[str, list[Any]]:
-    """Return word of a kind -> what these files declare. Raises DeclarationError."""
-    declared: dict[str, list[Any]] = {kind.word: [] for kind in user_files.KINDS}
+@dataclasses.dataclass
+class Declarations:
+    """Entries that a user's files declare."""
+
+    methods: list[MethodEntry] = dataclasses.field(default_factory=list)
+    scenes: list[Scene] = dataclasses.field(default_factory=list)
+    metrics: list[Metric] = dataclasses.field(default_factory=list)
+
+
+def read_files(paths: Sequence[str]) -> Declarations:
+    """Return what these files declare. Raises DeclarationError."""
+    declared = Declarations()
     for path in paths:
         if not path.endswith(".py"):
             raise DeclarationError(f"{path}: a file ends with .py")
@@ -47,13 +66,11 @@ def read_files(paths: Sequence[str]) -> dict[str, list[Any]]:
             names = ", ".join(kind.tuple_name for kind in user_files.KINDS)
             raise DeclarationError(f"{path}: declares none of {names}")
         for kind in kinds:
-            declared[kind.word] += user_files.entries_of(kind, file)
+            getattr(declared, kind.word).extend(user_files.entries_of(kind, file))
     return declared
 
 
-def check_files(
-    declared: dict[str, list[Any]], folder: Path, seconds: float = SECONDS
-) -> Iterator[tuple[str, bool]]:
+def check_files(declared: Declarations, folder: Path, seconds: float = SECONDS) -> Iterator[tuple[str, bool]]:
     """Check each entry in each scene.
 
     Args:
@@ -65,7 +82,7 @@ def check_files(
         Lines for people, and whether the entry is fine there.
     """
     plan = plan_of(declared, folder)
-    for entry in declared["methods"]:
+    for entry in declared.methods:
         if not any(cell.entry is entry for cell in plan.cells):
             why = next(filter(None, map(entry.skip, SCENES)), "no scene is meant for it")
             yield f"{entry.name}: wrong\n  is skipped in every scene: {why}", False
@@ -90,28 +107,27 @@ def check_files(
         executor.close()
 
 
-def plan_of(declared: dict[str, list[Any]], folder: Path) -> Plan:
+def plan_of(declared: Declarations, folder: Path) -> Plan:
     """Return the plan of each method in all scenes that fit it, and of each scene with the simulation."""
-    preset = dataclasses.replace(find_preset("smoke"), **SIZES)
     bare = [scene for scene in SCENES if scene.name in BARE]
     worn = of_garment(GARMENT).scene(TEST)
     simulations = [
-        Cell(scene.at(preset), find_method("simulation"), 0, ("speed",)) for scene in declared["scenes"]
+        Cell(scene.at(SIZES), find_method("simulation"), 0, ("speed",)) for scene in declared.scenes
     ]
     cells = [
-        Cell(scene.at(preset), entry, 0, ("speed",))
-        for entry in declared["methods"]
+        Cell(scene.at(SIZES), entry, 0, ("speed",))
+        for entry in declared.methods
         for scene in (*bare, worn)
         if entry.meant_for(scene) and entry.skip(scene) is None
     ]
     return Plan(
-        preset=preset, suites=("speed",), cells=(*simulations, *cells), cases=(), seeds=(0,), device="cpu",
+        preset=SIZES, suites=("speed",), cells=(*simulations, *cells), cases=(), seeds=(0,), device="cpu",
         folder=folder, command="", motions=Motions((TRAIN,), (TEST,)),
     )  # fmt: skip
 
 
 def _tasks(
-    declared: dict[str, list[Any]], plan: Plan, schedule: Schedule, seconds: float
+    declared: Declarations, plan: Plan, schedule: Schedule, seconds: float
 ) -> Iterator[tuple[str, Task]]:
     """Yield the name of each entry, and the task that checks it in a scene."""
     fields: dict[str, Any] = {"inputs": {}, "modules": (), "deadline": seconds}
@@ -128,7 +144,7 @@ def _tasks(
             name = cell.scene.name
             yield name, CheckScene(name=name, label="", process=name, scene=cell.scene, **fields)
     sheet = find_scene(BARE[0]).at(plan.preset)
-    for home in dict.fromkeys(metric.declared_in for metric in declared["metrics"]):
+    for home in dict.fromkeys(metric.declared_in for metric in declared.metrics):
         yield home, CheckMetrics(name=home, label=sheet.name, process=home, scene=sheet, home=home, **fields)
 
 

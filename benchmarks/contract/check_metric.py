@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING
 
 from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Findings
@@ -15,6 +15,9 @@ from benchmarks.registry import load
 from benchmarks.results.row import STATUSES
 from benchmarks.scene import Scene
 from benchmarks.tasks.task import Context, Outcome, Task
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
 
 SHIFT = 1e-3  # [m] by which the second roll-out is off
 
@@ -63,7 +66,7 @@ class CheckMetrics(Task):
         if silent:
             findings.notes.append(f"{self.scene.name} gives no {', '.join(silent)}")
 
-    def _measure(self, findings: Findings, module: ModuleType, roll_out: Any) -> set[str]:
+    def _measure(self, findings: Findings, module: ModuleType, roll_out: RollOut) -> set[str]:
         """Measure a roll-out twice, and return the names of its values."""
         import numpy as np
 

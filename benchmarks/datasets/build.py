@@ -5,14 +5,15 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.assets.inputs import FEWEST_FRAMES, read_inputs
+from benchmarks.cell import TaskId
+from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.plan.make_plan import WORKERS, check_garment_name, choose_states, scenes_of_file
 from benchmarks.plan.options import split
@@ -29,12 +30,10 @@ from benchmarks.scenes import of_garment
 from benchmarks.tasks.sequence import SimulateSequence
 from benchmarks.tasks.task import Outcome
 from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
+from snug.motion.motion import Motion
 from snug.motion.options import parse_motion_options
 from snug.recipes.recipe import DEFAULT
 from snug.training.simulated_data import INDEX, DataSet, SimulatedSequence, settings_of
-
-if TYPE_CHECKING:
-    from snug.motion.motion import Motion
 
 LONGEST = 1_000_000  # frames of a sequence
 
@@ -72,7 +71,7 @@ def build(options: argparse.Namespace, command_line: Sequence[str]) -> DataSet:
     return data
 
 
-def plan_sequences(options: argparse.Namespace, command_line: Sequence[str]) -> tuple[Plan, Any]:
+def plan_sequences(options: argparse.Namespace, command_line: Sequence[str]) -> tuple[Plan, MethodEntry]:
     """Return the plan of these motions, and the method that simulates them. Raises ValueError, one line."""
     for name, least in (
         ("sequences", 1),
@@ -125,7 +124,7 @@ def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str,
     from snug.motion.files import load_motions
     from snug.training.augmentation.mixed_clips import CLIP_FRAMES, SHARED_SEED, make_mixed_clips
 
-    reading, given = parse_motion_options(options), list[Any]()
+    reading, given = parse_motion_options(options), list[Motion]()
     for path in options.motions or ["library"]:
         names = library.DYNAMIC_TRAIN if dynamic else library.TRAIN
         given += embedded_motions(names) if path == "library" else load_motions(path, options=reading)
@@ -146,7 +145,7 @@ def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str,
     return {motion.name: motion for motion in cut}
 
 
-def sequence_tasks(plan: Plan, entry: Any) -> list[SimulateSequence]:
+def sequence_tasks(plan: Plan, entry: MethodEntry) -> list[SimulateSequence]:
     """Return one task for each motion; the machine is no input of it."""
     schedule, garment, tasks = Schedule(plan), plan.motions.first_garment, []
     for name, motion in plan.inputs.motions.items():
@@ -170,7 +169,7 @@ def _existing(folder: Path) -> DataSet | None:
     return None
 
 
-def _rate(motions: Any) -> float:
+def _rate(motions: Iterable[Motion]) -> float:
     rates = sorted({float(motion.fps) for motion in motions})
     if len(rates) != 1:
         raise PlanError(f"the motions have {rates} frames per second; give those of one rate")
@@ -178,7 +177,7 @@ def _rate(motions: Any) -> float:
 
 
 def _lines(
-    tasks: Sequence[SimulateSequence], outcomes: Any, kept: Sequence[SimulatedSequence]
+    tasks: Sequence[SimulateSequence], outcomes: Mapping[TaskId, Outcome], kept: Sequence[SimulatedSequence]
 ) -> tuple[SimulatedSequence, ...]:
     """Return the index: existing lines, and the outcome of each task, in the order of the first request."""
     lines = {line.name: line for line in kept}

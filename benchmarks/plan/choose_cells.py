@@ -119,8 +119,8 @@ def choose_cells(
     scenes = {cell.scene.name: cell.scene for cell in cells}
     settled = (*SCENES, *further_scenes(selection.motions.first_garment))  # those that any run may start from
     known = {scene.name: scene for scene in settled} | scenes
-    for scene in (scene for scene in scenes.values() if scene.declared_in):
-        _check_user_scene(scene, known, selection.motions)
+    for user_scene in (scene for scene in scenes.values() if scene.declared_in):
+        _check_user_scene(user_scene, known, selection.motions)
     return tuple(cells), cases, microbenchmarks
 
 

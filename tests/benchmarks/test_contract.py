@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import check
 from benchmarks.cell import Cell
-from benchmarks.contract.check_files import check_files
+from benchmarks.contract.check_files import Declarations, check_files
 from benchmarks.contract.check_method import CheckMethod
 from benchmarks.contract.check_scene import check_derivatives
 from benchmarks.contract.findings import Findings
@@ -187,7 +187,7 @@ def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monke
         needs_no_obstacle=True,
     )  # fmt: skip
     monkeypatch.setattr(check, "BARE", ("free_fall",))
-    found = list(check_files({"methods": [entry], "scenes": [], "metrics": []}, tmp_path, 4.0))
+    found = list(check_files(Declarations([entry]), tmp_path, 4.0))
     assert [fine for _, fine in found] == [False] and words in found[0][0]
 
 
@@ -195,7 +195,7 @@ def test_the_check_says_what_is_skipped_everywhere(tmp_path):
     entry = MethodEntry(
         name="m", description="", module="tests.benchmarks.runner.misbehaving", package="nowhere"
     )
-    ((line, fine),) = check_files({"methods": [entry], "scenes": [], "metrics": []}, tmp_path)
+    ((line, fine),) = check_files(Declarations([entry]), tmp_path)
     assert not fine and "is skipped in every scene: m needs the package nowhere" in line
 
 
