@@ -1,1 +1,1 @@
-"""The kinds of task that a run consists of. See task.py for what they have in common."""
+"""The kinds of task that a run consists of; task.py has what they share."""

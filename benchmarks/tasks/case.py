@@ -25,16 +25,19 @@ class RunCase(Task):
     case: Case
 
     def warm_up(self) -> None:
+        """Compile what the case needs."""
         self.case.warm_up()
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Run the case; its row is the result."""
         row = self.case.run()
         context.tell(self.units)
         return Outcome(row.status, row.reason, failed=row.status != "ok", result=dataclasses.asdict(row))
 
     def rows(self, outcome: Outcome) -> list[Row]:
-        """A case that died, or that hung, has a row too. A hang and a crash are failures of the solver: only
-        one that ends by itself may call it a timeout.
+        """Return the row of the case, also of one that died or hung.
+
+        A hang and a crash are failures of the solver: only one that ends by itself may call it a timeout.
         """
         if outcome.result:
             return [Row(**outcome.result)]

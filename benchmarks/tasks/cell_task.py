@@ -26,8 +26,14 @@ if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
     from reference_sim import Trajectory
 
-# What a trajectory says of itself, in the words of a result row. A solver stopped on purpose is ok.
-WORDS = {"converged": "ok", "ok": "ok", "stalled": "stalled", "diverged": "diverged", "timeout": "timeout"}
+# Status of a trajectory -> status of a result row. A solver stopped on purpose is ok.
+STATUS_OF = {
+    "converged": "ok",
+    "ok": "ok",
+    "stalled": "stalled",
+    "diverged": "diverged",
+    "timeout": "timeout",
+}
 OURS = ("reference_sim", "snug", "benchmarks")
 HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
 BATCH = 16  # bodies at once, where a method can
@@ -35,9 +41,31 @@ INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milli
 UNBELIEVABLE = "its time cannot be believed: "
 
 
+@dataclass
+class CellProcess:
+    """State that the tasks of one cell share in their process.
+
+    A method is kept between tasks because preparing it takes far longer than many of its runs.
+
+    Attributes:
+        scene: as built.
+        prepared: a method that `begin` has prepared, until a run takes it.
+        finished: the method of the cell's run, which BatchCell goes on with.
+    """
+
+    scene: BuiltScene | None = None
+    prepared: Method | None = None
+    finished: Method | None = None
+
+    @classmethod
+    def of(cls, context: Context) -> CellProcess:
+        """Return the state of this process."""
+        return context.memo.setdefault(cls, cls())
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CellTask(Task):
-    """What the run of a cell, its repeats and its batch have in common: a process with scene and method.
+    """Base of the run of a cell, its repeats and its batch: they share scene and method in one process.
 
     least: [s] to be measured.
     """
@@ -48,32 +76,36 @@ class CellTask(Task):
     least: float = 0.0
 
     def assets(self, assets: Assets | None) -> Assets | None:
+        """Return the assets of the cell's motion."""
         return assets.only(self.cell.scene.motion) if assets is not None and self.cell.scene.dressed else None
 
     def scene(self, context: Context) -> BuiltScene:
-        """The built scene of this process."""
-        if "scene" not in context.memo:
-            context.memo["scene"] = built(self.cell.scene, context)
-        return context.memo["scene"]
+        """Return the scene, built once in a process."""
+        process = CellProcess.of(context)
+        if process.scene is None:
+            process.scene = build_scene(self.cell.scene, context)
+        return process.scene
 
     def begin(self, context: Context) -> None:
-        """The scene, and the method prepared: one of the project's own, which is still until it is run. What
-        others leave at work would count against whoever is timed meanwhile.
+        """Prepare a method of the project, which is still until it is run.
+
+        What a user's method leaves at work would count against whoever is timed meanwhile.
         """
         if not self.cell.entry.declared_in:
-            context.memo["ready"] = self.ready(context)
+            CellProcess.of(context).prepared = self.prepared_method(context)
 
-    def ready(self, context: Context) -> Method:
-        """A fresh method, prepared."""
-        if "ready" in context.memo:
-            return context.memo.pop("ready")
-        cell = self.cell
+    def prepared_method(self, context: Context) -> Method:
+        """Return a method that is prepared and has not run."""
+        cell, process = self.cell, CellProcess.of(context)
+        if (method := process.prepared) is not None:
+            process.prepared = None
+            return method
         method = cell.entry.make(models=context.folder.models_of(cell.scene.garment), seed=cell.seed)
         method.prepare(self.scene(context))
         return method
 
     def timed(self, method: Method, least: float) -> tuple[Trajectory, Reading, list[np.ndarray]]:
-        """What run() gives, by the clock; and the times (T,) [s] that each run says its frames have taken."""
+        """Return the trajectory, the time of each run, and the times (T,) [s] it states for its frames."""
         frames = []
 
         def run() -> Trajectory:
@@ -85,7 +117,7 @@ class CellTask(Task):
         return made, reading, frames[-len(reading.runs) :]  # a first run that compiled is not among them
 
     def times(self, reading: Reading, frames: list[np.ndarray]) -> dict[str, float]:
-        """Result of these runs [s]: of the median one, and of its middle, late and slowest frame."""
+        """Return times [s] of the median run, and of its median, 95 % and slowest frame."""
         import numpy as np
 
         result = {"seconds": reading.seconds, "runs": len(reading.runs)}
@@ -104,15 +136,17 @@ class RunCell(CellTask):
     kind = "cell"
 
     def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
+        """Return why the method cannot do the scene, or empty."""
         return self.cell.entry.skip(self.cell.scene) or ""
 
     def clear(self, folder: RunFolder) -> None:
+        """Remove the files of an earlier run of the cell."""
         self.cell.trajectory(folder).unlink(missing_ok=True)
         self.cell.curves(folder).unlink(missing_ok=True)
         self.cell.quasi_static(folder).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Prepare off the clock, run on it, write. Memory is that until the run has ended."""
+        """Prepare off the clock, run on it, write the trajectory; memory is that until the run has ended."""
         try:
             outcome = self._run(context)
         except Exception as error:
@@ -123,7 +157,7 @@ class RunCell(CellTask):
 
     def _run(self, context: Context) -> Outcome:
         cell, folder = self.cell, context.folder
-        scene, method = self.scene(context), self.ready(context)
+        scene, method = self.scene(context), self.prepared_method(context)
         if cell.timed:
             trajectory, reading, frames = self.timed(method, 0.0)
         else:
@@ -157,13 +191,13 @@ class RunCell(CellTask):
                 raise ValueError(f"quasi_static() {wrong}")
             paths.append(cell.quasi_static(folder))
             quasi_static.save(paths[1])
-        context.memo["method"] = method
+        CellProcess.of(context).finished = method
         return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunUntimedCell(RunCell):
-    """The same beside others, where nobody asks for the time."""
+    """The trajectory of a cell whose time nobody asks for: it runs beside others."""
 
     stage = "cells that are not timed"
 
@@ -175,7 +209,8 @@ class BatchCell(CellTask):
     kind = "batch"
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        method = context.memo.get("method") or self.ready(context)
+        """Time the batch."""
+        method = CellProcess.of(context).finished or self.prepared_method(context)
         positions, reading = clocked(method.batch(BATCH), of=lambda made: made, least=self.least)
         seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
         result = {"seconds": seconds, "complaint": reading.complaint}
@@ -186,25 +221,27 @@ class BatchCell(CellTask):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RepeatCell(CellTask):
-    """The same once more, for its time alone. longest: [s] of a first run that is repeated."""
+    """One more run of a cell, for its time alone. longest: [s] of a first run that is repeated."""
 
     kind = "repeat"
     longest: float
 
     def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
+        """Return why the cell is not run again, or empty."""
         first = next(iter(needed.values()), Outcome())
         too_long = first.result.get("seconds", 0.0) > self.longest
         return "the first run took too long" if too_long else first.remark
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        _, reading, frames = self.timed(self.ready(context), self.least)
+        """Time another run."""
+        _, reading, frames = self.timed(self.prepared_method(context), self.least)
         if reading.complaint:
             return Outcome("failed", reading.complaint, result={"seconds": reading.seconds})
         return Outcome(result=self.times(reading, frames))
 
 
-def built(scene: Scene, context: Context) -> BuiltScene:
-    """The scene, a dressed one with the start and the posed body that the run's folder has ready."""
+def build_scene(scene: Scene, context: Context) -> BuiltScene:
+    """Return the built scene, a dressed one with the start and the posed body of the run's folder."""
     run, assets = context.folder, context.assets
     if assets is None or not run.body_path(scene.name).is_file():
         return scene.build(assets)
@@ -251,9 +288,9 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
         return ended, reason or f"ended after {trajectory.frames} of {scene.frames} frames"
     if trajectory.status == "max_iterations":
         return ("ok", "") if truncated else ("stalled", reason)
-    if trajectory.status not in WORDS:
-        return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(WORDS)}; {reason}"
-    status = WORDS[trajectory.status]
+    if trajectory.status not in STATUS_OF:
+        return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(STATUS_OF)}; {reason}"
+    status = STATUS_OF[trajectory.status]
     if status != "ok" and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
@@ -264,10 +301,10 @@ def misshapen(positions: Any, scene: BuiltScene) -> str:
     """Why these are no positions (T,V,3) of the scene, or empty. There may be fewer frames, and no more."""
     import numpy as np
 
-    x, due = np.asarray(positions), (scene.frames, scene.cloth.vertex_count, 3)
-    if x.dtype.kind == "f" and x.shape[1:] == due[1:] and len(x) <= due[0]:
+    x, shape = np.asarray(positions), (scene.frames, scene.cloth.vertex_count, 3)
+    if x.dtype.kind == "f" and x.shape[1:] == shape[1:] and len(x) <= shape[0]:
         return ""
-    return f"gives positions {x.dtype} {x.shape}: floats {due} are due, the start included"
+    return f"gives positions {x.dtype} {x.shape}: floats {shape} are due, the start included"
 
 
 def loaded() -> list[str]:

@@ -1,4 +1,4 @@
-"""What is simulated beside the cells: settled garments, motions to learn from, and quasi-static answers."""
+"""Simulations beside the cells: settled garments, motions to learn from, and quasi-static solutions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from benchmarks.cell import TaskId, flat
 from benchmarks.method import MethodEntry
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.tasks.cell_task import built
+from benchmarks.tasks.cell_task import build_scene
 from benchmarks.tasks.task import Context, Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
@@ -43,10 +43,12 @@ class SettleStart(Task):
         return cls.kind, flat(scene.name)
 
     def clear(self, folder: RunFolder) -> None:
+        """Remove the files of an earlier run of it."""
         for path in self._paths(folder):
             path.unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Write the settled start, the posed body and the areas at rest."""
         from reference_sim.files.array_file import read_array, write_array
 
         scene, run, shared = self.scene.build(context.assets), context.folder, self.scene.start_of
@@ -99,6 +101,7 @@ class SimulateMotion(Task):
     entry: MethodEntry
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Simulate the motion and write its trajectory."""
         scene = self.scene.build(context.assets)
         trajectory = simulated(scene, self.entry, context.folder)
         path = context.folder.trajectory_path(scene.name, self.entry.name)
@@ -118,12 +121,18 @@ class SimulateMotion(Task):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulateClips(Task):
-    """Some of the mixed clips of a garment's training motions, each settled and simulated like a motion.
+    """Simulations of some of a garment's augmented clips, each settled and simulated like a motion.
 
-    scene: that of any motion in the garment; entry: the method that simulates; motions: those that are mixed.
-    clips: a name of all of them; part: number of these: those that `part` + 1 mixed frames for each given one
-    have, and `part` have not; swinging: see benchmarks.training.Simulated. Only clips that are whole and converged
-    are kept, and taught.
+    Only clips that are whole and converged are kept.
+
+    Attributes:
+        scene: that of any motion in the garment.
+        entry: method that simulates.
+        motions: the training motions that the clips are mixed from.
+        clips: name of all of them.
+        part: number of these: those that `part` + 1 augmented frames for each original one have, and `part`
+            have not.
+        swinging: see benchmarks.training.Simulated.
     """
 
     kind = "clips"
@@ -138,6 +147,7 @@ class SimulateClips(Task):
     swinging: bool = False
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Simulate the clips and write the vertices of those that are whole and converged."""
         import numpy as np
 
         from snug.training.augmentation.mixed_clips import make_shared_clips
@@ -151,14 +161,14 @@ class SimulateClips(Task):
             make_shared_clips(assets.named(self.motions), share, vertices=vertices, swinging=self.swinging)
             for share in (self.part, self.part + 1)
         )
-        own = clips[len(before) :]
-        for clip in own:
+        new = clips[len(before) :]
+        for clip in new:
             positions, reason = self._simulated(clip, context)
             if reason:
                 left_out[clip.name] = reason
             else:
                 kept[clip.name] = positions.astype(np.float32)  # as networks see it
-            context.tell(self.units / len(own))
+            context.tell(self.units / len(new))
         path = run.clips_path(self.clips, self.entry.name, self.part)
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:
@@ -167,13 +177,13 @@ class SimulateClips(Task):
         return Outcome(result=result, files=(run.relative(path),))
 
     def _simulated(self, clip: Motion, context: Context) -> tuple[np.ndarray, str]:
-        """Positions of a clip, and why they are not to be taught, or empty."""
+        """Return positions (T,V,3) [m] of a clip, and why no network learns from them, or empty."""
         import numpy as np
 
         assets, garment = context.assets, self.scene.garment
         assert assets is not None
-        own = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
-        scene = replace(self.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(own)
+        alone = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
+        scene = replace(self.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(alone)
         try:
             trajectory = simulated(scene, self.entry, context.folder)
         except RuntimeError as error:  # a pose that leaves the cloth no room
@@ -184,7 +194,7 @@ class SimulateClips(Task):
 
 
 def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:
-    """The scene by that method, which needs no network."""
+    """Return the trajectory of a scene by a method that needs no network."""
     method = entry.make(models=folder.models, seed=0)
     method.prepare(replace(scene, dressed=None))  # so that it shows no bar beside that of all tasks
     return method.run()
@@ -192,7 +202,7 @@ def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Traje
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulateQuasiStatic(Task):
-    """The simulator's answer to each frame of a scene held still: what dynamics are measured against."""
+    """Quasi-static solution of each frame of a scene: dynamics are measured against it."""
 
     kind = "quasi-static"
     silent = True
@@ -206,11 +216,12 @@ class SimulateQuasiStatic(Task):
         return cls.kind, flat(scene.name)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Simulate each frame held still and write the trajectory."""
         import numpy as np
 
         from reference_sim import simulate
 
-        scene = built(self.scene, context)
+        scene = build_scene(self.scene, context)
         path = context.folder.quasi_static_path(scene.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory = simulate(

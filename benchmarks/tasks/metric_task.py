@@ -18,7 +18,7 @@ from benchmarks.registry import load
 from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.tasks.cell_task import built
+from benchmarks.tasks.cell_task import build_scene
 from benchmarks.tasks.task import Context, Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasureCell(Task):
-    """What is measured of a cell's trajectory, beside those of the reference and its variants.
+    """Metrics of a cell's trajectory, compared with those of the reference and its variants.
 
     cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
     quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
@@ -48,16 +48,17 @@ class MeasureCell(Task):
     outside: tuple[str, ...] = ()
 
     def clear(self, folder: RunFolder) -> None:
+        """Remove the curves of an earlier measurement."""
         self.cell.curves(folder).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """The energies of each frame, and other curves, are written beside the trajectory."""
+        """Measure the trajectory, and write energies of each frame and other curves beside it."""
         if "roll-outs" not in context.memo:
             context.memo["roll-outs"] = self._roll_outs(context, needed)
         roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
         if self.counterpart is not None:
-            there = needed.get(self.counterpart.task_id)
-            if there is not None and there.status in USABLE:
+            outcome = needed.get(self.counterpart.task_id)
+            if outcome is not None and outcome.status in USABLE:
                 roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
         if self.training is not None:
             roll_out.training_poses = _training_poses(self.training, context)
@@ -75,28 +76,33 @@ class MeasureCell(Task):
         from reference_sim import Trajectory
 
         folder = context.folder
-        group = SceneRollOuts(built(self.cell.scene, context), gap_samples=self.gap_samples)
+        group = SceneRollOuts(build_scene(self.cell.scene, context), gap_samples=self.gap_samples)
         if self.quasi_static in needed:
             group.quasi_static = _positions(folder.quasi_static_path(self.cell.scene.name))
-        found = {}
+        roll_outs = {}
         for cell in self.cells:
             outcome = needed.get(cell.task_id)
             if outcome is not None and outcome.files:
-                found[cell] = RollOut(
+                roll_outs[cell] = RollOut(
                     group, cell.entry, Trajectory.load(cell.trajectory(folder)), status=outcome.status,
                     suites=cell.suites,
                     quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
                 )  # fmt: skip
-                group.roll_outs.append(found[cell])
-        return found
+                group.roll_outs.append(roll_outs[cell])
+        return roll_outs
 
 
 def measured(
     roll_out: RollOut, chosen: Sequence[str] | None = None, outside: tuple[str, ...] = ()
 ) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
-    """Metrics and curves of a roll-out by all modules that apply, or by those chosen, and by those outside;
-    and status and reason where one of them says that it has failed. Empty where no frame is left after the
-    warm-up.
+    """Return metrics and curves of a roll-out, and status and reason where a metric says that it has failed.
+
+    All are empty where no frame is left after the warm-up.
+
+    Args:
+        roll_out: the roll-out, beside those that it is compared with.
+        chosen: names of the modules of metrics; None: all that apply.
+        outside: further modules, which are not the project's.
     """
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}
@@ -123,7 +129,7 @@ def measured(
 
 
 def number(metric: str, value: Any) -> float | Estimate:
-    """The value as one, which JSON can keep. Raises TypeError."""
+    """Return the value as a number that JSON can keep. Raises TypeError."""
     if isinstance(value, Estimate):
         return Estimate(float(value.value), float(value.uncertainty), value.moved)
     if not isinstance(value, numbers.Real):
@@ -134,21 +140,21 @@ def number(metric: str, value: Any) -> float | Estimate:
 def compared(
     roll_out: RollOut, compare: Callable[[RollOut, RollOut], dict[str, float]]
 ) -> dict[str, float | Estimate]:
-    """The numbers against the reference, and what each simulation as right as it would change of them."""
+    """Return the numbers against the reference, with their change against each member of its ensemble."""
     if roll_out.reference is None:
         return {}
     values = compare(roll_out, roll_out.reference)
     twins = [other for other in roll_out.group.as_right if other is not roll_out]
     others = {other.entry.name: compare(roll_out, other) for other in twins}
-    found: dict[str, float | Estimate] = {}
+    estimates: dict[str, float | Estimate] = {}
     for name, value in values.items():
         moved = tuple((twin, beside[name] - value) for twin, beside in others.items() if name in beside)
-        found[name] = Estimate(value, max(abs(change) for _, change in moved), moved) if moved else value
-    return found
+        estimates[name] = Estimate(value, max(abs(change) for _, change in moved), moved) if moved else value
+    return estimates
 
 
 def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
-    """An .npz of curves (T,...), nan after the last frame that was measured."""
+    """Write an .npz of curves (T,...), nan after the last frame that was measured."""
     padded: dict[str, Any] = {
         name: np.pad(curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan)
         for name, curve in curves.items()
@@ -170,8 +176,8 @@ def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | No
         vertices = len(assets.garments[training.garment].rest_positions)
         drawn = find_kind(how.kind).physics
         mixed = augment(given, how.recipe, vertices=vertices, seed=training.seed) if drawn else []
-        if said := how.simulated:
-            mixed += make_shared_clips(given, said.mixed, vertices=vertices, swinging=said.swinging)
+        if simulated := how.simulated:
+            mixed += make_shared_clips(given, simulated.mixed, vertices=vertices, swinging=simulated.swinging)
         context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
     return context.memo[training.id]
 

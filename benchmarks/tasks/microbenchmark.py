@@ -31,11 +31,12 @@ class RunMicrobenchmark(Task):
     settings: Settings
 
     def clear(self, folder: RunFolder) -> None:
+        """Remove the files of an earlier measurement."""
         for name in self.benchmark.files:
             (folder.path / name).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Measure. A failure has the memory of its process too."""
+        """Measure; a failure has the memory of its process too."""
         from benchmarks.metrics.cost.microbenchmarks import PROCESS_MEMORY
 
         files = self.benchmark.files
@@ -49,7 +50,7 @@ class RunMicrobenchmark(Task):
         return dataclasses.replace(outcome, result={**outcome.result, PROCESS_MEMORY: peak_memory()})
 
     def rows(self, outcome: Outcome) -> list[Row]:
-        """One for each number; where the process died, one that says so."""
+        """Return a row for each number; where the process died, one that says so."""
         from benchmarks.metrics.cost.microbenchmarks import PROCESS_MEMORY
 
         benchmark, entry = self.benchmark, self.entry

@@ -18,6 +18,7 @@ class SimulateSequence(SimulateMotion):
     stage = "sequences"
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Simulate the motion and write what networks learn from beside it."""
         from reference_sim.trajectory.trajectory import Trajectory
         from snug.training.simulated_data import write_motion, write_vertices
 

@@ -1,4 +1,4 @@
-"""A task: what is done once and kept. Its inputs, what it needs, how it runs, and what comes of it.
+"""A task: work that is done once and kept, with its inputs, its needs and its outcome.
 
 Ground truth, trainings, cells and their repeats, metrics, validation and stress cases are all tasks. The
 runner alone asks the cache, runs tasks in their processes, keeps outcomes and goes on after a failure.
@@ -22,12 +22,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a task.
+    """Outcome of a task.
 
-    status and reason: in the words of a result row. failed: whether there is nothing to build upon. result:
-    plain values. files: what it has left, by their names in the run's folder; digests: of these, by name,
-    once it is kept. seconds: wall time. origin: commit, preset and hardware of it, once it is kept.
-    remark: what has changed since, where it is kept all the same.
+    Attributes:
+        status: as in a result row.
+        reason: why, as in a result row.
+        failed: whether there is nothing to build upon.
+        result: plain values.
+        files: names of the files that it has left in the run's folder.
+        digests: name -> digest of these files, once the outcome is kept.
+        seconds: wall time [s].
+        origin: commit, preset and hardware of it, once the outcome is kept.
+        remark: what has changed since, where an outdated outcome is kept all the same.
     """
 
     status: str = "ok"
@@ -42,12 +48,19 @@ class Outcome:
 
 
 def tell_nobody(units: float) -> None:
-    """Where no one follows the progress."""
+    """Report progress to nobody."""
 
 
 @dataclass
 class Context:
-    """What a process knows. memo: kept between tasks of this process. tell: reports units of progress."""
+    """State of a process that does tasks.
+
+    Attributes:
+        folder: files of the run.
+        assets: body, garments and motions; None where no task needs a dressed body.
+        tell: reports units of progress.
+        memo: kept between the tasks of one batch in this process.
+    """
 
     folder: RunFolder
     assets: Assets | None = None
@@ -59,16 +72,23 @@ class Context:
 class Task:
     """One piece of work.
 
-    inputs: plain values that the outcome depends on. modules: those whose source, with all that they import,
-    it depends on. needs: tasks without whose success it cannot be run; reads: those that it uses where they
-    succeeded. Their outcomes count as inputs. units: of progress. batch: tasks of one batch are handed out
-    together. process: a timed task runs alone on the machine, in the process of this name; others run side by
-    side in any. deadline: [s] after which its process is ended.
+    Attributes:
+        name: unique among the tasks of its kind; part of file names.
+        label: for messages.
+        inputs: plain values that the outcome depends on.
+        modules: modules whose source, with all that they import, the outcome depends on.
+        needs: tasks without whose success it cannot be run; their outcomes count as inputs.
+        reads: tasks whose outcomes it uses where they succeeded; they count as inputs too.
+        units: of progress.
+        batch: tasks of one batch are handed out together.
+        process: a timed task runs alone on the machine, in the process of this name; others, without a
+            name, run side by side in any process.
+        deadline: [s] after which its process is ended.
     """
 
     kind: ClassVar[str]
-    stage: ClassVar[str]  # title of what it belongs to
-    unit_seconds: ClassVar[float] = 1.0  # that one of its units takes, roughly: for progress and order
+    stage: ClassVar[str]  # title of the stage of a run that it belongs to
+    unit_seconds: ClassVar[float] = 1.0  # expected duration of one of its units: for progress and order
     silent: ClassVar[bool] = False  # whether no row of the results speaks of it: a failure is then said apart
 
     name: str
@@ -84,40 +104,45 @@ class Task:
 
     @property
     def id(self) -> TaskId:
+        """Kind and name."""
         return self.kind, self.name
 
     @property
     def expected_seconds(self) -> float:
-        """That it takes, roughly."""
+        """Expected duration [s], for the progress bar and the order of tasks."""
         return self.units * self.unit_seconds
 
     @property
     def title(self) -> str:
+        """Kind and label, for messages."""
         return f"{self.kind} {self.label}"
 
     def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
-        """Why there is nothing to do, or empty. Such a task leaves no trace."""
+        """Return why there is nothing to do, or empty. Such a task leaves no trace."""
         return ""
 
     def clear(self, folder: RunFolder) -> None:
-        """Remove what an earlier run of it has left, so that nobody takes it for this one's."""
+        """Remove the files of an earlier run of it, so that nobody takes them for this one's."""
 
     def assets(self, assets: Assets | None) -> Assets | None:
-        """What of the assets its own process needs."""
+        """Return the part of the assets that a process of its own needs."""
         return None
 
     def begin(self, context: Context) -> None:
-        """What a timed task does before its turn, beside others. What it raises, run() has to raise again."""
+        """Prepare a timed task before its turn, beside others. run() has to raise again what this raises."""
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Do it. needed: the outcomes of `needs` and `reads` that are there. What is raised is a failure."""
+        """Do it and return its outcome; an exception is a failure.
+
+        needed: outcomes of those of `needs` and `reads` that succeeded.
+        """
         raise NotImplementedError
 
     def warm_up(self) -> None:
-        """What a process does before its first task of this kind and module, without the deadline."""
+        """Prepare a process for its first task of this kind and module; the deadline does not count."""
 
     def rows(self, outcome: Outcome) -> list[Row]:
-        """The rows of what came of it, skips aside; unit, commit and remark are filled in later."""
+        """Return the rows of an outcome, skips aside; unit, commit and remark are filled in later."""
         return []
 
 
@@ -129,8 +154,9 @@ class RunStopped(RuntimeError):
 
 
 def failure(error: BaseException) -> Outcome:
-    """The outcome of a task that raised, or whose process died. torch's allocator on a CPU raises a plain
-    RuntimeError. Raises RunStopped for what is no fault of the task.
+    """Return the outcome of a task that raised, or whose process died.
+
+    torch's allocator on a CPU raises a plain RuntimeError. Raises RunStopped for what no task is at fault of.
     """
     from reference_sim.files.atomic_files import disk_full
 

@@ -56,12 +56,15 @@ class TrainNetwork(Task):
     key: str = ""
 
     def path(self, folder: RunFolder) -> Path:
+        """Return the path of the trained model."""
         return model_path(folder.models_of(self.garment), self.training, self.seed)
 
     def clear(self, folder: RunFolder) -> None:
+        """Remove the model of an earlier training."""
         self.path(folder).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Train the network and write its model."""
         import torch
 
         from reference_sim.trajectory.trajectory import Trajectory
@@ -94,12 +97,12 @@ class TrainNetwork(Task):
             path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
             resume=True, key=digest([self.key, targets]),
         )  # fmt: skip
-        told = 0
+        reported = 0  # steps
 
         def log(row: dict[str, float]) -> None:
-            nonlocal told
-            context.tell(int(row["step"]) - told)
-            told = int(row["step"])
+            nonlocal reported
+            context.tell(int(row["step"]) - reported)
+            reported = int(row["step"])
 
         if self.chosen is None:
             model = untrained_model("snug", dressed, assets.named(motions), seed=self.seed)
@@ -109,8 +112,8 @@ class TrainNetwork(Task):
                 seed=self.seed, trajectories=targets, recipe=self.chosen.recipe, log=log, progress=False,
                 every=LOG_EVERY, device=self.device, checkpoint=checkpoint, validation=validation,
             )  # fmt: skip
-        if told < self.steps:  # it ended early
-            context.tell(self.steps - told)
+        if reported < self.steps:  # it ended early
+            context.tell(self.steps - reported)
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
         checkpoint.delete()
@@ -131,23 +134,23 @@ class TrainNetwork(Task):
     def _mixed(
         self, assets: Assets, folder: RunFolder, needed: Mapping[TaskId, Outcome]
     ) -> tuple[list[Motion], dict[str, np.ndarray]]:
-        """The mixed clips that were simulated, and their vertices by name."""
+        """Return the augmented clips that were simulated, and their vertices (T,V,3) [m] by name."""
         from reference_sim.files.array_file import read_arrays
         from snug.training.augmentation.mixed_clips import make_shared_clips
 
-        found: dict[str, np.ndarray] = {}
+        vertices_of: dict[str, np.ndarray] = {}
         for id in self.clips:
             if id in needed:
-                found |= read_arrays(folder.path / needed[id].files[0])
-        if twice := sorted(found.keys() & set(self.motions)):
+                vertices_of |= read_arrays(folder.path / needed[id].files[0])
+        if twice := sorted(vertices_of.keys() & set(self.motions)):
             raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
         vertices = len(assets.garments[self.garment].rest_positions)
-        said = self.chosen.simulated if self.chosen else None
+        simulated = self.chosen.simulated if self.chosen else None
         clips = make_shared_clips(
             assets.named(self.motions), len(self.clips), vertices=vertices,
-            swinging=said is not None and said.swinging,
+            swinging=simulated is not None and simulated.swinging,
         )  # fmt: skip
-        return [clip for clip in clips if clip.name in found], found
+        return [clip for clip in clips if clip.name in vertices_of], vertices_of
 
     @staticmethod
     def _is_whole(outcome: Outcome | None) -> bool:

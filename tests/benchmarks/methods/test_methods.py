@@ -24,7 +24,7 @@ from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
-from benchmarks.tasks.cell_task import built
+from benchmarks.tasks.cell_task import build_scene
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
@@ -91,7 +91,7 @@ def rows(run):
 def scenes(run):
     """Name -> built scene."""
     plan, _, executor = run
-    return {scene.name: built(scene, executor.context()) for scene in plan.scenes}
+    return {scene.name: build_scene(scene, executor.context()) for scene in plan.scenes}
 
 
 def outcomes_of(run, name):

@@ -28,6 +28,7 @@ from benchmarks.runner.loop import NoLog, Runner
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import SCENES as DECLARED
+from benchmarks.tasks.cell_task import CellProcess
 from benchmarks.tasks.task import Context, Outcome, failure
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -95,11 +96,12 @@ def test_a_cell_tells_the_bar_that_it_is_done(tmp_path, how):
 def test_only_a_method_of_the_project_is_prepared_before_its_turn(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="still")
     own = dataclasses.replace(plan.cells[0].entry, declared_in="mine.py")
-    for entry, names in ((plan.cells[0].entry, {"scene", "ready"}), (own, set())):
+    for entry, prepared in ((plan.cells[0].entry, True), (own, False)):
         context = Context(RunFolder(tmp_path))
         cell = dataclasses.replace(plan.cells[0], entry=entry)
         dataclasses.replace(Schedule(plan).cell(plan.cells[0]), cell=cell).begin(context)
-        assert set(context.memo) == names
+        process = CellProcess.of(context)
+        assert (process.scene is not None, process.prepared is not None) == (prepared, prepared)
 
 
 def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_path):
