@@ -10,15 +10,9 @@ from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
 from snug.body.bake import merge_weights, to_t_pose
-from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES, BodyError
 from snug.body.smpl_files import read_body
 from tests.snug.body.other_bodies import lowered, other_mesh, plain_arrays, smpl_arrays, with_hands
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:

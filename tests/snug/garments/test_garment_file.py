@@ -22,7 +22,6 @@ from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
-from snug.body.parametric_body import Body
 from snug.garments.fit import pose_in_file
 from snug.garments.garment import GarmentError
 from snug.garments.options import GarmentFile, add_garment_options, demand_garment_file, make_garment_file
@@ -34,11 +33,6 @@ from snug.training.command import train_to_file
 from tests.snug.body.other_bodies import lowered, plain_arrays, read_again
 from tests.snug.garments.garment_files import doubled_along, own_chart, write_obj, z_up
 from tests.snug.training.dressing import tube_dress
-
-
-@pytest.fixture(scope="session")
-def body():
-    return Body.load()
 
 
 @pytest.fixture(scope="session")

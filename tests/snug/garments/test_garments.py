@@ -7,7 +7,6 @@ import igl
 import numpy as np
 import pytest
 
-from snug.body.parametric_body import Body
 from snug.garments.cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
 from snug.garments.garment import GarmentError, smooth_weights
 from snug.garments.openings import name_openings
@@ -16,11 +15,6 @@ from tests.reference_sim.meshes import edge_counts, girth
 from tests.snug.body.other_bodies import BODIES, other_mesh, simulate_walk
 
 WAIST = "spine1"
-
-
-@pytest.fixture(scope="session")
-def body():
-    return Body.load()
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,6 @@ from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.ground_truth import SimulateQuasiStatic
 from reference_sim import Trajectory
-from snug.body.parametric_body import Body
 from snug.garments.garment import GarmentError
 from snug.garments.templates import tailor_skirt, tailor_tshirt
 from snug.motion.library import make_motion
@@ -25,11 +24,6 @@ from tests.benchmarks.runner.tasks_by_hand import context, dressed_scene
 from tests.reference_sim.meshes import edge_counts, girth
 
 TINY = dataclasses.replace(find_preset("smoke"), garment_vertices=300, frames=10, clip_frames=8)
-
-
-@pytest.fixture(scope="module")
-def body():
-    return Body.load()
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Recorded motion put on the body: retargeting, glitches of a bone, and recorded clips where they are."""
+"""Recorded motion put on the body: retargeting, jumps of a bone, and recorded clips where they are."""
 
 import os
 from pathlib import Path

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from snug.body.parametric_body import Body
 from snug.body.skeleton import (
     JOINT,
     JOINT_NAMES,
@@ -336,15 +335,13 @@ def test_place_faces_forward_on_the_floor():
 
 
 class TestSkeleton:
-    def test_is_the_bodys(self):
-        body = Body.load()
+    def test_is_the_bodys(self, body):
         assert body.joint_names == JOINT_NAMES
         assert tuple(body.parents) == PARENTS
         np.testing.assert_allclose(REST_JOINTS, body.joints(), atol=0.01)
 
-    def test_moves_rigid_parts_as_skinning_does(self, library):
+    def test_moves_rigid_parts_as_skinning_does(self, body, library):
         # Oracle: a vertex that hangs on one joint alone must ride on that joint's frame.
-        body = Body.load()
         motion = library["spin_jump"].cut(30, 45)
         vertices = body.vertices(motion.poses, motion.translations)
         positions = joint_positions(motion.poses, motion.translations, body.joints())
@@ -358,9 +355,8 @@ class TestSkeleton:
                 checked += 1
         assert checked >= 15
 
-    def test_rest_soles_are_on_the_floor(self):
+    def test_rest_soles_are_on_the_floor(self, body):
         soles = sole_points(np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
         np.testing.assert_allclose(soles[:, 1], 0.0, atol=1e-12)
-        body = Body.load().template
         for point in soles:  # each sole point lies under the foot
-            assert np.linalg.norm(body - point, axis=1).min() < 0.03
+            assert np.linalg.norm(body.template - point, axis=1).min() < 0.03

@@ -1,4 +1,4 @@
-"""Motions of strangers: one motion in many forms, its vertical axis, its glitches. Damage: test_fuzz.py."""
+"""Motions of strangers: one motion in many forms, its vertical axis, its recording errors. Damage: test_fuzz.py."""
 
 import re
 from dataclasses import replace
