@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from reference_sim.geometry.topology import unique_edges
+
 Index = np.ndarray  # of whole numbers
 
 TRIED = 24  # places of a first triangle; a mesh with as many symmetries as triangles has thousands
@@ -148,7 +150,7 @@ def _third(faces: Index) -> dict[tuple[int, int], int] | None:
 
 def _colours(faces: Index, vertices: int) -> Index:
     """Return colours (V,), equal where the mesh within ROUNDS edges of two vertices is alike."""
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = unique_edges(faces)
     both = np.concatenate([edges, edges[:, ::-1]])
     colour = np.bincount(faces.ravel(), minlength=vertices).astype(np.uint64)
     for _ in range(ROUNDS):

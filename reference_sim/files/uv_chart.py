@@ -12,6 +12,7 @@ import numpy as np
 
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.mesh_files import Surface
+from reference_sim.geometry.topology import corner_areas
 
 JOIN_DISTANCE = 1e-6  # [m] from which two vertices are one: round-off of six digits
 AREA_FACTOR = 1.5  # a chart whose area is further from the mesh's is in another unit
@@ -69,7 +70,7 @@ def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndar
         raise MeshError(f"{prefix}uv-scale {scale}: give metres per unit of the chart, above 0")
     chart = scale * surface.uv
     corners = surface.positions[surface.faces]
-    flat, mesh = areas_of(chart), areas_of(corners)
+    flat, mesh = corner_areas(chart), corner_areas(corners)
     ratio = flat.sum() / mesh.sum()
     if not 1 / AREA_FACTOR <= ratio <= AREA_FACTOR:
         equal = f"{prefix}uv-scale {scale / np.sqrt(ratio):.4g} makes them equal, " if ratio > 0 else ""
@@ -95,14 +96,6 @@ def flattened(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return a chart (F, 3, 2) [m] of a mesh at rest in space: each triangle laid flat by itself."""
     frames = Cloth(positions, faces).frames
     return np.concatenate([np.zeros((len(faces), 1, 2)), frames.transpose(0, 2, 1)], axis=1)
-
-
-def areas_of(corners: np.ndarray) -> np.ndarray:
-    """Areas (F,) of triangles (F, 3, 2) or (F, 3, 3)."""
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    if corners.shape[2] == 2:
-        return 0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
-    return 0.5 * np.linalg.norm(np.cross(first, second), axis=1)
 
 
 def stretches(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:

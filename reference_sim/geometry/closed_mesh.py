@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim.cloth import MeshError
+from reference_sim.geometry.topology import half_edges
 
 LEAST_AREA_RATIO = 1e-12  # area of a face relative to the mean, below which it has no normal
 
@@ -36,7 +37,7 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
 
 def _check_edges(faces: np.ndarray, size: int) -> None:
     """Refuse an edge that is not between exactly two faces that walk it in opposite directions."""
-    half = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    half = half_edges(faces)
     undirected = np.sort(half, axis=1) @ np.array([size, 1])
     _, inverse, count = np.unique(undirected, return_inverse=True, return_counts=True)
     count = count[inverse]

@@ -1,4 +1,4 @@
-"""Boundary loops, areas and angles of a triangle mesh."""
+"""Edges, boundary loops, areas and angles of a triangle mesh."""
 
 from __future__ import annotations
 
@@ -7,6 +7,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+
+def half_edges(faces: Index) -> Index:
+    """Return the directed edges (3F,2) of faces (F,3), three for each face in turn, along its winding."""
+    return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
+def unique_edges(faces: Index) -> Index:
+    """Return the edges (E,2) of faces (F,3), sorted, the lower vertex first."""
+    return np.unique(np.sort(half_edges(faces), axis=1), axis=0)
 
 
 def boundary_loops(faces: Index) -> list[Index]:
@@ -18,7 +28,7 @@ def boundary_loops(faces: Index) -> list[Index]:
     Raises:
         ValueError: the mesh is not manifold at its boundary.
     """
-    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    halves = half_edges(faces)
     size = int(faces.max()) + 1
     forward, backward = halves @ [size, 1], halves @ [1, size]
     rim = halves[~np.isin(forward, backward)]
@@ -39,8 +49,15 @@ def boundary_loops(faces: Index) -> list[Index]:
 
 def triangle_areas(points: Array, faces: Index) -> Array:
     """Return the areas (F,) [m^2] of the faces (F,3) between points (V,3) [m]."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return corner_areas(points[faces])
+
+
+def corner_areas(corners: Array) -> Array:
+    """Return the areas (F,) [m^2] of triangles by their corners (F,3,3), or (F,3,2) in a plane [m]."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    if corners.shape[2] == 2:
+        return 0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    return 0.5 * np.linalg.norm(np.cross(first, second), axis=1)
 
 
 def corner_angles(points: Array, faces: Index) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from reference_sim.potential import Potential
 SUFFICIENT_DECREASE = 1e-4
 STEP_HALVINGS = 24  # of a step before its direction is given up
 
+Value = TypeVar("Value")
 Observer = Callable[[np.ndarray], object]  # is called with positions (V, 3) [m]
 
 
@@ -68,12 +70,17 @@ class Descent:
         if self.observe is not None:
             self.observe(self.x.copy())
 
+    def timed(self, part: str, function: Callable[..., Value], *arguments: object) -> Value:
+        """Return function(*arguments), and add its seconds to those of `part`."""
+        start = time.perf_counter()
+        value = function(*arguments)
+        self.seconds[part] += time.perf_counter() - start
+        return value
+
     def evaluate(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the value [J] and the gradient over the free vertices, flat (3n,) [N], at x (V, 3) [m]."""
-        start = time.perf_counter()
         with np.errstate(all="ignore"):  # a trial point far off is refused by its value, not by a warning
-            value, gradient = self.potential.value_and_gradient(x)
-        self.seconds["evaluate"] += time.perf_counter() - start
+            value, gradient = self.timed("evaluate", self.potential.value_and_gradient, x)
         return value, gradient[self.free].ravel()
 
     def spread(self, p: np.ndarray) -> np.ndarray:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from reference_sim.assembly.cholesky import analyse
@@ -99,36 +97,23 @@ class FactorisedDescent(Descent):
 
     def assemble(self, convexity: float) -> np.ndarray:
         """Return values (nnz,) of the Hessian at the point kept last."""
-        start = time.perf_counter()
         with np.errstate(all="ignore"):
-            data = self.hessian.assemble(self.x, convexity)
-        self.seconds["assemble"] += time.perf_counter() - start
-        return data
+            return self.timed("assemble", self.hessian.assemble, self.x, convexity)
 
     def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
         """Factorise, as the Hessian does; False if not positive definite."""
-        start = time.perf_counter()
-        self.factorised = self.hessian.factorise(data, shift)
+        self.factorised = self.timed("factorise", self.hessian.factorise, data, shift)
         self.factorisations += 1
-        self.seconds["factorise"] += time.perf_counter() - start
         return self.factorised
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation, as the Hessian does."""
-        start = time.perf_counter()
-        x = self.hessian.solve(b)
-        self.seconds["solve"] += time.perf_counter() - start
-        return x
+        return self.timed("solve", self.hessian.solve, b)
 
     def precondition(self, r: np.ndarray) -> np.ndarray:
         """Return a first guess of a solution, as the Hessian does."""
-        start = time.perf_counter()
-        x = self.hessian.precondition(r)
-        self.seconds["solve"] += time.perf_counter() - start
-        return x
+        return self.timed("solve", self.hessian.precondition, r)
 
     def look_for_negative_curvature(self) -> None:
         """Look for negative curvature, as the Hessian does."""
-        start = time.perf_counter()
-        self.hessian.look_for_negative_curvature()
-        self.seconds["solve"] += time.perf_counter() - start
+        self.timed("solve", self.hessian.look_for_negative_curvature)

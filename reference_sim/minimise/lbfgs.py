@@ -14,7 +14,6 @@ way, at the same tolerance.
 
 from __future__ import annotations
 
-import time
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -169,18 +168,10 @@ class LBFGSRun(Descent):
 
     def factorise(self) -> bool:
         """Factorise the preconditioner here; return whether it is positive definite."""
-        start = time.perf_counter()
-        data = self.preconditioner.assemble(self.x)
-        middle = time.perf_counter()
-        done = self.preconditioner.factorise(data)
+        data = self.timed("assemble", self.preconditioner.assemble, self.x)
         self.factorisations += 1
-        self.seconds["assemble"] += middle - start
-        self.seconds["factorise"] += time.perf_counter() - middle
-        return done
+        return self.timed("factorise", self.preconditioner.factorise, data)
 
     def solve(self, q: np.ndarray) -> np.ndarray:
         """Return the inverse of the preconditioner times q (3n,)."""
-        start = time.perf_counter()
-        p = self.preconditioner.solve(q)
-        self.seconds["solve"] += time.perf_counter() - start
-        return p
+        return self.timed("solve", self.preconditioner.solve, q)

@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse
 
 from reference_sim.files.array_file import ArrayFileError, read_arrays
-from reference_sim.geometry.topology import boundary_loops
+from reference_sim.geometry.topology import boundary_loops, half_edges
 from snug.body.parametric_body import SHAPES, Body
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, BodyError
@@ -282,7 +282,7 @@ def _faces(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
         raise BodyError(f"{path}: f names vertex {faces.max()}; the body has {len(template)}")
     if faces.shape[1] == 4:
         faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
-    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges = half_edges(faces)
     if len(np.unique(edges, axis=0)) != len(edges) or (edges[:, 0] == edges[:, 1]).any():
         raise BodyError(f"{path}: f is not a closed surface with one winding; inside and outside need one")
     faces = _fill_holes(path, faces, template)

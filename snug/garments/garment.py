@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 
 from reference_sim.cloth import Cloth
+from reference_sim.geometry.topology import half_edges
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
 
@@ -132,6 +133,6 @@ def _average(values: Array, faces: Index, rounds: int) -> Array:
 
 
 def _adjacency(faces: Index, count: int) -> csr_array:
-    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    halves = half_edges(faces)
     both = np.unique(np.concatenate([halves, halves[:, ::-1]]), axis=0)
     return coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count)).tocsr()

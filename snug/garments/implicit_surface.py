@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from reference_sim.geometry.topology import unique_edges
 from snug.body.parametric_body import Body
 from snug.garments.landmarks import ARM_BONES, CROTCH_BONES, LEG_BONES, TORSO_BONES, joint_position, skin_of
 
@@ -186,7 +187,7 @@ def legs_part(body: Body, room: float) -> float:
 def _edges(body: Body, bones: Sequence[str]) -> Index:
     """Return the edges (E,2) of the body between vertices that follow `bones`. Raises ValueError."""
     faces = np.asarray(body.faces, dtype=np.int64)
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = unique_edges(faces)
     edges_of_bones = edges[skin_of(body, bones)[edges].all(axis=1)]
     if not len(edges_of_bones):
         raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")

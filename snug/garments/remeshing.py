@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from reference_sim.geometry.topology import boundary_loops, triangle_areas
+from reference_sim.geometry.topology import boundary_loops, half_edges, triangle_areas
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -43,7 +43,7 @@ def along(curve: Array, shares: Array) -> Array:
 
 def interior_edges(faces: Index) -> tuple[Index, Index, Index]:
     """Return edges with two faces: ends (E,2) as wound in the first, faces (E,2), far corners (E,2)."""
-    halves = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    halves = half_edges(faces)
     key = np.sort(halves, axis=1) @ [int(faces.max()) + 1, 1]
     order = np.argsort(key, kind="stable")
     twin = np.flatnonzero(key[order][1:] == key[order][:-1])
@@ -77,7 +77,7 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
         candidates = np.flatnonzero((excess < -1e-6) & kept_side)
         if not len(candidates):
             break
-        present = {tuple(edge) for edge in np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1).tolist()}
+        present = {tuple(edge) for edge in np.sort(half_edges(faces), 1).tolist()}
         touched = np.zeros(len(faces), dtype=bool)
         for e in candidates[np.argsort(excess[candidates], kind="stable")]:
             (a, b), (f, g), (c, d) = ends[e], sides[e], far[e]
