@@ -9,8 +9,8 @@
 | training | losses, one optimisation step, the loop over steps, checkpoints |
 | train, check | the commands `python -m snug.train` and `python -m snug.check` |
 
-Imports run downwards: body < motion < garments < recipes < kernels < networks < training < train. The function
-that trains is `train_network`; `snug.train` is the command.
+Imports run downwards: body < motion < garments < recipes < kernels < networks < training < train. The
+function that trains is `train_network`; `snug.train` is the command.
 
 A small top of the chest's own skin, a static network trained for two steps, and its roll-out:
 

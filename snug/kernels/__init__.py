@@ -1,4 +1,4 @@
-"""Compiled closed forms for a CPU: the recurrent network, skinning, contact energies, one frame of a roll-out.
+"""Compiled closed forms for a CPU: recurrent networks, skinning, contact, one frame of a roll-out.
 
 | module | what lies there |
 | --- | --- |

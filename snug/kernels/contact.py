@@ -1,4 +1,4 @@
-"""Kernels of the contact cache: normals of the skin, planes at anchors, and the energy of all samples."""
+"""Kernels of the contact cache: normals of the skin, planes at anchors, energy of all samples."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PARTS = 255.0  # of a barycentric coordinate
 
 @njit(cache=True, error_model="numpy")
 def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Vertex normals of positions (N, P, 3) as int8, 127 times unit length, see Patch.normals."""
+    """Return vertex normals of positions (N, P, 3) as int8, 127 times unit length, see Patch.normals."""
     normals = np.empty(positions.shape, np.int8)
     for frame in range(len(positions)):
         normals[frame] = np.rint(np.float32(127.0) * vertex_normals(positions[frame], faces))
@@ -26,7 +26,7 @@ def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def _interpolated(
     faces: np.ndarray, face: np.integer, parts: np.ndarray, vectors: np.ndarray, c: int
 ) -> np.float32:
-    """Component c of what vectors (P, 3) of the body's vertices are at an anchor."""
+    """Interpolate component c of vectors (P, 3) of the body's vertices at an anchor."""
     v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
     u = np.float32(1.0) - v - w
     return u * vectors[faces[face, 0], c] + v * vectors[faces[face, 1], c] + w * vectors[faces[face, 2], c]
@@ -44,7 +44,7 @@ def interpolated_planes(
     out_points: np.ndarray,
     out_normals: np.ndarray,
 ) -> None:
-    """Points and unit normals (N, S, 3) of the anchors of frames (N,), see ContactCache.planes."""
+    """Compute points and unit normals (N, S, 3) at the anchors of frames (N,), see ContactCache.planes."""
     for n in range(len(frames)):
         x, m = positions[rows[n]], normals[rows[n]]
         anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
@@ -93,11 +93,11 @@ def contact_energy(
     slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:  # fmt: skip
-    """k max(margin - d, 0)^power of each sample, summed: values (C, TRAINING_LANES), and added up: gradients like x.
+    """Sum k max(margin - d, 0)^power over samples into values (C, TRAINING_LANES); add gradients like x.
 
-    x (C, V, 3, TRAINING_LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first asked
-    whether it counts from the end. Most samples are out of reach, and for them it is the loads that count:
-    what they read of a frame is first laid together.
+    x (C, V, 3, TRAINING_LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first
+    tested whether it counts from the end. Most samples are out of reach, and for them the loads cost most:
+    all that they read of a frame is first laid together.
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)

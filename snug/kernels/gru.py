@@ -1,4 +1,4 @@
-"""Forward and backward of the recurrent network in closed form: what training on a CPU runs, not autograd.
+"""Forward and backward of the recurrent network in closed form, in place of autograd, for training on a CPU.
 
 For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU's convention):
 
@@ -42,7 +42,7 @@ _LINEAR = (
 
 
 def product(a: Tensor, b: Tensor, bias: Tensor | None = None) -> Tensor:
-    """a (n, k) times the transpose of b (m, k), plus bias (m,) -> (n, m), in float32 on a CPU."""
+    """Return a (n, k) times the transpose of b (m, k), plus bias (m,), (n, m) in float32 on a CPU."""
     if _LINEAR is not None:
         return _LINEAR(a, b, bias, "none", [], "")
     return nn.functional.linear(a, b, bias)
@@ -58,6 +58,7 @@ class FastGRU(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, state: Tensor, *weights: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the outputs of the last layer and the states after the last frame."""
         x = x.transpose(0, 1).contiguous()  # time first: the frames of a step lie together
         saved, last = [], []
         for layer, start in enumerate(state):
@@ -82,7 +83,8 @@ class FastGRU(torch.autograd.Function):
         return x.transpose(0, 1), ends
 
     @staticmethod
-    def backward(ctx: Any, *above: Tensor) -> Any:
+    def backward(ctx: Any, *above: Tensor) -> tuple[Tensor | None, ...]:
+        """Return the gradients by the weights."""
         weights, saved = ctx.saved_tensors[: 4 * ctx.layers], ctx.saved_tensors[4 * ctx.layers :]
         gradients: list[Tensor | None] = [None] * len(weights)
         y = above[0].transpose(0, 1)
@@ -103,7 +105,7 @@ class FastGRU(torch.autograd.Function):
 
 
 def _back_in_time(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tuple[Tensor, Tensor]:
-    """Gradients (T N, 3H) of what W_i x and W_h h gave, from those y (T, N, H) of a layer's outputs."""
+    """Return the gradients (T N, 3H) by W_i x and by W_h h, from those y (T, N, H) by a layer's outputs."""
     (frames, count, size), wide = y.shape, hidden.shape[-1]
     to_inputs, to_recurrent = (y.new_empty(frames, count, 3 * wide) for _ in range(2))
     back, y = y.new_zeros(count, wide), _widened(y.contiguous(), size)
@@ -116,20 +118,20 @@ def _back_in_time(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tupl
 
 
 def _widened(rows: Tensor, size: int) -> Tensor:
-    """Rows (..., k H), H of this size, with each of the k parts filled up with 0 to a multiple of TRAINING_LANES."""
+    """Fill each of the k parts of rows (..., k H), H of this size, with 0 to a multiple of TRAINING_LANES."""
     if size % TRAINING_LANES == 0:
         return rows
     return nn.functional.pad(rows.unflatten(-1, (-1, size)), (0, -size % TRAINING_LANES)).flatten(-2)
 
 
 def _narrowed(rows: Tensor, size: int) -> Tensor:
-    """The inverse of `_widened`."""
+    """Return rows without the zeros of `_widened`."""
     return rows.unflatten(-1, (-1, size + -size % TRAINING_LANES))[..., :size].flatten(-2)
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
 def _tanh(x: np.float32) -> np.float32:
-    """In float32, at most 4e-7 off; of no number none."""
+    """Return tanh in float32, at most 4e-7 off; NaN for NaN."""
     x = _END if x > _END else x
     x = -_END if x < -_END else x
     z = x * x
@@ -146,8 +148,9 @@ def _cell(
     after: np.ndarray,
     blocks: int,
 ) -> None:
-    """One frame of a layer: what W_i x and W_h h give (N, 3H) and h (N, H) -> r, z, n, q (N, 4H) and h'
-    (N, H). All flat, with H, widened, of so many blocks of TRAINING_LANES.
+    """Compute one frame of a layer: r, z, n, q (N, 4H) and h' (N, H) from W_i x, W_h h (N, 3H) and h (N, H).
+
+    All flat, with H, widened, of so many blocks of TRAINING_LANES.
     """
     L, u = TRAINING_LANES, np.empty(7 * TRAINING_LANES, np.float32)
     for place in range(len(after) // L):
@@ -178,8 +181,9 @@ def _cell_back(
     to_recurrent: np.ndarray,
     blocks: int,
 ) -> None:
-    """One frame of a layer: back (N, H), the gradient of h' that comes from later frames, becomes what passes
-    to h through z alone. All flat, as in `_cell`.
+    """Go back through one frame of a layer, all flat as in `_cell`.
+
+    back (N, H), the gradient by h' from later frames, becomes the part that passes to h through z alone.
     """
     L, u = TRAINING_LANES, np.empty(7 * TRAINING_LANES, np.float32)
     for place in range(len(back) // L):
@@ -203,12 +207,14 @@ def _cell_back(
 
 
 class FastLinear(torch.autograd.Function):
-    """apply(x (N, T, k), weight (m, k), bias (m,)) -> (N, T, m): nn.Linear by `product`, its result laid out
-    as (m, T, N), see snug.kernels.lanes.
+    """apply(x (N, T, k), weight (m, k), bias (m,)) -> (N, T, m): nn.Linear by `product`.
+
+    Its result lies in memory as (m, T, N), see snug.kernels.lanes.
     """
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+        """Return the layer's outputs."""
         count, frames = x.shape[:2]
         rows = x.transpose(0, 1).flatten(0, 1)
         ctx.save_for_backward(rows, weight)
@@ -216,7 +222,8 @@ class FastLinear(torch.autograd.Function):
         return y.view(-1, frames, count).permute(2, 1, 0)
 
     @staticmethod
-    def backward(ctx: Any, *above: Tensor) -> Any:
+    def backward(ctx: Any, *above: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return the gradients by x, weight and bias."""
         rows, weight = ctx.saved_tensors
         count, frames, _ = above[0].shape
         y = above[0].permute(2, 1, 0).flatten(1)
@@ -225,9 +232,9 @@ class FastLinear(torch.autograd.Function):
 
 
 def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None, *, closed_form: bool) -> tuple[Tensor, Tensor]:
-    """What gru(x, state) gives, for a gru of batches first, in one direction and without dropout.
+    """Return gru(x, state), for a gru of batches first, in one direction and without dropout.
 
-    closed_form: by FastGRU, where a gradient is asked for.
+    closed_form: use FastGRU where a gradient is needed.
     """
     if not (closed_form and torch.is_grad_enabled()):
         return gru(x, state)
@@ -238,9 +245,9 @@ def run_gru(gru: nn.GRU, x: Tensor, state: Tensor | None, *, closed_form: bool) 
 
 
 def run_linear(layer: nn.Linear, x: Tensor, *, closed_form: bool = False) -> Tensor:
-    """What layer(x) gives, x (..., k); by `product` where no gradient is asked for, in float32 on a CPU.
+    """Return layer(x), x (..., k); by `product` where no gradient is needed, in float32 on a CPU.
 
-    closed_form: x (N, T, k) by FastLinear, where a gradient is.
+    closed_form: x (N, T, k) by FastLinear where a gradient is needed.
     """
     if closed_form and torch.is_grad_enabled():
         return FastLinear.apply(x, layer.weight, layer.bias)

@@ -41,7 +41,8 @@ def skin_frame(
     """Write world vertices into out (V, 3) [m], float64, by linear blend skinning.
 
     offsets (3 V',) and rest (3, V'), the unposed garment [m]: in this order (V,) of vertices and with others
-    behind them, in blocks of VERTEX_BLOCK; joints[first[b]:first[b + 1]] move block b, with shares (., VERTEX_BLOCK).
+    behind them, in blocks of VERTEX_BLOCK; joints[first[b]:first[b + 1]] move block b, with shares
+    (., VERTEX_BLOCK).
     transforms (J, 3, 4), pelvis (3,) [m], float64; all other real numbers are float32.
     """
     count, padded = len(order), rest.shape[1]
@@ -126,7 +127,7 @@ def _value_of(weight: Any) -> Any:
 def _multiply(
     kind: int, weights: np.ndarray, terms: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int
 ) -> None:
-    """Multiply four rows at once, a quarter of the matrix apart: memory gives four streams sooner than one."""
+    """Multiply four rows at once, a quarter of the matrix apart: four streams of memory are faster."""
     part = rows // ROWS
     for i in range(part):
         w0, w1 = weights[i * columns :], weights[(part + i) * columns :]
@@ -163,7 +164,7 @@ def _sigmoid(x: np.float32) -> np.float32:
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
 def _cell(inputs: np.ndarray, recurrent: np.ndarray, state: np.ndarray, size: int) -> None:
-    """Update a state by torch.nn.GRU's gates (snug.kernels.gru) of W_i x + b_i and W_h h + b_h, (3 size,) each."""
+    """Update a state by the gates of snug.kernels.gru from W_i x + b_i and W_h h + b_h, (3 size,) each."""
     for j in range(size):
         r = _sigmoid(inputs[j] + recurrent[j])
         z = _sigmoid(inputs[size + j] + recurrent[size + j])

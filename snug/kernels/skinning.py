@@ -1,7 +1,8 @@
-"""`snug.body.skinning.skin` in closed form for many frames of one garment: what training on a CPU runs.
+"""Skinning of many frames of one garment in closed form, for training on a CPU.
 
-The transforms of all vertices are one matrix product, laid out like the vertices (snug.kernels.lanes), so that the
-loops are ones of vector instructions. tests/snug/body/test_skinning.py holds values and gradients to `skin`.
+The transforms of all vertices are one matrix product, laid out like the vertices (snug.kernels.lanes), so
+that the loops become vector instructions. tests/snug/body/test_skinning.py compares values and gradients with
+`snug.body.skinning.skin`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.training_lanes import TRAINING_LANES
 from reference_sim.kernels.vector_rows import copy_lanes
 from snug.kernels.gru import product
-from snug.kernels.lanes import laid, unlaid
+from snug.kernels.lanes import from_lanes, to_lanes
 
 
 class FastSkin(torch.autograd.Function):
@@ -27,20 +28,22 @@ class FastSkin(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-        entries = torch.from_numpy(laid(transforms.flatten(-2)))  # (C, J, 12, TRAINING_LANES)
+        """Return the posed points."""
+        entries = torch.from_numpy(to_lanes(transforms.flatten(-2)))  # (C, J, 12, TRAINING_LANES)
         entries = entries.movedim(1, -1).flatten(0, 2)
         ctx.blended = product(weights, entries).view(len(weights), -1, 12 * TRAINING_LANES).numpy()
         columns = points.detach().permute(2, 3, 1, 0).flatten(2)  # (V, 3, T N)
         columns = nn.functional.pad(columns, (0, -columns.shape[2] % TRAINING_LANES)).contiguous()
         posed = np.empty((ctx.blended.shape[1], len(weights), 3, TRAINING_LANES), np.float32)
         _posed(columns.numpy().ravel(), ctx.blended, posed.ravel())
-        return unlaid(posed, *points.shape[:2])
+        return from_lanes(posed, *points.shape[:2])
 
     @staticmethod
-    def backward(ctx: Any, *above: Tensor) -> Any:
+    def backward(ctx: Any, *above: Tensor) -> tuple[Tensor, None, None]:
+        """Return the gradient by the points."""
         windows, frames, vertices, _ = above[0].shape
         back = np.empty((vertices, 3, ctx.blended.shape[1], TRAINING_LANES), np.float32)
-        _turned_back(laid(above[0]).ravel(), ctx.blended, back.ravel())
+        _turned_back(to_lanes(above[0]).ravel(), ctx.blended, back.ravel())
         columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
         return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
@@ -48,7 +51,7 @@ class FastSkin(torch.autograd.Function):
 # The point is copied into one small array of known size, for the compiler then knows that nothing overlaps.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
-    """Flat points (V, 3, C, TRAINING_LANES), blended (V, C, 12 TRAINING_LANES), flat out (C, V, 3, TRAINING_LANES)."""
+    """Pose flat points (V, 3, C, L) by blended (V, C, 12 L) into flat out (C, V, 3, L), L lanes."""
     L, (vertices, blocks, _) = TRAINING_LANES, blended.shape
     u = np.empty(3 * L, np.float32)
     for v in range(vertices):
@@ -67,7 +70,7 @@ def _posed(points: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _turned_back(above: np.ndarray, blended: np.ndarray, out: np.ndarray) -> None:
-    """Gradients by the points, laid out like these: the transpose of each rotation part."""
+    """Compute the gradients by the points, laid out like these: the transpose of each rotation part."""
     L, (vertices, blocks, _) = TRAINING_LANES, blended.shape
     u = np.empty(3 * L, np.float32)
     for v in range(vertices):

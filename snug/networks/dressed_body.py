@@ -144,7 +144,7 @@ class DressedBody:
         smoothing: int = 0,
         offsets: Tensor | None = None,
     ) -> np.ndarray:
-        """Return world vertices (T, V, 3) [m], float64: the unposed garment plus offsets (T, V, 3), skinned."""
+        """Return world vertices (T, V, 3) [m], float64: the unposed garment plus offsets, skinned."""
         unposed = self.rest(betas) if offsets is None else self.rest(betas) + offsets
         posed = skin(unposed, self.weights(smoothing), self.transforms(motion.poses, betas))
         return posed.double().numpy() + self.pelvis(motion, betas)[:, None]

@@ -140,7 +140,7 @@ class FramePlan:
         return x
 
     def offsets(self, network: GarmentNetwork, *parts: tuple[nn.Linear, slice]) -> None:
-        """Add the offsets (3 V,), the sum of these layers of the numbers at their places; to be called last."""
+        """Add the offsets (3 V,), the sum of linear layers of the numbers at places; to be called last."""
         places, vertices = self._places.copy(), network.vertices
         places[np.isin(places, network.pins)] = vertices  # as those behind: without offset
         rows = (3 * places + np.arange(3)[:, None]).ravel()
@@ -150,7 +150,7 @@ class FramePlan:
             self._product(kind, matrix, bias, x, self._used, scale=network.output_scale)
 
     def _place(self, size: int) -> slice:
-        """Reserve a place for `size` numbers; those behind stay zero, as matrices are read in whole vectors."""
+        """Reserve a place for `size` numbers; those behind stay zero: matrices are read in whole vectors."""
         start = self._used
         self._used += _up(size + ROWS, COLUMNS)
         return slice(start, start + size)

@@ -126,7 +126,7 @@ def prepare_batch(
 
 
 def collect_frames(frames: Iterator[np.ndarray], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Compute all frames (V, 3); return those with numbers `kept` (T,), (T, V, 3), and their times (T,) [s]."""
+    """Compute all frames; return positions (T, V, 3) [m] and times (T,) [s] of those numbered `kept` (T,)."""
     places, seconds = {int(frame): place for place, frame in enumerate(kept)}, np.empty(len(kept))
     positions, clock = np.empty(0), time.perf_counter()
     for frame, x in enumerate(frames):

@@ -1,4 +1,4 @@
-"""A network with all that is needed to use it again: its recipe, its inputs, its training history; one file."""
+"""Trained models: a network with its recipe, inputs and training history, in one file."""
 
 from __future__ import annotations
 

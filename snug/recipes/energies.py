@@ -15,7 +15,7 @@ from reference_sim.energies import Energy
 
 
 def find_energy(name: str) -> Callable[..., Energy]:
-    """What makes the energy of that name from a Cloth, its options at their defaults.
+    """Return the function that makes the energy of that name from a Cloth, its options at their defaults.
 
     Raises ValueError for an unknown name, for one that two have, and for what cannot be trained.
     That is what is made of more than a cloth, what must be prepared for each step of a simulation (see

@@ -14,8 +14,9 @@ from snug.recipes.recipe import DEFAULT, TERMS, Recipe, RecipeError
 # and of which `contact_refresh` searches a few anew in a step (the text computes it anew; searching all 48
 # frames would take several times as long as the rest of a step); only to skin that the rule of regions
 # allows; the garment that the offsets are added to follows the shape of the body; and hinges are scaled, as
-# its authors have since corrected the text: every network is judged by scaled hinges, and trained on printed
-# ones its row would mix the recipe with another cloth (`printed-bending` below shows that alone).
+# its authors have since corrected the text: every network is evaluated with scaled hinges, and
+# trained on printed ones its row would mix the recipe with another cloth (`printed-bending` below shows that
+# alone).
 PAPER = Recipe(
     name="paper",
     pose_input="axis_angle",
@@ -38,9 +39,9 @@ PAPER = Recipe(
     spike=1e6,
 )
 # Vertices of a simulation depend on more than two frames before: longer windows follow them better (7 mm
-# instead of 13 on the training motions at 500 vertices), and there is no energy that a window could cheat.
+# instead of 13 on the training motions at 500 vertices), and there is no energy that a window could exploit.
 # Half of the default's rate: as near to the simulation on three held-out motions, with less energy by each of
-# three seeds (docs/notebook/training.md). Without decay it is .6 mm farther off.
+# three seeds (docs/notebook/training.md). Without decay the error is 0.6 mm larger.
 SUPERVISED = replace(
     DEFAULT,
     name="supervised",
@@ -83,8 +84,8 @@ def _without(term: str) -> Recipe:
 
 
 # Longer windows get smaller batches, so that a step sees 48 frames in each. Bodies of other shapes: with all
-# mixed clips on them the excess over the simulation on the mean body was .052 J, with half .033, without
-# .027 (docs/method.md).
+# augmented clips on them the excess over the simulation on the mean body was 0.052 J, with half 0.033,
+# without 0.027 (docs/method.md).
 ABLATIONS = (
     replace(DEFAULT, name="shapes", shape_range=3.0, shape_of="clip", shape_share=0.5),
     *(_without(term) for term in ("bending", "strain", "gravity", "inertia")),
@@ -110,7 +111,7 @@ RECIPE_OF_KIND = {
 
 
 def find_recipe(name: str) -> Recipe:
-    """The recipe of that name. Raises RecipeError naming the known ones."""
+    """Return the recipe of that name. Raises RecipeError naming the known ones."""
     if name not in RECIPES:
         raise RecipeError(f"unknown recipe {name!r}: use one of {', '.join(RECIPES)}")
     return RECIPES[name]

@@ -1,7 +1,7 @@
 """Recipe: every choice of a training run in one frozen place. The named ones are in snug.recipes.named.
 
-No recipe holds a balancing weight between the energies: there is none. Imports
-nothing heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none. Imports nothing heavy,
+so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
@@ -21,48 +21,59 @@ class RecipeError(ValueError):
 class Recipe:
     """Options of the network and of its training. Lengths in metres, energies in joules.
 
-    name: shown in tables.
-    pose_input: `six` (two columns of each joint's rotation matrix, the root by its up direction alone, so
-        that the direction a person walks in does not matter) or `axis_angle` (the 72 numbers of the pose).
-    velocity_frame: axes of the root velocity, `root` or `world`.
-    smoothing: sweeps of neighbour averaging over the borrowed skinning weights, at 1000 vertices (see
-        DressedBody.weights).
-    zero_last_layer: start at the skinned template instead of at centimetres of noise.
-    output_scale: factor on the predicted offsets.
-    learning_rate: of Adam. schedule: what becomes of it, `cosine` (half a cosine, down to a hundredth of it
-        at the last step), `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
-    weight_decay: share, times the rate, taken off each weight in a step (AdamW, Loshchilov and Hutter 2019).
-    h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
-    remembered: that noise is added to the state which the network last had after the frame before (see
-        snug.training.hidden_state_cache), instead of to nothing. Not for what learns simulated vertices, nor where
-        each window gets a shape of its own (`shape_of`); of little use where `window_stride` is no
-        divisor of `window`, for then few frames before a window ever end one.
-    window, batch: frames of a sub-sequence, sub-sequences of a step.
-    window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
-    even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
-        chance alone (1) a hard pose may come so late that the network, by then settled, meets it with joules.
-    shape_range: bodies get shape numbers from U(-r, r). shape_of: who gets them, each `window` in each step
-        anew, as the paper has it, or each mixed `clip` once, while given motions stay on the mean body: what
-        is known of a frame (its posed body, its anchors, the state before it) then stays true. shape_share:
-        of these clips that leave the mean body.
-    contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
-    contact_stiffness, contact_margin: of ContactPenalty; None takes the simulator's defaults.
-    contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most one
-        of each window; in between anchors walk with the cloth.
-    mixed: frames of mixed motions (snug.training.augmentation.mixed_clips) for each frame of a training motion, up to
-        20,000; not for what learns simulated vertices. mixed_turn [rad], mixed_lift: see there.
-    terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
-        snug.recipes.energies. Leaving one out is an ablation, and it is then never evaluated.
-    material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or `pbns`
-        (edges, hinges, uniform mass and squared contact of PBNS, see snug.training.losses.pbns_material; it has its own
-        stiffness and margin of contact).
-    bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints them; of
-        no account with material `pbns`.
-    pretraining: updates before those by the energies, for a network that learns from a simulated past, see
-        snug.training.losses.simulated_past.
-    spike: a window above this many joules a frame is named and counted, and its step's gradient clipped; what
-        else is done about such batches: see snug.training.divergence_guard.
-    gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
+    Attributes:
+        name: shown in tables.
+        pose_input: `six` (two columns of each joint's rotation matrix, the root by its up direction alone, so
+            that the direction a person walks in does not matter) or `axis_angle` (the 72 numbers of the
+            pose).
+        velocity_frame: axes of the root velocity, `root` or `world`.
+        smoothing: sweeps of neighbour averaging over the borrowed skinning weights, at 1000 vertices (see
+            DressedBody.weights).
+        zero_last_layer: start at the skinned template instead of at centimetres of noise.
+        output_scale: factor on the predicted offsets.
+        learning_rate: of Adam.
+        weight_decay: share, times the rate, taken off each weight in a step (AdamW, Loshchilov and Hutter
+            2019).
+        schedule: of the learning rate: `cosine` (half a cosine, down to a hundredth at the last step),
+            `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
+        drop_after_epochs: see `schedule`.
+        h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
+        remembered: add that noise to the state which the network last had after the frame before (see
+            snug.training.hidden_state_cache), instead of to zero. Not for networks that learn simulated
+            vertices, nor where each window gets its own shape (`shape_of`); of little use where
+            `window_stride` is no divisor of `window`, for then few frames before a window ever end one.
+        window: frames of a sub-sequence.
+        batch: sub-sequences of a step.
+        window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
+        even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
+            chance alone (1) a hard pose may come so late that the network, by then settled, meets it with
+            joules.
+        shape_range: bodies get shape numbers from U(-r, r).
+        shape_of: receivers of a shape: each `window` in each step anew, as the paper has it, or each
+            augmented `clip` once, while original motions stay on the mean body: all that is known of a frame
+            (its posed body, its anchors, the state before it) then stays true.
+        shape_share: share of these clips that leave the mean body.
+        contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
+        contact_stiffness: of ContactPenalty; None takes the simulator's default.
+        contact_margin: of ContactPenalty; None takes the simulator's default.
+        contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most
+            one of each window; in between anchors walk with the cloth.
+        mixed: frames of augmented motions (snug.training.augmentation.mixed_clips) for each frame of a
+            training motion, up to 20,000; not for networks that learn simulated vertices.
+        mixed_turn: standard deviation of their added turns [rad].
+        mixed_lift: share of their thighs that are lifted.
+        terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
+            snug.recipes.energies. Leaving one out is an ablation, and it is then never evaluated.
+        material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or
+            `pbns` (edges, hinges, uniform mass and squared contact of PBNS, see
+            snug.training.losses.pbns_material, with its own stiffness and margin of contact).
+        bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints
+            them; without effect with material `pbns`.
+        pretraining: updates before those by the energies, for a network that learns from a simulated past,
+            see snug.training.losses.simulated_past.
+        spike: a window above this many joules a frame is named and counted, and its step's gradient clipped;
+            further measures: see snug.training.divergence_guard.
+        gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
     """
 
     name: str = "default"
@@ -134,7 +145,7 @@ class Recipe:
 
     @staticmethod
     def _demand_known(terms: Iterable[str]) -> None:
-        """Raises RecipeError for what is no energy of the simulator that can be trained on."""
+        """Raise RecipeError unless all terms are energies of the simulator that can be trained on."""
         for term in terms:
             from snug.recipes.energies import find_energy
 
@@ -145,23 +156,24 @@ class Recipe:
                 raise RecipeError(f"recipe option terms: {error}; the recipes here have {here}") from error
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for a model file or run.json."""
+        """Return plain values, for a model file or run.json."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Recipe:
-        """The inverse of `as_dict`. Raises RecipeError for an option that this version does not know."""
+        """Make a recipe from `as_dict`. Raises RecipeError for an unknown, missing or mistyped option."""
         known = {field.name for field in fields(cls)}
-        unknown = sorted(set(values) - known)
-        if unknown:
+        if unknown := sorted(set(values) - known):
             raise RecipeError(f"unknown recipe option {unknown[0]!r}")
+        if missing := sorted(known - set(values)):
+            raise RecipeError(f"recipe option {missing[0]!r} is missing")
         for field in fields(cls):
-            value = values.get(field.name, field.default)
+            value = values[field.name]
             if type(value) not in _READ_AS.get(type(field.default), (type(field.default),)):
                 raise RecipeError(f"recipe option {field.name}={str(value)[:40]!r}: of another type")
-        if not all(isinstance(term, str) for term in values.get("terms", ())):
+        if not all(isinstance(term, str) for term in values["terms"]):
             raise RecipeError("recipe option terms: give names")
-        return cls(**{**values, "terms": tuple(values.get("terms", TERMS))})
+        return cls(**{**values, "terms": tuple(values["terms"])})
 
 
 # Types of an option in a file, by that of its default; an optional one is a number.

@@ -1,4 +1,4 @@
-"""Checkpoint of a training run: one file from which a stopped run resumes with the bits of an unbroken one."""
+"""Checkpoints: a file from which a stopped training run resumes with the bits of an unbroken one."""
 
 from __future__ import annotations
 

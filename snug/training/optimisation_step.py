@@ -84,8 +84,8 @@ class Trainer:
             of_mixed = draw_clip_shapes(len(mixed), dressed.body.shape_count, recipe, seed=seed)
             shapes = np.concatenate([mean, of_mixed])
         self.data = TrainingSet(
-            dressed, [*motions, *mixed], recipe, features=how.network.feature_set, sequences=how.network.sequential,
-            device=device, shapes=shapes,
+            dressed, [*motions, *mixed], recipe, features=how.network.feature_set,
+            sequences=how.network.sequential, device=device, shapes=shapes,
         )  # fmt: skip
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         pins = dressed.garment.pins
@@ -161,7 +161,7 @@ class Trainer:
         )
 
     def draw(self) -> np.ndarray:
-        """The next windows: every sub-sequence once, in random order, before any comes again."""
+        """Draw the next windows: every sub-sequence once, in random order, before any comes again."""
         even = self.recipe.even
         while len(self.order) < self.windows:
             parts = [
@@ -197,7 +197,7 @@ class Trainer:
         return {"loss": sum(means.values()), **means}
 
     def _physics_step(
-        self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Any
+        self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Tensor | None
     ) -> dict[str, float]:
         """Take a step on the energies. windows (N,), frames (N, T): of all processes; batch: of this one."""
         assert self.loss is not None
@@ -243,8 +243,8 @@ class Trainer:
         self.contact.search(places, frames, posed, x, exact=True)
         return True
 
-    def start_state(self, count: int, mine: slice, batch: Batch) -> Any:
-        """Return the state before the windows of a batch: noise of the recipe's sigma, added to the cached state.
+    def start_state(self, count: int, mine: slice, batch: Batch) -> Tensor | None:
+        """Return the state before the windows of a batch: noise of the recipe's sigma plus the cached state.
 
         For TailorNet it is the dropout masks.
 
@@ -256,7 +256,7 @@ class Trainer:
         state = state[:, mine].contiguous()  # as cuDNN wants it
         return state + self.hidden_states.at(batch.frames[:, 0]) if self.hidden_states else state
 
-    def predict(self, batch: Batch, state: Any) -> tuple[Tensor, Any]:
+    def predict(self, batch: Batch, state: Tensor | None) -> tuple[Tensor, Tensor | None]:
         """Return vertices (N, T, V, 3) [m] relative to the pelvis, and the state after them."""
         with self.clock.part("forward"):
             offsets, after = self._callable(batch.features, state)

@@ -3,9 +3,9 @@
 Every process makes the same data and draws the same random numbers for the whole batch, then works on its own
 windows. Gradients are averaged by DistributedDataParallel; the energies of all windows are gathered, so that
 every process evaluates the same batch; contact anchors that one process moved or found anew, and states that
-it caches, are sent to the others. So the run is that of a single process with the same batch up to the rounding of float32 sums, which are taken in
-another order, and up to the anchors of a frame that comes twice in a step: it repeats bit for bit with the
-same number of processes, and not across numbers.
+it caches, are sent to the others. So the run is that of a single process with the same batch up to the
+rounding of float32 sums, which are taken in another order, and up to the anchors of a frame that comes twice
+in a step: it repeats bit for bit with the same number of processes, and not across numbers.
 """
 
 from __future__ import annotations

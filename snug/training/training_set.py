@@ -170,7 +170,7 @@ def _reposed(dressed: DressedBody, transforms: Tensor, betas: Tensor) -> Tensor:
 
 
 def _ahead(pelvis: np.ndarray) -> Tensor:
-    """Return 2 p_{t-1} - p_{t-2} - p_t of each frame, (T, 3) [m]; zero where two earlier frames are missing."""
+    """Return 2 p_{t-1} - p_{t-2} - p_t of each frame, (T, 3) [m]; zero without two earlier frames."""
     ahead = np.zeros_like(pelvis)
     ahead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
     return torch.as_tensor(ahead, dtype=torch.float32)

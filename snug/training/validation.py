@@ -54,8 +54,8 @@ class Validator:
         self.trainer = trainer
         how, motions = trainer.how, validation.motions
         self.data = TrainingSet(
-            trainer.dressed, motions, trainer.recipe, features=how.network.feature_set, sequences=how.network.sequential,
-            device=trainer.device,
+            trainer.dressed, motions, trainer.recipe, features=how.network.feature_set,
+            sequences=how.network.sequential, device=trainer.device,
         )  # fmt: skip
         if self.data.dt != trainer.data.dt:
             here, there = 1 / self.data.dt, 1 / trainer.data.dt

@@ -3,8 +3,9 @@
 Secondary motion shows after a turn and a stop, and few motions have either. Each clip is played at
 another speed; its trunk turns to and fro about the vertical, a random share of it from the pelvis; at a
 random frame the body stops dead and holds still for up to a second. Joined into one long motion they need one
-settled start, and the ways between them are motions too. Half of the clips are pieces of the original motions:
-mixed ones alone hardly come near a pose that people take, and there the network then stretches the cloth.
+settled start, and the ways between them are motions too. Half of the clips are pieces of the original
+motions: mixed ones alone hardly come near a pose that people take, and there the network then stretches the
+cloth.
 """
 
 from __future__ import annotations
@@ -62,7 +63,10 @@ def make_swinging_motion(
 
 
 def _choose_clip(clip: Motion, originals: Sequence[Motion], random: np.random.Generator) -> Motion:
-    """Return the clip, or with probability ORIGINAL_SHARE a piece of an original motion, mirrored half of the time."""
+    """Return the clip or, with probability ORIGINAL_SHARE, a piece of an original motion.
+
+    The piece is mirrored half of the time.
+    """
     if not originals or random.random() >= ORIGINAL_SHARE:
         return clip
     source = originals[int(random.integers(len(originals)))]

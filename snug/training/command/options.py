@@ -19,14 +19,14 @@ EXAMPLES = """examples:
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
   python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
-  python -m snug.train --recipe paper --vertices 4400    the paper's text (but see snug.recipes.named on contact)
+  python -m snug.train --recipe paper --vertices 4400    the paper's text (see snug.recipes.named on contact)
   python -m snug.train --dataset data/walks --model supervised    learn from the simulations of a data set
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
   torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
 
-supervised, santesteban2019 and tailornet learn from simulated motions, which python -m benchmarks.dataset makes;
-python -m benchmarks.run makes its own. With --dataset, name the --garment, --vertices and --body that it was built
-with."""
+supervised, santesteban2019 and tailornet learn from simulated motions, which python -m benchmarks.dataset
+makes; python -m benchmarks.run makes its own. With --dataset, name the --garment, --vertices and --body that
+it was built with."""
 
 
 def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:

@@ -1,12 +1,12 @@
-"""Contact planes for training: where each point of a garment may touch the body, cached and queried anew.
+"""Cache of contact anchors: where each sample of a garment may touch the body, searched anew in training.
 
 The loss needs, for each contact sample x of each frame, a plane (closest body point c, outward normal n), so
 that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
 anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
 carry it to a plane in no time. Near the skin it walks to where its sample is now, whenever the energy is
-taken (reference_sim.contact.anchor_walk), and a few frames of each batch search anew from the current prediction,
-with the simulator's own search and its rule of regions. All positions are float32, relative to the pelvis.
-With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
+taken (reference_sim.contact.anchor_walk), and a few frames of each batch are searched anew from the current
+prediction, with the simulator's own search and its rule of regions. All positions are float32, relative to
+the pelvis. With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
 coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
 """
 
@@ -31,9 +31,15 @@ EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, a
 class Patch:
     """The part of a body that one garment may touch.
 
-    body_vertices (P,) into the whole body; faces (Q, 3) into the patch; rest (P, 3) and centroids (Q, 3) [m]
-    in the T-pose; sample_rest (S, 3) [m] of the garment; adjacency (Q, 3), see
-    surface_walk.triangle_adjacency; a tree to search the faces with.
+    Attributes:
+        body_vertices: (P,) into the whole body.
+        faces: (Q, 3) into the patch.
+        rest: (P, 3) [m] in the T-pose.
+        centroids: (Q, 3) [m] in the T-pose.
+        sample_rest: (S, 3) [m], contact samples of the garment.
+        region: largest distance [m] in the T-pose from a sample to a face it may touch.
+        adjacency: (Q, 3), see reference_sim.contact.anchor_walk.triangle_adjacency.
+        tree: to search the faces with.
     """
 
     body_vertices: np.ndarray
@@ -80,24 +86,31 @@ class Patch:
         self, points: np.ndarray, positions: np.ndarray, anchor_faces: np.ndarray | None = None, *,
         exact: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """Closest allowed body point of each sample in one frame.
+        """Find the closest allowed body point of each sample in one frame.
 
-        points (S, 3), positions (P, 3) of the patch [m], anchor_faces (S,) where to look first
-        -> faces (S,), barycentric (S, 2) of the second and third corner. Beyond EXACT from the skin an old
-        anchor stands as long as no face is half as far, unless all are to be exact.
+        Beyond EXACT from the skin an old anchor stands as long as no face is half as far.
+
+        Args:
+            points: samples (S, 3) [m].
+            positions: of the patch, (P, 3) [m].
+            anchor_faces: (S,), faces to look at first.
+            exact: let no old anchor stand.
+
+        Returns:
+            Faces (S,), and barycentric coordinates (S, 2) of the second and third corner.
         """
         self.tree.refit(positions)
-        found = self.tree.nearest(
+        nearest = self.tree.nearest(
             points,
             hints=anchor_faces,
             rest_points=self.sample_rest,
             region=self.region,
             exact=np.inf if exact else EXACT,
         )
-        return found.faces, found.barycentric[:, 1:]
+        return nearest.faces, nearest.barycentric[:, 1:]
 
     def normals(self, positions: np.ndarray) -> np.ndarray:
-        """Area-weighted vertex normals: positions (N, P, 3) float32 -> (N, P, 3) int8, 127 times unit length.
+        """Return area-weighted vertex normals of positions (N, P, 3) float32, int8, 127 times unit length.
 
         A byte is enough (0.3 degrees): planes interpolate them and make the result unit length again. With
         thousands of frames cached, memory counts.
@@ -105,9 +118,11 @@ class Patch:
         return byte_normals(positions, self.faces)
 
 
-def quantised(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Anchors on a body of so many faces as they are cached: faces (S,) in as few bytes as hold them,
-    barycentric (S, 2) as uint8 in 1 / PARTS, the two together never more than one.
+def quantise(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Round anchors as they are cached.
+
+    Faces (S,) take as few bytes as the body's number of faces needs; barycentric coordinates (S, 2) are
+    uint8 in 1 / PARTS, the two together never more than one.
     """
     parts = np.rint(PARTS * barycentric)
     parts[:, 1] = np.minimum(parts[:, 1], PARTS - parts[:, 0])
@@ -118,7 +133,7 @@ class ContactCache:
     """One anchor per frame and sample, and the steps since each frame's were last searched or propagated."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
-        faces, barycentric = quantised(
+        faces, barycentric = quantise(
             *patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces)
         )
         self.patch = patch
@@ -129,9 +144,9 @@ class ContactCache:
     def planes(
         self, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Planes of frames (N,), whose patch positions and normals are rows (N,) of (R, P, 3) arrays.
+        """Return points and unit normals (N, S, 3) float32 of the planes of frames (N,).
 
-        -> points, unit normals (N, S, 3) float32
+        Patch positions and normals of the frames are rows (N,) of (R, P, 3) arrays.
         """
         shape = (len(frames), self.faces.shape[1], 3)
         points, directions = np.empty(shape, np.float32), np.empty(shape, np.float32)
@@ -160,12 +175,20 @@ class ContactCache:
         *,
         walk: bool = False,
     ) -> np.ndarray:
-        """Contact energy of garments x (C, V, 3, TRAINING_LANES) float32 [m], see snug.kernels.lanes, in frames (N, T), with
-        the planes of `planes`; rows (N, T).
+        """Return the contact energy (C, TRAINING_LANES) [J] of garments; add its gradient to `gradients`.
 
-        -> values (C, TRAINING_LANES) [J], zero in lanes beyond the last frame; adds to gradients like x [N]. walk:
-        anchors near the skin first walk to where their samples are, and are remembered there. A sample that
-        is out of reach costs no more than the look at its anchor, and no plane is stored.
+        Values are zero in lanes beyond the last frame. A sample that is out of reach costs no more than the
+        look at its anchor, and no plane is stored.
+
+        Args:
+            contact: the contact term.
+            x: (C, V, 3, TRAINING_LANES) float32 [m], see snug.kernels.lanes.
+            gradients: like x [N].
+            frames: (N, T).
+            rows: (N, T), see `planes`.
+            positions: (R, P, 3), of the patch [m].
+            normals: (R, P, 3).
+            walk: whether anchors near the skin first walk to where their samples are, and stay there.
         """
         values = np.zeros((len(x), TRAINING_LANES), np.float32)
         contact_energy(
@@ -195,18 +218,18 @@ class ContactCache:
 
         exact: no old anchor stands for being roughly right.
         """
-        found = self.patch.search(points, positions, self.faces[frame], exact=exact)
-        self.faces[frame], self.barycentric[frame] = quantised(*found, len(self.patch.faces))
+        anchors = self.patch.search(points, positions, self.faces[frame], exact=exact)
+        self.faces[frame], self.barycentric[frame] = quantise(*anchors, len(self.patch.faces))
         self.age[frame] = 0
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """Places in `frames` of the `count` whose anchors are oldest; every frame passed here grows older."""
+        """Return the places in `frames` of the `count` oldest anchors; every one of `frames` grows older."""
         self.age[frames] += 1
         return np.argsort(-self.age[frames], kind="stable")[:count]
 
 
 @lru_cache(maxsize=16)
 def _samples(contact: ContactPenalty) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:
-    """Stencils, weights, stiffness and margin in the types of the kernel."""
+    """Return stencils, weights, stiffness and margin in the types of the kernel."""
     weights, stiffness = contact.weights.astype(np.float32), contact.stiffness.astype(np.float32)
     return contact.stencils.astype(np.uint32), weights, stiffness, np.float32(contact.margin)

@@ -1,4 +1,4 @@
-"""Contact anchors held and searched in torch: what `snug.training.contact.cache.ContactCache` does on a CPU, on any device.
+"""Contact anchors held and searched in torch on any device, as ContactCache does on a CPU.
 
 Normals are rounded to the same 127 steps as there, so that both give the same planes. The search is by brute
 force: of all allowed body vertices the nearest few, and of the faces around those the one that comes closest.
@@ -17,13 +17,12 @@ from snug.training.contact.cache import PARTS, ContactCache, Patch
 
 NEAREST = 3  # body vertices whose faces are tried for each sample
 CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
-FORBIDDEN = (
-    1.0  # m^2 added to the squared distance of a face out of the region: taken only for want of others
-)
+# m^2 added to the squared distance of a face out of the region: taken only for want of others.
+FORBIDDEN = 1.0
 
 
 class TensorContactCache:
-    """One anchor per frame and sample, on `device`; on the CPU, when each was last searched or propagated."""
+    """One anchor per frame and sample on `device`; the ages of the frames are on the CPU."""
 
     def __init__(self, patch: Patch, frames: int, device: torch.device) -> None:
         start = ContactCache(patch, 1)
@@ -41,22 +40,22 @@ class TensorContactCache:
         )  # (P, K) faces, -1 beyond the last
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """See ContactCache.oldest."""
+        """Return the places of the oldest anchors, see ContactCache.oldest."""
         return ContactCache.oldest(cast(ContactCache, self), frames, count)
 
     def normals(self, positions: Tensor) -> Tensor:
-        """Area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
+        """Return area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
         a, b, c = (positions[:, self.corners[:, corner]] for corner in range(3))
         of_faces = torch.linalg.cross(b - a, c - a)
         # Gathered, not scattered: sums are then taken in one order on a GPU too.
-        there = (self.around >= 0)[..., None]
-        normals = (of_faces[:, self.around.clamp(min=0)] * there).sum(-2)
+        present = (self.around >= 0)[..., None]
+        normals = (of_faces[:, self.around.clamp(min=0)] * present).sum(-2)
         return (127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)).round()
 
     def planes(
         self, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """See ContactCache.planes; positions and normals (R, P, 3) and the result are tensors."""
+        """Return the planes of frames, see ContactCache.planes; all but frames and rows are tensors."""
         device = positions.device
         chosen = torch.as_tensor(frames, device=device)
         corners = self.corners[self.faces[chosen].long()]  # (N, S, 3)
@@ -71,9 +70,10 @@ class TensorContactCache:
         self, samples: Tensor, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor, *,
         reach: float,
     ) -> None:  # fmt: skip
-        """Anchors of frames (N,) go to where reference_sim.contact.anchor_walk.walk_to_foot takes them for samples
-        (N, S, 3): those of samples less than `reach` and WALK_SLACK above their planes. positions, normals: see
-        `planes`.
+        """Move anchors of frames (N,) as reference_sim.contact.anchor_walk.walk_to_foot does.
+
+        Anchors of samples (N, S, 3) less than `reach` and SLACK above their planes walk. positions, normals:
+        see `planes`.
         """
         # A frame that comes twice walks once: which of two writes lands last is not a GPU's to choose.
         once = np.sort(np.unique(frames, return_index=True)[1])
@@ -101,18 +101,19 @@ class TensorContactCache:
             last, face = torch.where(moving, face, last), torch.where(moving, other, face)
         a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
         v, w = closest_on_triangle(b - a, c - a, x - a)
-        faces, parts = in_parts(face, torch.stack([v, w], -1), self.faces.dtype)
+        faces, parts = quantise_tensors(face, torch.stack([v, w], -1), self.faces.dtype)
         self.faces[chosen, sample], self.barycentric[chosen, sample] = faces, parts
 
     def requery(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
-        """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame. Brute force has no
-        use for old anchors, so that `exact` changes nothing.
+        """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame.
+
+        Brute force has no use for old anchors, so that `exact` changes nothing.
         """
         for start in range(0, len(points), CHUNK):
             part = slice(start, start + CHUNK)
             faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)
-            found = in_parts(faces, barycentric, self.faces.dtype)
-            self.faces[frame, part], self.barycentric[frame, part] = found
+            anchors = quantise_tensors(faces, barycentric, self.faces.dtype)
+            self.faces[frame, part], self.barycentric[frame, part] = anchors
         self.age[frame] = 0
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
@@ -132,16 +133,17 @@ class TensorContactCache:
         return pick[0], torch.stack(pick[1:], -1)
 
 
-def in_parts(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
-    """As snug.training.contact.cache.quantised: faces (S,) of a small type, barycentric (S, 2) as uint8."""
+def quantise_tensors(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
+    """Round anchors as snug.training.contact.cache.quantise does: faces (S,), barycentric (S, 2)."""
     second = (PARTS * barycentric[:, :1]).round()
     third = torch.minimum((PARTS * barycentric[:, 1:]).round(), PARTS - second)
     return faces.to(kind), torch.cat([second, third], 1).to(torch.uint8)
 
 
 def foot(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Weights v, w where the plane of a triangle comes closest to a point, and the squared area of its
-    parallelogram [m^4]; s, t, r as for `closest_on_triangle`.
+    """Return the weights v, w where a triangle's plane comes closest to a point, and a squared area [m^4].
+
+    The area is that of the parallelogram; s, t, r as for `closest_on_triangle`.
     """
     aa, cc, m = (s * s).sum(-1), (t * t).sum(-1), (s * t).sum(-1)
     d, e = (s * r).sum(-1), (t * r).sum(-1)
@@ -150,7 +152,7 @@ def foot(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor]:
-    """Weights v, w of the second and third corner where a triangle comes closest to a point.
+    """Return the weights v, w of the second and third corner where a triangle comes closest to a point.
 
     s, t (..., 3): sides from the first corner; r (..., 3): from it to the point [m].
     """
@@ -170,7 +172,7 @@ def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor
 
 
 def _incident(faces: np.ndarray) -> np.ndarray:
-    """Faces around each vertex, ascending: (Q, 3) -> (P, K) int64, rows filled up with -1."""
+    """Return the faces around each vertex, ascending: (Q, 3) -> (P, K) int64, rows filled up with -1."""
     counts = np.bincount(faces.ravel())
     table = np.full((len(counts), counts.max()), -1, np.int64)
     order = np.argsort(faces.ravel(), kind="stable")

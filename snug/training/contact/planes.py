@@ -1,8 +1,8 @@
 """Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
 
-Anchors walk with their samples in every step (reference_sim.contact.anchor_walk). Searched, for skin that no walk
-would find, are the middle frames of a few windows in a step. What is found there is propagated to the frames
-around it that show almost the same pose. Propagated farther, an anchor from where the thigh was elsewhere
+Anchors walk with their samples in every step (reference_sim.contact.anchor_walk). The middle frames of a few
+windows in a step are searched, for skin that no walk would reach. Their anchors are propagated to the frames
+around them that show almost the same pose. Propagated farther, an anchor from where the thigh was elsewhere
 claims a contact that is none, or misses a thigh that stands in the hem.
 """
 
@@ -20,15 +20,15 @@ from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.cache_torch import TensorContactCache
-from snug.training.losses.physics_loss import Planes
+from snug.training.losses.physics_loss import FrameData, Planes
 from snug.training.process_group import ALONE, Group
 from snug.training.training_set import Batch, TrainingSet
 
 # rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
-Posed = tuple[np.ndarray, Any, Any]
-TOGETHER = 64  # frames whose bodies are posed by one matrix product
+Posed = tuple[np.ndarray, FrameData, FrameData]
+POSED_TOGETHER = 64  # frames whose bodies are posed by one matrix product
 # Frames before and after a searched one that may take over its anchors; at the start.
-PROPAGATED, FIRST_PROPAGATED = 3, 7
+REACH, FIRST_REACH = 3, 7
 # m: how far a mark of the body may have moved from a frame to one that takes over its anchors. At the start a
 # frame lies within FIRST_NEAR of the first and of the last of those; from those between it may be twice as
 # far.
@@ -37,10 +37,15 @@ MARKED = 25  # every so many vertices of the patch there is a mark
 
 
 class TrainingContact:
-    """Anchors of all training frames. With `kernels` in numpy and numba, else in torch on the set's device.
+    """Anchors of all training frames; a group shares the work, and every process of it keeps all anchors.
 
-    refresh: see Recipe.contact_refresh. kept: whether each frame has one body for good; the kernels then pose
-    them all once. A group shares the work, and every process of it keeps all anchors.
+    Args:
+        data: the training set.
+        contact: the contact term, with its samples.
+        refresh: see Recipe.contact_refresh.
+        kept: whether each frame has one body for good; the kernels then pose them all once.
+        kernels: in numpy and numba, else in torch on the set's device.
+        group: processes that share the training.
     """
 
     def __init__(
@@ -75,11 +80,11 @@ class TrainingContact:
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
         self._kept = self._posed_everywhere() if kept and kernels else None
         self._changed = np.zeros(frames, bool)
-        self._before: tuple[Any, ...] | None = None
+        self._before: tuple[FrameData, ...] | None = None
         self._credit = 0.0
 
     def _skinned(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
-        """Patch positions (..., P, 3) of unposed ones, with pose correctives; or of `every` so many."""
+        """Skin patch positions (..., P, 3), or every so many of them, with pose correctives."""
         rest = rest[..., ::every, :]
         if self.correctives is not None:
             parents = self.data.dressed.parents
@@ -88,15 +93,15 @@ class TrainingContact:
         return skin(rest, self.weights[::every].to(rest.device), transforms)
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
-        """Patch positions and normals (F, P, 3) of every frame, computed once."""
+        """Compute patch positions and normals (F, P, 3) of every frame."""
         positions = np.empty((self.data.frames, *self.template.shape), np.float32)
         for rest, frames in self._worn():
             corners = torch.cat([rest, torch.ones(len(rest), 1)], 1)  # (P, 4)
             # sum_j w_pj T_j (p, 1) as a matrix product over (j, 4), of many frames at once: several times
             # faster than blending first, and ten times faster than frame by frame.
             spread = (self.weights[:, :, None] * corners[:, None]).flatten(1)  # (P, 96)
-            for start in range(frames.start, frames.stop, TOGETHER):
-                some = slice(start, min(start + TOGETHER, frames.stop))
+            for start in range(frames.start, frames.stop, POSED_TOGETHER):
+                some = slice(start, min(start + POSED_TOGETHER, frames.stop))
                 transforms = self.data.transforms[some]  # (C, 24, 3, 4)
                 if self.correctives is not None:
                     positions[some] = self._skinned(rest, transforms).numpy()
@@ -107,7 +112,7 @@ class TrainingContact:
         return positions, self.patch.normals(positions)
 
     def _worn(self) -> Iterator[tuple[Tensor, slice]]:
-        """Unposed patches (P, 3) and the frames of each: motion by motion, or one of all frames."""
+        """Yield unposed patches (P, 3) and the frames of each: motion by motion, or one for all frames."""
         shapes, first = self.data.shapes, self.data.first
         if shapes is None:
             yield self.template, slice(0, self.data.frames)
@@ -118,16 +123,16 @@ class TrainingContact:
 
     @cached_property
     def _marks(self) -> np.ndarray:
-        """Some vertices of the patch in every frame: (F, M, 3) [m]; to propagate by."""
+        """Some vertices of the patch in every frame, (F, M, 3) [m], by which poses are compared."""
         # On the CPU whatever the device, so that processes that share a run propagate alike.
         return np.concatenate([
             self._skinned(rest.cpu(), part.cpu(), MARKED).numpy()
             for rest, frames in self._worn()
-            for part in self.data.transforms[frames].split(TOGETHER)
+            for part in self.data.transforms[frames].split(POSED_TOGETHER)
         ])  # fmt: skip
 
     def posed(self, batch: Batch) -> Posed:
-        """The body where the frames of a batch have it."""
+        """Return the body in the poses of a batch."""
         if self._kept is not None:
             return batch.frames.ravel(), *self._kept
         rest = self.template
@@ -140,11 +145,13 @@ class TrainingContact:
         return rows, positions.numpy(), self.patch.normals(positions.numpy())
 
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
-        """What the loss takes: of the cached anchors, points and normals (N, T, S, 3), or, with kernels,
-        the energy itself.
+        """Return points and normals (N, T, S, 3) at the cached anchors, or, with kernels, the energy itself.
 
-        x (N, T, V, 3): vertices that the anchors first walk to, until `settle` says whether for good; None
-        where they have just been searched.
+        Args:
+            batch: windows.
+            posed: its bodies.
+            x: (N, T, V, 3), vertices that the anchors first walk to, until `settle` decides whether for
+                good; None where they have just been searched.
         """
         walk = x is not None
         if walk:
@@ -164,29 +171,31 @@ class TrainingContact:
         return points.reshape(shape), normals.reshape(shape)
 
     def search_first(self, weights: Tensor) -> None:
-        """Search where the skinned template touches, in as many frames as give to all others.
+        """Search where the skinned template touches, in enough frames to propagate to all others.
 
-        weights (V, 24): skinning weights of the garment. Now, for a thigh that is found in the hem only later
-        meets, with joules, a network that has long since settled.
+        It comes before training: a thigh that is found in the hem only later meets, with joules, a network
+        that has long since settled. weights (V, 24): skinning weights of the garment.
         """
         data, frame, done = self.data, 0, 0
         while done < data.frames:
-            last, frame = frame, self._near(done, FIRST_PROPAGATED, FIRST_NEAR).stop - 1
+            last, frame = frame, self._near(done, FIRST_REACH, FIRST_NEAR).stop - 1
             batch = data.at(np.array([[frame]]))
             x = skin(batch.rest, weights, batch.transforms)
             rows, positions, _ = self.posed(batch)
             self.cache.faces[frame] = self.cache.faces[last]  # a good place to begin
             self.cache.requery(frame, self._samples(x[0, 0]), positions[rows[0]])
-            end = self._near(frame, FIRST_PROPAGATED, FIRST_NEAR).stop
+            end = self._near(frame, FIRST_REACH, FIRST_NEAR).stop
             self._propagate(frame, np.arange(done, end))
             done = end
         self._changed[:] = False  # a resumed run makes these anchors again
 
     def requery(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
-        """Search a few windows of a batch anew, those that were left alone for longest.
+        """Search a few windows of a batch anew, those whose last search is longest ago.
 
-        frames (N, T): of the whole batch. posed and the predicted vertices x (n, T, V, 3): of the windows
-        that this process works on.
+        Args:
+            frames: (N, T), of the whole batch.
+            posed: bodies of the windows that this process works on.
+            x: (n, T, V, 3), predicted vertices of these windows.
         """
         self._credit += self.refresh * frames.size
         count = int(self._credit)
@@ -197,12 +206,13 @@ class TrainingContact:
         self.search(oldest * window + window // 2, frames, posed, x)
         searched = np.unique(middle[oldest])
         for frame in searched:
-            around = self._near(int(frame), PROPAGATED, NEAR)
+            around = self._near(int(frame), REACH, NEAR)
             self._propagate(int(frame), np.setdiff1d(np.arange(around.start, around.stop), searched))
 
     def _near(self, frame: int, reach: int, near: float) -> slice:
-        """The frames around it, of the same motion and at most `reach` off, up to where a mark has moved by
-        `near` [m].
+        """Return the frames around one, of the same motion and at most `reach` off.
+
+        They end where a mark has moved by `near` [m].
         """
         first = self.data.first
         motion = int(self.data.motion_of(frame))
@@ -213,14 +223,15 @@ class TrainingContact:
         return slice(max([start, *before]), min([stop, *after]))
 
     def _propagate(self, frame: int, others: np.ndarray) -> None:
-        """The anchors of a frame to others (n,), as if they had been searched."""
+        """Copy the anchors of a frame to others (n,), as if they had been searched."""
         for table in self._tables():
             table[others] = table[[frame]]  # a copy: torch writes no tensor onto itself
         self.cache.age[others], self._changed[others] = 0, True
 
     def settle(self, frames: np.ndarray, *, trusted: bool) -> None:
-        """Keep where anchors walked to since `planes`, or put them back where it is no guide. Then
-        every process gives its own to the others. frames: see `requery`.
+        """Keep the anchors' places since `planes` if the prediction is trusted, else put them back.
+
+        Then every process gives its own to the others. frames: see `requery`.
         """
         if self._before and not trusted:
             rows, *before = self._before
@@ -241,9 +252,9 @@ class TrainingContact:
     def search(
         self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor, *, exact: bool = False
     ) -> None:
-        """Search the anchors of some places (n,) among the frames (N T,) of a batch; else as `requery`.
+        """Search the anchors of some places (n,) among the frames (N T,) of a batch.
 
-        exact: see ContactCache.requery.
+        exact: see ContactCache.requery; other arguments: see `requery`.
         """
         flat, (rows, positions, _) = frames.ravel(), posed
         vertices, window = x.detach(), frames.shape[1]
@@ -256,14 +267,14 @@ class TrainingContact:
             self.cache.age[flat[place]] = 0
             self._send(int(flat[place]), owner)
 
-    def _samples(self, vertices: Tensor) -> Any:
-        """Contact samples (S, 3) of vertices (V, 3); of tensors also (..., S, 3) of (..., V, 3)."""
+    def _samples(self, vertices: Tensor) -> Any:  # as the cache's, an array or a tensor
+        """Return contact samples (S, 3) of vertices (V, 3); of tensors also (..., S, 3) of (..., V, 3)."""
         if self.kernels:
             return (self.contact.sample_matrix @ vertices.numpy()).astype(np.float32)
         return (vertices[..., self.stencils, :] * self.sample_weights[..., None]).sum(-2)
 
-    def _tables(self) -> tuple[Any, Any]:
-        """Faces (F, S) and barycentric coordinates (F, S, 2) of all anchors."""
+    def _tables(self) -> tuple[Any, Any]:  # arrays or tensors, written to in place
+        """Return faces (F, S) and barycentric coordinates (F, S, 2) of all anchors."""
         return self.cache.faces, self.cache.barycentric
 
     def _send(self, frame: int, owner: int) -> None:
@@ -272,7 +283,7 @@ class TrainingContact:
             self.group.sent(torch.as_tensor(table[frame]).view(torch.uint8), owner)
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
-        """What a resumed run needs: anchors that changed in training, ages of all, a search not yet due."""
+        """Return the state for a checkpoint: changed anchors, ages of all, a search not yet due."""
         changed = torch.as_tensor(np.flatnonzero(self._changed))
         faces, barycentric = (torch.as_tensor(table) for table in self._tables())
         there = changed.to(faces.device)
@@ -282,7 +293,7 @@ class TrainingContact:
         }, {"credit": self._credit}  # fmt: skip
 
     def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-        """The inverse of `state`."""
+        """Continue from a `state`."""
         changed = tensors["changed"].numpy()
         self._changed[changed] = True
         for table, name in zip(self._tables(), ("faces", "barycentric")):

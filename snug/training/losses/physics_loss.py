@@ -9,8 +9,8 @@ three holds three static terms and one inertia, whose gradient reaches all three
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (those that a term declares as "training_batch", or its own gradient) give the same values and
-gradients in a small part of the time, so autograd uses those. On a GPU the definitions run as they are, and on
-a CPU that of an energy that has no kernel. A recipe may name any energy of the simulator
+gradients in a small part of the time, so autograd uses those. On a GPU the definitions run as they are, and
+on a CPU that of an energy that has no kernel. A recipe may name any energy of the simulator
 (snug.recipes.energies).
 The contact planes are the one difference: training keeps an anchor for each sample, which walks along, and
 takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
@@ -40,7 +40,7 @@ from reference_sim.energies import (
 from reference_sim.energies.inertia import batch_of_windows
 from reference_sim.kernels.fast_kernels import fast_kernel, has_kernel, warn_slow_path
 from reference_sim.kernels.training_lanes import TRAINING_LANES, BatchKernel
-from snug.kernels.lanes import laid, unlaid
+from snug.kernels.lanes import from_lanes, to_lanes
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe
 from snug.training.device import CPU
@@ -94,10 +94,10 @@ class ClosedForms(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, *kernels: BatchKernel) -> tuple[Tensor, ...]:
         """Evaluate all kernels."""
-        lanes = laid(x)
+        lanes = to_lanes(x)
         gradient = np.zeros_like(lanes)
-        values = tuple(unlaid(kernel(lanes, gradient), *x.shape[:2]) for kernel in kernels)
-        ctx.gradient = unlaid(gradient, *x.shape[:2])
+        values = tuple(from_lanes(kernel(lanes, gradient), *x.shape[:2]) for kernel in kernels)
+        ctx.gradient = from_lanes(gradient, *x.shape[:2])
         return values
 
     @staticmethod
@@ -224,7 +224,7 @@ class PhysicsLoss:
         """Return the kernels in lanes of the terms that have one, by name of the term."""
         kernels = dict(self._batches)
         if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % TRAINING_LANES == 0:
-            kernels["inertia"] = batch_of_windows(self.inertia, laid(ahead), len(x))
+            kernels["inertia"] = batch_of_windows(self.inertia, to_lanes(ahead), len(x))
         if "collision" in self.terms and callable(planes):
             kernels["collision"] = planes
         return kernels

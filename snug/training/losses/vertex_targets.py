@@ -49,7 +49,7 @@ def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class StoredVertices:
-    """Simulated vertices in an .npy file of float32, (T, V, 3) [m] relative to the pelvis; read when asked for.
+    """Simulated vertices (T, V, 3) [m] relative to the pelvis, in an .npy file of float32.
 
     Attributes:
         path: the file.

@@ -12,7 +12,7 @@ from torch.overrides import TorchFunctionMode
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.kernels.fast_kernels import fast_kernel
 from snug.body.skinning import skin
-from snug.kernels.lanes import laid, unlaid
+from snug.kernels.lanes import from_lanes, to_lanes
 from snug.recipes.named import PAPER
 from snug.recipes.recipe import DEFAULT
 from snug.training.contact.cache import PARTS, ContactCache, Patch
@@ -114,7 +114,7 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
         *(ContactCache(patch, 2) for _ in range(3)),
         TensorContactCache(patch, 2, CPU),
     )
-    lanes = laid(x[:, None])
+    lanes = to_lanes(x[:, None])
     on = (contact, lanes, np.zeros_like(lanes), frames[:, None], rows[:, None], positions.numpy(), normals)
     assert fast.energy(*on).sum() > 0 and (fast.faces == still.faces).all()
     fast.energy(*on, walk=True)
@@ -194,10 +194,10 @@ def test_a_set_lies_where_it_is_told_to():
 
 def lane_by_lane(kernel, x):
     """Values (N,) and gradients (N, V, 3) that a kernel of lanes gives for x (N, V, 3)."""
-    lanes = laid(torch.as_tensor(x)[:, None])
+    lanes = to_lanes(torch.as_tensor(x)[:, None])
     gradients = np.zeros_like(lanes)
     values = kernel(lanes, gradients)
-    return (unlaid(found, len(x), 1)[:, 0].numpy() for found in (values, gradients))
+    return (from_lanes(found, len(x), 1)[:, 0].numpy() for found in (values, gradients))
 
 
 @pytest.mark.parametrize("count", [1, 16, 21])

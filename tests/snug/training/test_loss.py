@@ -11,10 +11,10 @@ import torch
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, StretchStVK
 from reference_sim.energies.bend_hinge.definition import dihedral_angles
 from snug.body.skinning import skin
-from snug.kernels.lanes import laid, unlaid
+from snug.kernels.lanes import from_lanes, to_lanes
 from snug.recipes.named import PAPER, PBNS_SPRINGS, RECIPES
 from snug.recipes.recipe import DEFAULT, Recipe
-from snug.training.contact.cache import EXACT, PARTS, ContactCache, Patch, quantised
+from snug.training.contact.cache import EXACT, PARTS, ContactCache, Patch, quantise
 from snug.training.losses.physics_loss import PhysicsLoss, evaluate, make_contact, static_terms
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -238,10 +238,10 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
         anchors.requery(int(frame), samples, skin_now[row])
 
     def energies():
-        lanes, rows = laid(x[:, None]), np.arange(2)[:, None]
+        lanes, rows = to_lanes(x[:, None]), np.arange(2)[:, None]
         gradients = np.zeros_like(lanes)
         values = anchors.energy(contact, lanes, gradients, frames[:, None], rows, skin_now, normals)
-        return (unlaid(taken, 2, 1)[:, 0].numpy() for taken in (values, gradients))
+        return (from_lanes(taken, 2, 1)[:, 0].numpy() for taken in (values, gradients))
 
     values, gradients = energies()
     points, directions = anchors.planes(frames, np.arange(2), skin_now, normals)
@@ -260,7 +260,7 @@ def test_remembered_anchors_lie_in_their_faces():
     exact = random.dirichlet([0.3, 0.3, 0.3], 5000)[:, 1:]
     exact[:3] = (0.5, 0.5), (1.0, 0.0), (0.0, 1.0)
     for count, kind in ((2**15 - 1, np.int16), (2**15, np.int32)):
-        faces, parts = quantised(np.full(5000, count - 1), exact, count)
+        faces, parts = quantise(np.full(5000, count - 1), exact, count)
         assert faces.dtype == kind and (faces == count - 1).all() and parts.dtype == np.uint8
     assert (parts.astype(int).sum(1) <= 255).all()
     assert np.abs(parts / PARTS - exact).max() <= 1.01 / 255

@@ -14,7 +14,7 @@ from snug.body.skinning import skin
 from snug.recipes.recipe import DEFAULT
 from snug.training.augmentation.mixed_clips import augment
 from snug.training.contact.cache import ContactCache, Patch
-from snug.training.contact.planes import FIRST_NEAR, FIRST_PROPAGATED, MARKED, NEAR, PROPAGATED
+from snug.training.contact.planes import FIRST_NEAR, FIRST_REACH, MARKED, NEAR, REACH
 from snug.training.optimisation_step import Trainer
 from tests.reference_sim.meshes import sphere
 from tests.snug.training.dressing import swaying, tube_dress
@@ -64,7 +64,7 @@ def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
         near = [
             other
             for other in searched
-            if (other < 30) == (frame < 30) and abs(other - frame) <= FIRST_PROPAGATED
+            if (other < 30) == (frame < 30) and abs(other - frame) <= FIRST_REACH
             and np.linalg.norm(body[other] - body[frame], axis=1).max() < 2.6 * FIRST_NEAR
         ]  # fmt: skip
         assert any((anchors.faces[frame] == anchors.faces[other]).all() for other in near), frame
@@ -164,7 +164,7 @@ def propagated(motions, frame, monkeypatch):
 
 def test_what_is_searched_is_propagated_around_it_but_to_no_other_motion(monkeypatch):
     slow = [swaying(30, degrees=1.0), swaying(11, name="slow", degrees=1.0)]
-    assert PROPAGATED == 3
+    assert REACH == 3
     assert propagated(slow, 28, monkeypatch) == [25, 26, 27, 28, 29]
     assert propagated(slow, 20, monkeypatch) == [17, 18, 19, 20, 21, 22, 23]
 
