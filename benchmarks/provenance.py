@@ -1,4 +1,4 @@
-"""Where numbers come from: the code, the machine and the versions, stated on every row."""
+"""Provenance of numbers: code, machine and versions, stated on every row."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PACKAGES = (
 
 
 def commit() -> str:
-    """The commit of the checkout, with "+changes" when tracked files differ; else the package version."""
+    """Return the commit of the checkout, "+changes" where tracked files differ; else the package version."""
     root = Path(__file__).resolve().parent.parent
 
     def git(*words: str) -> str:
@@ -33,7 +33,7 @@ def commit() -> str:
 
 
 def package_version(name: str) -> str:
-    """The installed version of a distribution, read without importing it; "absent" when it is not there."""
+    """Return the installed version of a distribution, read without importing it, or "absent"."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
@@ -41,7 +41,7 @@ def package_version(name: str) -> str:
 
 
 def processor_name() -> str:
-    """The name that the processor gives itself, or the architecture where it gives none."""
+    """Return the name that the processor gives itself, or the architecture where it gives none."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
@@ -52,14 +52,14 @@ def processor_name() -> str:
 
 
 def usable_cores() -> int:
-    """Processor cores that this process may use."""
+    """Return the number of processor cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def hardware(device: str = "cpu") -> dict[str, Any]:
-    """Processor, cores, memory [GB], system and, for cuda, the accelerator's name."""
+    """Return processor, cores, memory [GB], system and, for cuda, the accelerator's name."""
     facts: dict[str, Any] = {
         "processor": processor_name(),
         "cores": usable_cores(),
@@ -77,11 +77,11 @@ def hardware(device: str = "cpu") -> dict[str, Any]:
 
 
 def hardware_line(facts: dict[str, Any]) -> str:
-    """One short line for the hardware column of a row."""
+    """Return one short line for the hardware column of a row."""
     parts = (facts.get("accelerator"), f"{facts['processor']} ({facts['cores']} cores)")
     return ", ".join(part for part in parts if part)
 
 
 def versions() -> dict[str, str]:
-    """The installed version of each package that computes."""
+    """Return the installed version of each package that computes."""
     return {name: package_version(name) for name in PACKAGES}

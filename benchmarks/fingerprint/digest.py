@@ -11,7 +11,11 @@ from typing import Any
 
 
 def digest(value: Any) -> str:
-    """16 hexadecimal digits of a value: JSON, bytes, dataclasses, or anything with a plain repr inside."""
+    """Return 16 hexadecimal digits of a value: JSON, bytes, arrays, sets and dataclasses of these.
+
+    >>> digest({"b": 1, "a": [2]}) == digest({"a": [2], "b": 1})
+    True
+    """
     if not isinstance(value, bytes):
         value = json.dumps(value, sort_keys=True, default=_plain).encode()
     return hashlib.sha256(value).hexdigest()[:16]

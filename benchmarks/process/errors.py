@@ -4,9 +4,9 @@ from __future__ import annotations
 
 
 def one_line(error: BaseException) -> str:
-    """Return class and message of an error in one line.
+    r"""Return class and message of an error in one line.
 
-    >>> one_line(ValueError("too\\nlong"))
+    >>> one_line(ValueError("too\nlong"))
     'ValueError: too long'
     """
     return " ".join(f"{type(error).__name__}: {error}".split())

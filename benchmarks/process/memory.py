@@ -1,4 +1,4 @@
-"""What a process has taken of the memory, and what of it it no longer needs."""
+"""Memory of a process: its peak, and giving back what is free."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def peak_memory() -> float:
-    """Most memory that this process has held at once [MB].
+    """Return the most memory that this process has held at once [MB].
 
     Linux keeps it per memory image; ru_maxrss there would still hold what the parent had before this process
     loaded its own program.
@@ -27,8 +27,9 @@ def peak_memory() -> float:
 
 
 def give_back() -> None:
-    """Free what nobody holds, and let the C library return it to the system, where it is one that keeps it
-    (glibc). A simulation refers to itself: it stays until Python looks for such circles.
+    """Free unused memory, and let the C library return it to the system, where it keeps it (glibc).
+
+    A simulation refers to itself: it stays until Python looks for such circles.
     """
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None

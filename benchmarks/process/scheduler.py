@@ -15,7 +15,7 @@ class ClusterError(ValueError):
 
 
 def connect(address: str, *, seconds: float) -> Any:
-    """A client of the scheduler, which looks for one that it has lost for so long. Raises ClusterError."""
+    """Return a client of the scheduler, which looks for a lost one for so long. Raises ClusterError."""
     try:
         from distributed import Client
     except ImportError:
@@ -29,5 +29,5 @@ def connect(address: str, *, seconds: float) -> Any:
 
 
 def check_scheduler(address: str) -> None:
-    """Raises ClusterError where no scheduler answers."""
+    """Raise ClusterError unless a scheduler answers."""
     connect(address, seconds=FIRST).close()

@@ -35,7 +35,7 @@ MOST = 1000  # runs, of what takes no time
 
 @dataclass(frozen=True)
 class Reading:
-    """runs: [s] on the clock, of each run. complaint: why they cannot be believed, or empty."""
+    """Measured time: [s] of each of its `runs`, and a `complaint` where they cannot be believed."""
 
     runs: tuple[float, ...]
     complaint: str = ""
@@ -63,8 +63,9 @@ def one_thread() -> None:
 def clocked(
     run: Callable[[], Made], *, of: Callable[[Made], np.ndarray], least: float = 0.0
 ) -> tuple[Made, Reading]:
-    """What run() gives, and the time until all positions `of` it are there; called again, MOST times at most,
-    until `least` seconds are measured.
+    """Return the result of run(), and the time until all positions `of` it are there.
+
+    run() is called again, MOST times at most, until `least` seconds are measured.
     """
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
@@ -102,7 +103,7 @@ def clocked(
 
 @contextmanager
 def _compilations() -> Iterator[list[object]]:
-    """What numba compiles meanwhile; a kernel that it finds on disk is none."""
+    """Yield a list of what numba compiles meanwhile; a kernel that it finds on disk is not in it."""
     if "numba" not in sys.modules:
         yield []
         return

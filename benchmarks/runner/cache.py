@@ -1,6 +1,7 @@
-"""What is finished in a run's folder, and for what inputs, code, packages and files: so that it is not done
-twice.
+"""Finished results of a run's folder: which are reused, and which are stale.
 
+An entry names the inputs, code, packages and files that its outcome came of; where one of them is another
+now, the result is stale, and the task is done again.
 An entry is written whole after the files that it speaks of. A run that is killed therefore loses what it was
 at, and nothing else. It holds the digest of each of its files, and of itself: what is not as it was written
 is missing, and done again.
@@ -30,11 +31,15 @@ NOWHERE: Mapping[str, Any] = {}
 
 
 @dataclasses.dataclass(frozen=True)
-class Found:
-    """What the folder says of a task. state: one of STATES; why: what has changed, or what failed.
+class Cached:
+    """The cache entry of a task.
 
-    outcome: that of the entry, also of a stale one; None without one, or where its files are gone or damaged.
-    content: equal where what others read of it is. wanted: to be done now.
+    Attributes:
+        state: one of benchmarks.plan.plan.STATES.
+        why: name of the changed dependency, or of the failure.
+        outcome: that of the entry, also of a stale one; None without one, or where its files are gone.
+        content: digest of all that other tasks read of it.
+        wanted: whether the task is to be done now.
     """
 
     state: str
@@ -45,20 +50,20 @@ class Found:
 
 
 def dependencies(task: Task) -> dict[str, str]:
-    """Name -> digest or version of each input, file of source, package and data file, to say what changed."""
+    """Return name -> digest or version of each input, source file, package and data file of a task."""
     return {name: digest(value) for name, value in task.inputs.items()} | software(*task.modules)
 
 
 class Cache:
-    """The entries of one run's folder. only: the states whose tasks are done again; origin: see Outcome."""
+    """Entries of one run's folder. only: states whose tasks are done again; origin: see Outcome."""
 
     def __init__(
         self, folder: RunFolder, *, only: Iterable[str] = DEFAULT_ONLY, origin: Mapping[str, Any] = NOWHERE
     ) -> None:
         self.folder, self.only, self.origin = folder, frozenset(only), dict(origin)
 
-    def find(self, task: Task, others: Mapping[TaskId, Found]) -> Found:
-        """Whether the task is done, and what came of it. others: what is known of those that it reads."""
+    def find(self, task: Task, others: Mapping[TaskId, Cached]) -> Cached:
+        """Return the entry of a task. others: entries of the tasks that it reads."""
         state, why, entry = self._state(task, others)
         outcome = None
         if state != "missing":
@@ -67,10 +72,10 @@ class Cache:
             if state == "stale":
                 outcome = dataclasses.replace(outcome, remark=f"kept though {why} changed")
         content = "" if outcome is None else _content(entry)
-        return Found(state, why, outcome, content, wanted=state in self.only)
+        return Cached(state, why, outcome, content, wanted=state in self.only)
 
-    def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Found]) -> Found:
-        """Write the entry, after the files; gives what find() would."""
+    def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Cached]) -> Cached:
+        """Write the entry, after the files, and return it."""
         files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
         outcome = dataclasses.replace(outcome, digests=files, origin={**self.origin, **outcome.origin})
         entry = {
@@ -90,19 +95,19 @@ class Cache:
         with replacing(self.path(task)) as temporary:
             temporary.write_text(text, encoding="utf-8")
         state = "failed" if outcome.failed else "finished"
-        return Found(state, _why(outcome), outcome, _content(entry), wanted=False)
+        return Cached(state, _why(outcome), outcome, _content(entry), wanted=False)
 
     def forget_all(self) -> None:
-        """Everything is missing from now on, and no training goes on from where an earlier one stopped."""
+        """Remove all entries and checkpoints: everything is missing from now on."""
         shutil.rmtree(self.folder.cache, ignore_errors=True)
         for path in self.folder.models.rglob(".*.checkpoint.safetensors"):
             path.unlink()
 
     def path(self, task: Task) -> Path:
-        """cache/<kind>/<name>.json"""
+        """Return cache/<kind>/<name>.json in the run's folder."""
         return self.folder.cache / task.kind / f"{task.name}.json"
 
-    def _state(self, task: Task, others: Mapping[TaskId, Found]) -> tuple[str, str, dict[str, Any]]:
+    def _state(self, task: Task, others: Mapping[TaskId, Cached]) -> tuple[str, str, dict[str, Any]]:
         path = self.path(task)
         if not path.is_file():
             return "missing", "", {}
@@ -123,7 +128,7 @@ class Cache:
 
 
 def read_entry(path: Path) -> dict[str, Any] | None:
-    """An entry as it was written, or None where it is damaged or of another format."""
+    """Return an entry as it was written, or None where it is damaged or of another format."""
     try:
         entry = read_json(path)
     except ResultsError:
@@ -135,16 +140,17 @@ def read_entry(path: Path) -> dict[str, Any] | None:
 _KEPT = ("status", "reason", "failed", "result", "seconds")
 
 
-def _needs(task: Task, others: Mapping[TaskId, Found]) -> dict[str, str]:
-    """Content of each task that it reads; of one that is out of date, or about to be done, a text that no
-    entry has; empty for one of which there is nothing.
+def _needs(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
+    """Return the content of each task that a task reads.
+
+    Of one that is out of date, or about to be done, it is a text that no entry has; empty without an entry.
     """
-    found = {}
+    contents = {}
     for id in (*task.needs, *task.reads):
-        other = others.get(id, Found("missing", wanted=False))
+        other = others.get(id, Cached("missing", wanted=False))
         outdated = other.wanted or other.state == "stale"
-        found[" ".join(id)] = "out of date" if outdated else other.content
-    return found
+        contents[" ".join(id)] = "out of date" if outdated else other.content
+    return contents
 
 
 def _why(outcome: Outcome) -> str:
@@ -152,7 +158,7 @@ def _why(outcome: Outcome) -> str:
 
 
 def _content(entry: Mapping[str, Any]) -> str:
-    """Equal where the files are, and what the task says of them, whatever time it took."""
+    """Return a digest of the files and the outcome, whatever time they took."""
     return digest([entry["files"], entry["outcome"] | {"seconds": 0.0}])
 
 

@@ -1,7 +1,7 @@
 """What a worker of a cluster does: each task in a process, in the folder of the run.
 
-Everything here is called by cluster_executor, in the process of a worker of dask.distributed. A process stays for
-the next task of its run, and ends when nobody wants it any more.
+Everything here is called by cluster_executor, in the process of a worker of dask.distributed. A process stays
+for the next task of its run, and ends when nobody wants it any more.
 """
 
 from __future__ import annotations
@@ -123,9 +123,8 @@ def _why_unfit(assets: Path, here: Mapping[str, str], expected: Mapping[str, str
         remedy = "start it with --no-nanny, or with DASK_DISTRIBUTED__WORKER__DAEMON=False in its environment"
         return f"it may start no process: {remedy}"
     if not assets.is_file():
-        return (
-            f"it does not see the folder {assets.parent} of the run: give one that all machines see by --out"
-        )
+        remedy = "give one that all machines see by --out"
+        return f"it does not see the folder {assets.parent} of the run: {remedy}"
     names = sorted(here.keys() | expected.keys(), key=lambda name: (not name.startswith("package "), name))
     changed = [name for name in names if here.get(name) != expected.get(name)]
     if not changed:
@@ -162,7 +161,7 @@ def _give_back(process: _Process) -> None:
 
 
 def _do(process: _Process, task: Task, needed: Any, worker: Any, key: Any) -> Outcome:
-    """Return the outcome; end the process where the scheduler has cancelled the task, as when the command died."""
+    """Return the outcome; end the process where the scheduler has cancelled the task: the command died."""
     with ThreadPoolExecutor(1) as thread:
         future = thread.submit(process.do, task, needed)
         while not wait([future], WATCH).done:

@@ -1,4 +1,4 @@
-"""What is printed at the end of a run: what came out, in one screen, and what its reader should know."""
+"""The summary printed at the end of a run: results in one screen, and remarks on them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MEANS = ("garments", "speed")  # suites of which the methods' means are shown; o
 
 
 def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
-    """Means over scenes and seeds of each suite and method; counts of checks and cases; stage times."""
+    """Return means over scenes and seeds of each suite and method, counts of cases, and stage times."""
     parts = []
     for suite in MEANS:
         of_suite = [row for row in rows if row.suite == suite]
@@ -42,7 +42,7 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
 
 
 def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> list[str]:
-    """What whoever reads the times should know, in a line each. outdated: task -> what has changed since."""
+    """Return remarks for whoever reads the times, a line each. outdated: task -> what has changed since."""
     rows, lines = list(rows), []
     if reused:
         lines.append(f"{reused} results taken from earlier runs in this folder")
@@ -61,18 +61,18 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
 
 
 def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:
-    """Scenes of one garment together; of speed each by itself, as errors of different scenes do not add."""
+    """Return titled groups of rows: scenes of one garment together, scenes of speed each by itself."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(row.garment if suite == "garments" else row.scene, []).append(row)
     if suite != "garments":
-        return [(f"speed, {scene}", own) for scene, own in groups.items()]
+        return [(f"speed, {scene}", members) for scene, members in groups.items()]
     titled = []
-    for garment, own in groups.items():
+    for garment, members in groups.items():
         # Not those of long roll-outs and trainings, whose numbers have other names.
-        count = len({row.scene for row in own if row.metric == "energy/total"}) or 1
+        count = len({row.scene for row in members if row.metric == "energy/total"}) or 1
         of = f", {garment}" if len(groups) > 1 else ""
-        titled.append((f"garments{of}, mean of {count} scene{'s' * (count > 1)}", own))
+        titled.append((f"garments{of}, mean of {count} scene{'s' * (count > 1)}", members))
     return titled
 
 
@@ -87,10 +87,10 @@ def _table(title: str, rows: list[Row]) -> str:
     seeds = {method: len({row.seed for row in rows if row.method == method}) for method in methods}
 
     def shown(method: str, metric: str) -> str:
-        own = values.get((method, metric))
-        if not own:
+        known = values.get((method, metric))
+        if not known:
             return DASH
-        return f"{sum(own) / len(own):.4g}" + FEWER * (len(own) < seeds[method] * len(scenes[metric]))
+        return f"{sum(known) / len(known):.4g}" + FEWER * (len(known) < seeds[method] * len(scenes[metric]))
 
     columns = [(metric, head) for metric, head in COLUMNS if any((m, metric) in values for m in methods)]
     lines = [[title, *(head for _, head in columns), "status"]]

@@ -1,4 +1,4 @@
-"""What a run would do: every task, what its folder holds of it, and the time where it is known."""
+"""Dry run: every task, its cache entry, and its duration where it is known."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ from functools import partial
 
 from benchmarks.plan.plan import STATES, Plan, runs
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cache import Cache, Found
+from benchmarks.runner.cache import Cache, Cached
 from benchmarks.runner.loop import LEFT_OUT, Runner
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Outcome
 
 
 def describe(plan: Plan) -> str:
-    """The plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
+    """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
     only = STATES if plan.fresh else plan.only
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=only))
-    lines, wanted, cached = _head(plan), list[Found](), 0
+    lines, wanted, cached = _head(plan), list[Cached](), 0
     stage = ""
-    for task, found, outcome in runner.preview():
+    for task, entry, outcome in runner.preview():
         if task.stage != stage:
             stage = task.stage
             lines.append(stage)
-        lines.append(f"  {task.title}: {_verdict(found, outcome)}")
+        lines.append(f"  {task.title}: {_verdict(entry, outcome)}")
         if outcome is None:
-            wanted.append(found)
-        cached += outcome is not None and outcome is found.outcome
-    known = [found.outcome.seconds for found in wanted if found.outcome and found.outcome.seconds]
+            wanted.append(entry)
+        cached += outcome is not None and outcome is entry.outcome
+    known = [entry.outcome.seconds for entry in wanted if entry.outcome and entry.outcome.seconds]
     times = f", about {sum(known):.0f} s for the {len(known)} whose time is known" if known else ""
     return "\n".join([*lines, f"{len(wanted)} tasks to run{times}; {cached} cached"])
 
@@ -55,11 +55,11 @@ def _size(plan: Plan, garment: str) -> str:
     return f"{garment} of about {plan.preset.garment_vertices} vertices"
 
 
-def _verdict(found: Found, outcome: Outcome | None) -> str:
-    why = f" ({found.state}{': ' * bool(found.why)}{found.why})"
+def _verdict(entry: Cached, outcome: Outcome | None) -> str:
+    why = f" ({entry.state}{': ' * bool(entry.why)}{entry.why})"
     if outcome is None:
-        took = f", {found.outcome.seconds:.1f} s last time" if found.outcome and found.outcome.seconds else ""
+        took = f", {entry.outcome.seconds:.1f} s last time" if entry.outcome and entry.outcome.seconds else ""
         return f"run{why}{took}"
-    if outcome is found.outcome:
-        return "cached" + (why if found.state != "finished" else "")
+    if outcome is entry.outcome:
+        return "cached" + (why if entry.state != "finished" else "")
     return f"left out{why}" if outcome.reason == LEFT_OUT else f"skip ({outcome.reason})"

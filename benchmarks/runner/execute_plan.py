@@ -64,7 +64,7 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
 
 
 def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
-    """What executes the plan's tasks. Raises RunStopped where its cluster is gone."""
+    """Return the executor of the plan's tasks. Raises RunStopped where its cluster is gone."""
     if not plan.scheduler:
         return LocalExecutor(folder, assets, plan.workers)
     from benchmarks.process.scheduler import ClusterError
@@ -77,7 +77,7 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
 
 
 def check_roll_outs(plan: Plan) -> Assets | None:
-    """Compare every stored roll-out with its scene before anything is written; gives the assets that it made.
+    """Compare every stored roll-out with its scene before anything is written; return the assets made for it.
 
     Raises RollOutError.
     """
@@ -97,7 +97,7 @@ def check_roll_outs(plan: Plan) -> Assets | None:
 
 
 def accepted(row: Row) -> bool:
-    """Whether a row lets the run end with status 0; an extreme case may fail honestly, never silently."""
+    """Return whether a row lets the run end with status 0; an extreme case may fail with a reason."""
     return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
 
 

@@ -1,4 +1,4 @@
-"""What executes tasks: processes of this machine. A cluster stands behind the same four calls: cluster.py.
+"""Executor of tasks on this machine. cluster_executor has the same five calls.
 
 A task that raises, hangs, or whose process dies is an outcome, not an end of the run.
 """
@@ -28,20 +28,20 @@ class Executor(Protocol):
     """Executes tasks whose needs are there; gives outcomes, in any order."""
 
     def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
-        """Batches of untimed tasks, some side by side, until none is at work and none is ready.
+        """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
 
         ready: the next batch that can begin, None where there is none before further outcomes are known.
         bar: is told of progress.
         """
 
     def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
-        """Timed tasks begin, some side by side, each in the process that it names."""
+        """Prepare timed tasks, some side by side, each in the process that it names."""
 
     def alone(self, task: Task, needed: Needed) -> Outcome:
-        """A timed task, nothing at work beside it, in the process that it names."""
+        """Do a timed task, nothing at work beside it, in the process that it names."""
 
     def release(self, process: str) -> None:
-        """No other task wants that process."""
+        """End a process that no other task wants."""
 
     def close(self) -> None:
         """End everything."""
@@ -61,6 +61,7 @@ class LocalExecutor:
         self._crew: list[TaskProcess] = []
 
     def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
+        """Yield tasks with their outcomes until none is at work and none is ready."""
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
 
         def do(worker: TaskProcess, batch: Batch) -> None:
@@ -92,7 +93,7 @@ class LocalExecutor:
                 raise
 
     def _idle(self, at_work: Collection[TaskProcess]) -> TaskProcess:
-        """A worker that does nothing, a new one where all are at work."""
+        """Return a worker that does nothing, a new one where all are at work."""
         for worker in self._crew:
             if worker not in at_work:
                 return worker
@@ -100,6 +101,7 @@ class LocalExecutor:
         return self._crew[-1]
 
     def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
+        """Prepare timed tasks side by side; one that dies of it has that outcome at its turn."""
         self._dismiss()
         with ThreadPoolExecutor(self.workers) as threads:
             begun = {
@@ -115,23 +117,26 @@ class LocalExecutor:
                 raise
 
     def alone(self, task: Task, needed: Needed) -> Outcome:
+        """Return the outcome of a timed task."""
         self._dismiss()
         if trouble := self._troubles.pop(task.process, None):
             return trouble
         return call(self._process(task), perform, task, needed, seconds=task.deadline)
 
     def _process(self, task: Task) -> IsolatedProcess:
-        """The one that a timed task names."""
+        """Return the process that a timed task names."""
         if task.process not in self._named:
             context = Context(self.folder, task.assets(self.assets))
             self._named[task.process] = IsolatedProcess(begin_tasks, context)
         return self._named[task.process]
 
     def release(self, process: str) -> None:
+        """End the process of this name."""
         if process in self._named:
             self._named.pop(process).close()
 
     def close(self) -> None:
+        """End all processes."""
         self._dismiss()
         for name in list(self._named):
             self.release(name)

@@ -26,7 +26,7 @@ Outcomes = Mapping[TaskId, Outcome]
 
 
 def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
-    """The rows of everything that has an outcome; cells first, with remarks where an error does not fall."""
+    """Return the rows of all outcomes; cells first, with remarks where a gap does not fall."""
     by_id = {task.id: task for task in tasks}
     cells = [row for cell in plan.cells for row in rows_of_cell(cell, plan, by_id, outcomes)]
     others = [row for task in tasks for row in _rows_of_task(task, outcomes)]
@@ -92,8 +92,8 @@ def _rows(
     )  # fmt: skip
     if not metrics:
         yield base
-    for name, found in metrics.items():
-        value, uncertainty, moved = found if isinstance(found, (tuple, list)) else (found, None, ())
+    for name, measured in metrics.items():
+        value, uncertainty, moved = measured if isinstance(measured, (tuple, list)) else (measured, None, ())
         metric, why, ended = find_metric(name, outside), reason, status
         if name == "cost/frame" and not entry.timed:
             why = DECLARED
@@ -119,8 +119,9 @@ def _finite(number: float | None) -> float | None:
 
 
 def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str, float], str]:
-    """What clock and process give: cost/frame and its percentiles, cost/whole, cost/batch [ms], cost/spread
-    [%], cost/peak [MB]; and a remark on what did not go well.
+    """Return the costs that clock and process give, and a remark on what did not go well.
+
+    They are cost/frame and its percentiles, cost/whole, cost/batch [ms], cost/spread [%], cost/peak [MB].
 
     Times are medians of the repeats, but for those of inputs; these and the peak are of the first run. A
     frame's time is that of the whole run over the frames computed.
@@ -197,7 +198,7 @@ def not_learned(trained: TaskId | None, outcomes: Outcomes) -> str:
 
 
 def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
-    """The rows that a task gives by itself; one that --only leaves out has none."""
+    """Yield the rows that a task gives by itself; one that --only leaves out has none."""
     outcome = outcomes.get(task.id)
     if outcome is None or outcome.status == "skipped":
         return
@@ -208,7 +209,7 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:
-    """The rows, those of the reference with their differences to simulations that are as right.
+    """Return the rows, those of the reference with their differences to simulations that are as right.
 
     Of answers, and not of what has an uncertainty of its own. outside: where further metrics are declared.
     """
@@ -217,19 +218,19 @@ def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list
         if as_right(row.family, row.level) and row.status == "ok" and row.value is not None:
             others.setdefault((row.scene, row.metric), {})[row.method] = row.value
 
-    def told(row: Row) -> Row:
-        there = others.get((row.scene, row.metric), {})
+    def with_ensemble(row: Row) -> Row:
+        ensemble = others.get((row.scene, row.metric), {})
         answer = row.role == "reference" and find_metric(row.metric, outside).of == "answer"
-        if not answer or row.uncertainty is not None or row.value is None or not there:
+        if not answer or row.uncertainty is not None or row.value is None or not ensemble:
             return row
-        moved = tuple((twin, value - row.value) for twin, value in there.items())
+        moved = tuple((twin, value - row.value) for twin, value in ensemble.items())
         return dataclasses.replace(row, uncertainty=max(abs(change) for _, change in moved), moved=moved)
 
-    return [told(row) for row in rows]
+    return [with_ensemble(row) for row in rows]
 
 
 def remarked(rows: Iterable[Row]) -> list[Row]:
-    """The rows, with a reason at each gap above that of a coarser method of its family.
+    """Return the rows, with a reason at each gap above that of a coarser method of its family.
 
     More iterations or sweeps, or a smaller tolerance, need not lower it: a step's gap is judged from the
     method's own past, and cloth that folds otherwise has other minima. So a rise is no failure, but whoever
@@ -254,7 +255,7 @@ def remarked(rows: Iterable[Row]) -> list[Row]:
 
 
 def _curves(row: Row) -> tuple[str, ...]:
-    """The curves along which it should fall: by its level, or as the reference among its tolerances."""
+    """Return the families along which the gap should fall: by level, or by tolerance of the reference."""
     if row.role == "reference":
         return ("simulation-tolerance",)
     other = ("simulation-dt", "simulation-perturbed")  # another problem, another start
@@ -262,7 +263,7 @@ def _curves(row: Row) -> tuple[str, ...]:
 
 
 def rises(gaps: Iterable[Row]) -> dict[str, str]:
-    """For each method whose gap is above that of a coarser one of its family: a remark that says so.
+    """Return method -> remark where its gap is above that of a coarser one of its family.
 
     By more than two standard errors of both, where gaps are known from some of the frames.
     """
@@ -279,7 +280,7 @@ def rises(gaps: Iterable[Row]) -> dict[str, str]:
 
 
 def _fineness(row: Row) -> float:
-    """Grows with the effort: with iterations, and as a tolerance falls."""
+    """Return a key that grows with the effort: with iterations, and as a tolerance falls."""
     if row.role in ("reference", "reference-variant"):
         return -(REFERENCE_TOLERANCE if row.level is None else row.level)
     return row.level or 0.0

@@ -119,7 +119,7 @@ class RunLog:
         return assets
 
     def note_outcomes(self, runner: Runner) -> None:
-        """What became of ground truth, trainings and cells, and what the rows mean."""
+        """Note the outcomes of ground truth, trainings and cells."""
         of_kind: dict[str, dict[str, Any]] = {}
         for task in runner.tasks:
             outcome = runner.outcomes[task.id]
@@ -163,30 +163,33 @@ class RunLog:
 
 
 def now() -> str:
-    """The time as ISO text with its zone."""
+    """Return the time as ISO text with its zone."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
-    """What run.json says of the metrics, methods, scenes and cases of these rows: a report needs no other."""
+    """Return what run.json says of the metrics, methods, scenes and cases of these rows.
+
+    A report needs no other source.
+    """
     methods = {cell.method: cell.entry for cell in plan.cells}
     methods |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
-    found = {
+    declarations = {
         name: _metric(name, plan) for name in dict.fromkeys(r.metric for r in rows if r.method in methods)
     }
     order = {name: place for place, name in enumerate(declared(plan.metrics))}
-    ordered = sorted(found, key=lambda name: order.get(name, len(order)))
+    ordered = sorted(declarations, key=lambda name: order.get(name, len(order)))
     metrics = {
         name: _fields(metric, "name", "reference_tolerance", "declared_in")
         for name in ordered
-        if (metric := found[name]) is not None
+        if (metric := declarations[name]) is not None
     }
     without = ("name", "module", "declared_in", "files", "sizes", "options", "metrics")
     scenes = {
         scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
         for scene in plan.scenes
     }
-    said = {
+    of_methods = {
         name: {
             "label": entry.label, "description": entry.description, "role": entry.role,
             "family": entry.reporting.family, "level": entry.reporting.level, "base": entry.reporting.base,
@@ -196,7 +199,7 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     }  # fmt: skip
     for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
         if name in methods and not methods[name].timed:
-            said[name]["label"] = f"{methods[name].label or name} (declared time)"
+            of_methods[name]["label"] = f"{methods[name].label or name} (declared time)"
     cases = {
         case.name: {
             "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
@@ -204,7 +207,7 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         }
         for case in plan.cases
     }  # fmt: skip
-    return {"metrics": metrics, "methods": said, "scenes": scenes, "cases": cases}
+    return {"metrics": metrics, "methods": of_methods, "scenes": scenes, "cases": cases}
 
 
 def _metric(name: str, plan: Plan) -> Metric | None:

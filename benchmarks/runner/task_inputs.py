@@ -1,4 +1,4 @@
-"""What decides a task: the inputs and modules by which the cache knows it again."""
+"""Inputs and modules of each task: where one of them changes, its stored result is stale."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ ASSETS = "benchmarks.assets.assets"
 
 
 class TaskInputs:
-    """Of the tasks of one plan: by machine, body, garment, motion, scene and method."""
+    """Inputs of the tasks of one plan: by machine, body, garment, motion, scene and method."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan, self.preset = plan, plan.preset
 
     def machine(self, device: str = "cpu") -> dict[str, Any]:
-        """Times of another machine are not reused. device: of what trains; nothing else uses another."""
+        """Return the machine, as times of another are not reused. device: of a training; else cpu."""
         facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
         names = ("processor", "cores", "python", "accelerator")
         return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
@@ -35,10 +35,10 @@ class TaskInputs:
         return provenance.hardware(self.plan.device)
 
     def of_scene(self, scene: Scene, *modules: str) -> dict[str, Any]:
-        """inputs and modules of a task that builds the scene; what is measured in it is no part of it."""
-        said = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
-        del said["metrics"], said["counterpart"]
-        inputs = self.machine() | {"scene": said}
+        """Return inputs and modules of a task that builds the scene; its metrics are no part of them."""
+        declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
+        del declaration["metrics"], declaration["counterpart"]
+        inputs = self.machine() | {"scene": declaration}
         modules = (*modules, *modules_behind(scene))
         if not scene.dressed:
             return {"inputs": inputs, "modules": modules}
@@ -48,7 +48,7 @@ class TaskInputs:
         return {"inputs": inputs, "modules": (*modules, ASSETS)}
 
     def of_body(self, garment: str) -> dict[str, Any]:
-        """What the assets are made from."""
+        """Return the inputs that the assets are made from."""
         sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
         digests: dict[str, str] = {}
         if user_body := self.plan.inputs.body:
@@ -63,7 +63,7 @@ class TaskInputs:
         return f"{name} {digest(files[name])}" if name in files else name
 
     def simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:
-        """inputs and modules of a task that builds the scene, with those of the method."""
+        """Return inputs and modules of a task that builds the scene, with those of the method."""
         return {
             "inputs": of_scene["inputs"] | {"method": declared(entry)},
             "modules": (*of_scene["modules"], *modules_behind(entry)),
@@ -71,13 +71,13 @@ class TaskInputs:
 
 
 def declared(entry: Any) -> dict[str, Any]:
-    """What a scene, a method or a case declares, but for the words about it; of files their content."""
+    """Return what a scene, a method or a case declares, without descriptions; of files their content."""
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
-    said = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+    values = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
     if isinstance(entry, MethodEntry | Scene):  # a microbenchmark's are those that it writes
-        said["files"] = {path: digest_of_file(Path(path)) for path in said["files"]}
-    return said
+        values["files"] = {path: digest_of_file(Path(path)) for path in values["files"]}
+    return values
 
 
 def modules_behind(entry: Any) -> tuple[str, ...]:

@@ -37,7 +37,7 @@ class TaskProcess:
         self.warm: set[tuple[str, str]] = set()
 
     def forget(self) -> None:
-        """Let nothing of the batch before be there for the next."""
+        """Empty the memo, so that nothing of the batch before is there for the next."""
         try:
             if self.process.alive:
                 self.process.call(forget, seconds=None)
@@ -45,7 +45,7 @@ class TaskProcess:
             self._renew()
 
     def do(self, task: Task, needed: Needed) -> Outcome:
-        """The task's outcome; what it leaves in the memo is there for the next."""
+        """Return the task's outcome; what it leaves in the memo is there for the next."""
         outcome = self._warm(task) or call(self.process, perform, task, needed, seconds=task.deadline)
         if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
             self.process.close()
@@ -54,7 +54,7 @@ class TaskProcess:
         return outcome
 
     def _warm(self, task: Task) -> Outcome | None:
-        """What went wrong before the process could do its first task of this kind and module."""
+        """Return what went wrong before the first task of this kind and module, None where nothing did."""
         if (task.kind, task.modules[0]) in self.warm:
             return None
         trouble = call(self.process, task.warm_up, seconds=COMPILING)
@@ -63,7 +63,7 @@ class TaskProcess:
         return trouble
 
     def told(self) -> float:
-        """Progress since the last call, in seconds that it was expected to take."""
+        """Return the progress since the last call, in seconds that it was expected to take."""
         progress, seconds = self.progress, 0.0  # the worker may get another meanwhile
         while not progress.empty():
             seconds += progress.get()
@@ -71,7 +71,7 @@ class TaskProcess:
 
 
 def call(process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: Any) -> Any:
-    """function(*arguments) in that process, which is ended at the deadline; what goes wrong is an outcome."""
+    """Call function(*arguments) in a process, which is ended at the deadline; a failure is an outcome."""
     clock = time.perf_counter()
     try:
         return process.call(function, *arguments, seconds=seconds)
@@ -95,11 +95,13 @@ def begin_tasks(context: Context, progress: Any = None) -> None:
 
 
 def forget() -> None:
+    """Empty the memo of this process and give back its memory."""
     _context.memo.clear()
     give_back()
 
 
 def begin_task(task: Task, needed: Needed) -> None:
+    """Prepare a timed task before its turn."""
     for outcome in needed.values():
         _verify(outcome.digests)
     with suppress(Exception):  # it is raised again, and told, when it is the task's turn
@@ -107,6 +109,7 @@ def begin_task(task: Task, needed: Needed) -> None:
 
 
 def perform(task: Task, needed: Needed) -> Outcome:
+    """Return the outcome of a task, done in this process."""
     for outcome in needed.values():
         _verify(outcome.digests)
     context = dataclasses.replace(_context, tell=lambda units: _context.tell(units * task.unit_seconds))
@@ -119,7 +122,7 @@ def perform(task: Task, needed: Needed) -> Outcome:
 
 
 def _verify(digests: Mapping[str, str]) -> None:
-    """Raises RunStopped where a file is not as it was written: the next run makes it anew."""
+    """Raise RunStopped where a file is not as it was written: the next run makes it anew."""
     if damage := damaged(_context.folder.path, dict(digests.items() - _verified)):
         raise RunStopped(f"{damage} since this run wrote it")
     _verified.update(digests.items())

@@ -249,7 +249,7 @@ def test_a_damaged_file_is_made_anew_with_all_that_was_made_from_it(tmp_path):
     runner = run_tasks(tmp_path, *tasks)
     assert (tmp_path / "first.txt").read_text() == "first" and "network third" in runner.reused
     (tmp_path / "second.txt").unlink()
-    assert Cache(RunFolder(tmp_path)).find(tasks[1], runner.found).why == "second.txt is gone"
+    assert Cache(RunFolder(tmp_path)).find(tasks[1], runner.cached).why == "second.txt is gone"
     cache.path(tasks[2]).write_text("{")
     assert cache.find(tasks[2], {}).state == "missing"
 
@@ -290,7 +290,7 @@ def test_a_dry_run_decides_as_the_run_does(tmp_path):
         planned = {task.name for task, _, outcome in preview if outcome is None}
         runner = run_tasks(tmp_path, *tasks, only=only)
         blocked = "failed: cannot be run"
-        ran = {name for (_, name), found in runner.found.items() if not found.why.startswith(blocked)}
+        ran = {name for (_, name), found in runner.cached.items() if not found.why.startswith(blocked)}
         return planned, ran - {title.removeprefix("network ") for title in runner.reused}
 
     planned, done = planned_and_done(True, "stale", "missing")

@@ -84,7 +84,7 @@ def test_a_case_is_computed_once_and_again_when_it_declares_something_else(tmp_p
     off = dataclasses.replace(known, expected=(known.expected or 0.0) + 1e6, tolerance=1e-9)
     (failed,), runner = rows_of_cases(tmp_path, off)
     assert failed.status == "failed" and runner.reused == []
-    assert runner.found["case", known.name].state == "failed"
+    assert runner.cached["case", known.name].state == "failed"
     again, runner = rows_of_cases(tmp_path, off)
     assert [(r.status, r.reason) for r in again] == [("failed", failed.reason)] and len(runner.reused) == 1
     assert f"case {known.name}: cached (failed: " in describe(plan_of(tmp_path, cases=(off,)))
