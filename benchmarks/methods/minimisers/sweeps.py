@@ -48,8 +48,8 @@ class SweepSolver(ABC):
         """Sweep once."""
 
     def terminate(self, run: SweepRun) -> Stop | None:
-        """Stop after the last sweep, or the one that threw a vertex nowhere, or RUNAWAY_DISTANCE from where it began."""
-        # Written so that NaN is far too.
+        """Stop after the last sweep, or the one that threw a vertex RUNAWAY_DISTANCE from where it began."""
+        # Written so that NaN is as far.
         if run.iterations and not (np.abs(run.swept - run.x).max(initial=0.0) < RUNAWAY_DISTANCE):
             return Stop("diverged", f"sweep {run.iterations} threw a vertex far away")
         if run.iterations < self.max_iterations:
