@@ -260,7 +260,7 @@ def _potential(scene: BuiltScene) -> Potential:
 def spread_evenly(frames: range) -> Iterator[int]:
     """Yield all of the frames, in an order whose every beginning is spread evenly: halves, quarters.
 
-    >>> list(spread(range(2, 10)))
+    >>> list(spread_evenly(range(2, 10)))
     [2, 6, 4, 8, 3, 7, 5, 9]
     """
     count = len(frames)
