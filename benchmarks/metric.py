@@ -36,7 +36,7 @@ from benchmarks.results.row import USABLE, as_right
 if TYPE_CHECKING:
     from benchmarks.method import MethodEntry
     from benchmarks.scene import BuiltScene
-    from reference_sim import Trajectory
+    from reference_sim.trajectory.trajectory import Trajectory
 
 Made = TypeVar("Made")
 NUMBERS_OF = ("answer", "method", "machine")
@@ -225,7 +225,7 @@ def skinned(group: SceneRollOuts) -> np.ndarray | None:
     """Return the garment skinned to the poses as by the default recipe, (T,V,3) [m]; None without a body."""
     if group.scene.dressed is None:
         return None
-    from snug.networks.dressed_body import DressedBody
+    from snug.networks.dressed_body import DressedBody  # loads torch
     from snug.recipes.recipe import DEFAULT
 
     dressed, kept = group.scene.dressed, group.scene.kept

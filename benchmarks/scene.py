@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
     from benchmarks.assets.assets import Assets
     from benchmarks.presets import Preset
-    from reference_sim import Cloth, Obstacle
-    from reference_sim.energies import Energy
+    from reference_sim.cloth import Cloth
+    from reference_sim.energies.energy import Energy
+    from reference_sim.obstacle import Obstacle
     from snug.body.parametric_body import Body
     from snug.garments.garment import Garment
     from snug.motion.motion import Motion

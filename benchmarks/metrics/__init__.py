@@ -19,6 +19,7 @@ from functools import cache
 from types import ModuleType
 
 from benchmarks.metric import Metric
+from benchmarks.metrics.cost.microbenchmarks import METRICS as OF_MICROBENCHMARKS
 from benchmarks.registry import DeclarationError, by_name, load
 
 MODULES = {
@@ -64,15 +65,13 @@ def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
 
     Raises DeclarationError where a module declares no METRICS, or two declare one name.
     """
-    from benchmarks.metrics.cost.microbenchmarks import METRICS
-
     metrics: list[Metric] = []
     for name, module in modules().items():
         if not hasattr(module, "METRICS"):
             raise DeclarationError(f"{MODULE_OF[name]} declares no METRICS, a tuple of Metric")
         metrics += module.METRICS
     others = [replace(metric, declared_in=home) for home in outside for metric in load(home).METRICS]
-    return by_name("metric", (*metrics, *METRICS, *others))
+    return by_name("metric", (*metrics, *OF_MICROBENCHMARKS, *others))
 
 
 def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:

@@ -16,6 +16,9 @@ from benchmarks.performance.learning import dressed_body, training_motions
 from benchmarks.performance.microbenchmark import Settings
 from benchmarks.performance.training_step import PAPER_STEPS
 from reference_sim.files.atomic_files import replacing
+from snug.training.checkpoint import Checkpoint
+from snug.training.train_network import train_network
+from snug.training.validation import Validation
 
 HELD_OUT = "lunge"  # the training motion that is rolled out
 POINTS = 60  # of the curve
@@ -26,9 +29,6 @@ COLUMNS = ("step", "seconds", "loss", "validation", "strain", "bending", "gravit
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Train; return the end of the training and when the held-out energy came close to it, for good."""
-    from snug.training.checkpoint import Checkpoint
-    from snug.training.train_network import train_network
-    from snug.training.validation import Validation
 
     curve_path, path = settings.files
     path.parent.mkdir(parents=True, exist_ok=True)

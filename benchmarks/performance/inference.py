@@ -14,6 +14,8 @@ import numpy as np
 
 from benchmarks.performance.learning import dressed_body, training_motions
 from benchmarks.performance.microbenchmark import Settings
+from snug.networks.roll_out import prepare_frames
+from snug.training.train_network import untrained_model
 
 if TYPE_CHECKING:
     from snug.motion.motion import Motion
@@ -26,7 +28,6 @@ SWEPT = 48  # [MB] of other work between two cold frames: a solver, and what lie
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Return median, 95 % and least time of frames, the median of a cold one, and sizes of the network."""
-    from snug.training.train_network import untrained_model
 
     chosen = settings.chosen
     dressed, motions = dressed_body(vertices), training_motions()
@@ -56,7 +57,6 @@ def _frame_seconds(
 
     swept: [MB] read and written before each frame, off the clock.
     """
-    from snug.networks.roll_out import prepare_frames
 
     other = np.zeros(swept * 125_000)
     frames, seconds = prepare_frames(model, dressed, motion)(), []

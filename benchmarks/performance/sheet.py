@@ -10,8 +10,12 @@ import numpy as np
 
 from benchmarks.performance.microbenchmark import Settings
 from benchmarks.process.memory import peak_memory
-from reference_sim import Cloth, Material, Result
-from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.result import Result
 from reference_sim.time_step import State, TimeStepper
 
 FRAMES = 30

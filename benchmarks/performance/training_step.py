@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import itertools
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
+import torch
 
 from benchmarks.performance.learning import dressed_body, training_motions
 from benchmarks.performance.microbenchmark import Settings
 from benchmarks.presets import find_preset
-
-if TYPE_CHECKING:
-    from snug.training.optimisation_step import Trainer
+from snug.training.device import find_device
+from snug.training.optimisation_step import Trainer
 
 WARM_UP, BLOCK = 20, 20  # steps before the clock starts, and of each block that is timed
 PAPER_STEPS = find_preset("paper").steps_of("snug", "snug")
@@ -25,10 +24,6 @@ PAPER_STEPS = find_preset("paper").steps_of("snug", "snug")
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Return median and least time of a step over blocks, and the medians of its parts."""
-    import torch
-
-    from snug.training.device import find_device
-    from snug.training.optimisation_step import Trainer
 
     chosen, device = settings.chosen, find_device(settings.device)
     dressed, motions = dressed_body(vertices), training_motions()
@@ -62,7 +57,6 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
 
 def _timed(trainer: Trainer, blocks: int) -> tuple[list[float], dict[str, list[float]]]:
     """Return mean seconds a step of each block, whole and by part."""
-    import torch
 
     numbers = itertools.count()
 

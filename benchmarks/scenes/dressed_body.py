@@ -14,10 +14,17 @@ import numpy as np
 
 from benchmarks.assets.assets import Assets
 from benchmarks.scene import BuiltScene, Dressed, Scene
-from reference_sim import Cloth, Obstacle, Trajectory, simulate
-from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.obstacle import Obstacle
+from reference_sim.time_loop import simulate
+from reference_sim.trajectory.trajectory import Trajectory
 from snug.garments.garment import Garment
-from snug.motion.motion import Motion
+from snug.motion.motion import Motion, transition
 
 if TYPE_CHECKING:
     from snug.body.parametric_body import Body
@@ -96,7 +103,6 @@ def settled(
 
     Raises RuntimeError when the simulation of the approach did not stay finite.
     """
-    from snug.motion.motion import transition
 
     body = assets.body
     first = motion.poses[0]

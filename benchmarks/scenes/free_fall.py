@@ -13,9 +13,9 @@ import numpy as np
 
 from benchmarks.meshes import square_sheet
 from benchmarks.scene import BuiltScene, Scene
-from reference_sim import Cloth, Material
-from reference_sim.energies import Gravity
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.gravity import Gravity
+from reference_sim.material import GRAVITY, Material
 
 VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s]
 

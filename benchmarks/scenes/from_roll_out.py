@@ -11,9 +11,15 @@ from benchmarks.external.roll_out_files import StoredRollOut, read_rest_mesh, re
 from benchmarks.external.roll_out_option import RollOutError, RollOutOption
 from benchmarks.fingerprint.digest import digest
 from benchmarks.scene import BuiltScene, Scene
-from reference_sim import Cloth, Material, MeshError, Obstacle
-from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
+from reference_sim.cloth import Cloth, MeshError
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.files.mesh_files import METRES, to_metres_y_up
+from reference_sim.material import Material
+from reference_sim.obstacle import Obstacle
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.scene import BuiltScene, Dressed, Scene
 from benchmarks.scenes.dressed_body import declared_energies, settled, shape_of
-from reference_sim import Obstacle
+from reference_sim.obstacle import Obstacle
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, transition

@@ -6,8 +6,13 @@ import numpy as np
 
 from benchmarks.meshes import in_space, rectangle, sphere, square_sheet
 from benchmarks.scene import BuiltScene, Scene
-from reference_sim import Cloth, Material, Obstacle
-from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.obstacle import Obstacle
 
 RADIUS = 0.12  # [m]
 SIZE = 0.5  # [m]

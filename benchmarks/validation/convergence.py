@@ -7,7 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from reference_sim import Result, Trajectory
+from reference_sim.minimise.result import Result
+from reference_sim.trajectory.trajectory import Trajectory
 
 Solved = TypeVar("Solved", Result, Trajectory)
 

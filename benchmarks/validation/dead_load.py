@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim import Cloth
-from reference_sim.energies import Energy
+from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import Energy
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -22,9 +22,16 @@ import numpy as np
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes.dressed_body import declared_energies
-from reference_sim import Cloth, Potential, Trajectory
-from reference_sim.energies import ContactPenalty, Energy, Gravity, Inertia
+from reference_sim.cloth import Cloth
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.inertia import Inertia
 from reference_sim.minimise.methods import make_minimiser
+from reference_sim.potential import Potential
+from reference_sim.trajectory.trajectory import Trajectory
+from snug.networks.dressed_body import DressedBody
+from snug.recipes.recipe import DEFAULT
 
 ROUNDS, ITERATIONS, MEMORY = 40, 50, 20
 FALL = 1e-4  # a round that lowers the sum by a smaller share is the last
@@ -67,8 +74,6 @@ class DirectOptimisation(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Lay the frames out as one cloth and start from skinning. Raises ValueError for other terms."""
-        from snug.networks.dressed_body import DressedBody
-        from snug.recipes.recipe import DEFAULT
 
         assert scene.dressed is not None
         if _identity(scene.energies) != _identity(declared_energies(scene.cloth)):

@@ -12,6 +12,9 @@ from benchmarks.method import Method
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
 from reference_sim.trajectory.trajectory import Trajectory
+from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import prepare_batch, prepare_frame_inputs, prepare_roll_out, roll_out
+from snug.networks.trained_model import TrainedModel
 
 
 @dataclass
@@ -28,9 +31,6 @@ class Network(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Read the model, make the features and warm up. Not timed."""
-        from snug.networks.dressed_body import DressedBody
-        from snug.networks.roll_out import prepare_roll_out
-        from snug.networks.trained_model import TrainedModel
 
         assert scene.dressed is not None
         self.model = TrainedModel.load(self.path).rounded(self.precision)
@@ -47,7 +47,6 @@ class Network(Method):
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Return a function of the frame that makes features and joint transforms."""
-        from snug.networks.roll_out import prepare_frame_inputs
 
         assert scene.dressed is not None
         return prepare_frame_inputs(
@@ -56,13 +55,11 @@ class Network(Method):
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """Return a function that computes `copies` bodies in this motion at once, (T, copies, V, 3) [m]."""
-        from snug.networks.roll_out import prepare_batch
 
         return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
 
     def quasi_static(self) -> Trajectory:
         """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock."""
-        from snug.networks.roll_out import roll_out
 
         return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
 

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.method import posed_body
+from benchmarks.methods.networks.collision_post_processing import MARGIN, CollisionPostProcessing
 from benchmarks.methods.networks.network import Network
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
-from reference_sim import Trajectory
+from reference_sim.trajectory.trajectory import Trajectory
 
 WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 
@@ -22,7 +23,6 @@ class PostProcessedNetwork(Network):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Pose the body, compile the post-processing and prepare the network. Not timed."""
-        from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 
         assert scene.dressed is not None and scene.obstacle is not None
         body, garment = scene.dressed.body, scene.dressed.garment
@@ -36,7 +36,6 @@ class PostProcessedNetwork(Network):
 
     def run(self) -> Trajectory:
         """Roll out, each frame post-processed."""
-        from benchmarks.methods.networks.collision_post_processing import MARGIN
 
         cleaned = super().run()
         facts = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}

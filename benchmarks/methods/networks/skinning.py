@@ -13,7 +13,10 @@ import numpy as np
 
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from reference_sim import Trajectory
+from reference_sim.trajectory.trajectory import Trajectory
+from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import collect_frames, prepare_frame_inputs, prepare_skinned_frames
+from snug.recipes.recipe import DEFAULT
 
 
 class Skinning(Method):
@@ -21,9 +24,6 @@ class Skinning(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Smooth the weights and make the joint transforms. Not timed."""
-        from snug.networks.dressed_body import DressedBody
-        from snug.networks.roll_out import prepare_skinned_frames
-        from snug.recipes.recipe import DEFAULT
 
         assert scene.dressed is not None
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
@@ -33,7 +33,6 @@ class Skinning(Method):
 
     def run(self) -> Trajectory:
         """Skin all frames."""
-        from snug.networks.roll_out import collect_frames
 
         positions, seconds = collect_frames(self.frames(), np.arange(self.motion.frames))
         return Trajectory(
@@ -46,7 +45,6 @@ class Skinning(Method):
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Return a function of the frame that makes joint transforms."""
-        from snug.networks.roll_out import prepare_frame_inputs
 
         return prepare_frame_inputs(None, self.dressed, self.motion, self.betas)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.scene import BuiltScene
-from reference_sim import Trajectory
 from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
 from reference_sim.minimise.compiled.sliding_obstacle import SlidingObstacle
+from reference_sim.trajectory.trajectory import Trajectory
 
 
 class FastSimulation(Simulation):

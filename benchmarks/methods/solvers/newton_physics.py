@@ -24,8 +24,9 @@ import numpy as np
 
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from reference_sim import Cloth, Trajectory
+from reference_sim.cloth import Cloth
 from reference_sim.material import GRAVITY
+from reference_sim.trajectory.trajectory import Trajectory
 
 FAR = 100.0  # [m] from the origin, where a vertex has flown away
 

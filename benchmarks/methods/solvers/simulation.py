@@ -8,7 +8,8 @@ from typing import Any
 
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from reference_sim import Trajectory, simulate
+from reference_sim.time_loop import simulate
+from reference_sim.trajectory.trajectory import Trajectory
 
 
 @dataclass

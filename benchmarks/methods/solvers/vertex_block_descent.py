@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
 from benchmarks.methods.solvers.simulation import Simulation
 
 
 def make(*, models: Path, seed: int, iterations: int) -> Simulation:
     """Make a simulation whose every step is `iterations` sweeps of vertex block descent."""
-    from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
 
     return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})

@@ -11,20 +11,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from benchmarks.method import Method, posed_body
+from benchmarks.methods.solvers.fast_lbfgs import FastSimulation
+from benchmarks.methods.solvers.residual_transport import ResidualTransport
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
-from reference_sim import Potential, Trajectory
+from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
 from reference_sim.minimise.methods import Minimiser, make_minimiser
 from reference_sim.minimise.result import Result
-
-if TYPE_CHECKING:
-    from benchmarks.methods.solvers.residual_transport import ResidualTransport
+from reference_sim.potential import Potential
+from reference_sim.trajectory.trajectory import Trajectory
+from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
+from snug.networks.trained_model import TrainedModel
+from snug.recipes.recipe import DEFAULT
 
 SKINNING = "skinning"
 SHARE = 0.6  # of the last residual
@@ -114,10 +119,6 @@ class WarmStarted(Method):
 
     def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
         """Return a function that yields world positions (V, 3) [m], frame after frame, at each call."""
-        from snug.networks.dressed_body import DressedBody
-        from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
-        from snug.networks.trained_model import TrainedModel
-        from snug.recipes.recipe import DEFAULT
 
         assert scene.dressed is not None
         motion, betas, before = scene.dressed.motion, scene.dressed.betas, scene.dressed.before
@@ -129,9 +130,6 @@ class WarmStarted(Method):
         return prepare_frames(model, dressed, motion, betas, earlier=before)
 
     def _carry(self, scene: BuiltScene) -> ResidualTransport:
-        from benchmarks.methods.solvers.residual_transport import ResidualTransport
-        from snug.networks.dressed_body import DressedBody
-        from snug.recipes.recipe import DEFAULT
 
         assert scene.dressed is not None
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
@@ -147,9 +145,6 @@ def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -
     options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
     path, fast = model_path(models, guess, seed), solver == "fast-lbfgs"
     if fast:
-        from benchmarks.methods.solvers.fast_lbfgs import FastSimulation
-        from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
-
         return WarmStarted(guess, path, options | {"method": CompiledLBFGS}, fast, FastSimulation(options={}))
     options |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
     return WarmStarted(guess, path, options)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.metric import Metric
+from snug.motion.motion import nearest_pose
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
@@ -30,7 +31,6 @@ METRICS = (
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return median and 95th percentile of these distances over frames [degrees]."""
-    from snug.motion.motion import nearest_pose
 
     dressed, known = roll_out.scene.dressed, roll_out.training_poses
     if dressed is None or known is None:

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from benchmarks.metric import Metric, skinned
 from benchmarks.metrics.energies.replayed_step import copied_terms
+from reference_sim.energies.energy import Step
 from reference_sim.energies.gravity import Gravity
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut, SceneRollOuts
     from benchmarks.scene import BuiltScene
-    from reference_sim.energies import Energy
+    from reference_sim.energies.energy import Energy
 
 FIRST_FULL_FRAME = 2
 
@@ -90,7 +91,6 @@ def energy_series(
 def _terms_at(
     scene: BuiltScene, terms: Sequence[Energy], positions: NDArray[np.float64], frame: int
 ) -> dict[str, float]:
-    from reference_sim.energies import Step
 
     x = np.ascontiguousarray(positions[frame])
     previous, before = positions[max(frame - 1, 0)], positions[max(frame - 2, 0)]

@@ -39,7 +39,7 @@ from benchmarks.metrics.surface.curvature import boundary_mask, mean_curvature
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut, SceneRollOuts
     from benchmarks.scene import BuiltScene
-    from reference_sim import Potential
+    from reference_sim.potential import Potential
 
 Floats = NDArray[np.float64]
 
@@ -209,7 +209,7 @@ def optimality(
         The numbers of each sampled frame; nan where a frame has no finite energy.
     """
     from reference_sim.minimise.descent import mean_weight
-    from reference_sim.minimise.lbfgs import LBFGS
+    from reference_sim.minimise.lbfgs import LBFGS  # loads numba
 
     frames = _judged(scene, positions)
     numbers, potential = Optimality(judged=len(frames)), _potential(scene)
@@ -252,7 +252,7 @@ def _judged(scene: BuiltScene, positions: Floats) -> range:
 
 
 def _potential(scene: BuiltScene) -> Potential:
-    from reference_sim import Potential
+    from reference_sim.potential import Potential  # loads numba
 
     return Potential(copied_terms(scene))
 

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_sim.energies.energy import Step
+from reference_sim.energies.inertia import Inertia
+
 if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
-    from reference_sim import Potential
-    from reference_sim.energies import Energy, Step
+    from reference_sim.energies.energy import Energy
+    from reference_sim.potential import Potential
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +25,6 @@ def copied_terms(scene: BuiltScene) -> list[Energy]:
     A term may remember the step before, and read another term: so all are copied together, and what one of
     them knows of another is the other's copy. Arrays are shared with the scene's.
     """
-    from reference_sim.energies import Inertia
 
     declared = (*scene.energies, Inertia(scene.cloth, scene.dt))
     twins = {id(term): copy.copy(term) for term in declared}
@@ -54,7 +56,6 @@ def freeze_step(
 
 def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats | None = None) -> Step:
     """Return the step from frame - 1 of positions (T,V,3) [m] to `frame`, as a solver is given it."""
-    from reference_sim.energies import Step
 
     previous = positions[frame - 1]
     velocity = (previous - positions[max(frame - 2, 0)]) / scene.dt

@@ -36,8 +36,8 @@ from reference_sim.material import GRAVITY
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut, SceneRollOuts
     from benchmarks.scene import BuiltScene
-    from reference_sim import Potential
-    from reference_sim.energies import Step
+    from reference_sim.energies.energy import Step
+    from reference_sim.potential import Potential
 
 Floats = NDArray[np.float64]
 
@@ -148,7 +148,7 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
     Raises:
         ValueError: another scene, or a trajectory too short.
     """
-    from reference_sim import Potential
+    from reference_sim.potential import Potential  # loads numba
 
     if len(scene.cloth.pins):
         raise ValueError(f"scene {scene.name}: laws of a cloth with pins need the pins' forces")

@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.metric import Metric
 from benchmarks.metrics.motion.hem import AFTER, HemMotion, stop_frame
 from benchmarks.metrics.surface.distances import rms
+from snug.body.skeleton import rotation_matrices
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
@@ -82,7 +83,6 @@ def hem_motion(reference: RollOut) -> HemMotion | None:
     group, dressed = reference.group, reference.scene.dressed
     if dressed is None or group.quasi_static is None:
         return None
-    from snug.body.skeleton import rotation_matrices
 
     motion = dressed.motion
     return HemMotion(

@@ -18,7 +18,7 @@ from benchmarks.metrics.surface import distances as geometry
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
-    from reference_sim import Cloth
+    from reference_sim.cloth import Cloth
 
 AFTER = (1, 10, 30)  # frames after the glitch
 MM = 1e3
@@ -94,7 +94,8 @@ def judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None
 
 def strains(cloth: Cloth, positions: np.ndarray) -> np.ndarray:
     """Return the membrane energy of positions (T,V,3) [m], (T,) [J]; infinite where one is not finite."""
-    from reference_sim.energies import StretchStVK
+
+    from reference_sim.energies.stretch_stvk.definition import StretchStVK  # loads numba
 
     term, finite = StretchStVK(cloth), np.isfinite(positions).all(axis=(1, 2))
     return np.array(

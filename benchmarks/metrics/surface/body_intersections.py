@@ -54,7 +54,7 @@ def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[n
     """
     import igl
 
-    from reference_sim.geometry.surface import vertex_normals
+    from reference_sim.geometry.surface import vertex_normals  # loads numba
 
     points = np.asfortranarray(x + OFFSET * vertex_normals(x, faces))
     return np.asarray(igl.fast_winding_number(np.asfortranarray(x), faces, points)).ravel() > 0.5

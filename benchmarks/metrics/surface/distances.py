@@ -13,7 +13,7 @@ from benchmarks.metric import Metric
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut, SceneRollOuts
-    from reference_sim import Obstacle
+    from reference_sim.obstacle import Obstacle
 
 Floats = NDArray[np.float64]
 

@@ -37,7 +37,7 @@ METRICS = (
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return changes of edges and areas [%], folds [degrees] and self-intersections [%]."""
-    from benchmarks.metrics.surface.self_intersections import intersecting_share
+    from benchmarks.metrics.surface.self_intersections import intersecting_share  # loads numba
 
     cloth, x = roll_out.scene.cloth, roll_out.positions[roll_out.judged]
     return {

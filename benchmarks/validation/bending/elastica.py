@@ -17,8 +17,14 @@ from scipy.integrate import solve_bvp
 from benchmarks.meshes import FAMILIES, ROW, in_space, rectangle
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
-from reference_sim import Cloth, Material, Potential, minimise
-from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.potential import Potential
 
 K = 1e-3  # [J] hinge stiffness
 # 330 N/m: at Gamma = 1000 the strip weighs 0.9 N per metre of width, and stretches by 0.3 %.

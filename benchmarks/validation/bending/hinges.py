@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.meshes import in_space, random_rotation, right_grid
-from reference_sim import Cloth, Material, Potential
-from reference_sim.energies import BendHinge
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge, dihedral_angles
+from reference_sim.material import Material
+from reference_sim.potential import Potential
 
 COLUMNS, ROWS, CELL, DEPTH = 6, 4, 0.1, 0.7
 
@@ -60,6 +62,5 @@ def _folded(fold: float) -> tuple[Cloth, np.ndarray]:
 
 def _signs(cloth: Cloth) -> np.ndarray:
     """Return the sign of each hinge's angle where the strip is folded by a small negative angle, (H,)."""
-    from reference_sim.energies.bend_hinge.definition import dihedral_angles
 
     return np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))

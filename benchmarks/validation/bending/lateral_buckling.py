@@ -14,8 +14,12 @@ import scipy.sparse.linalg as spla
 from benchmarks.meshes import ROW, in_space, rectangle
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
-from reference_sim import Cloth, Material, Potential, minimise
-from reference_sim.energies import BendHinge, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.potential import Potential
 
 K = 1e-5  # [J] hinge stiffness: so small that the strip hardly sags in its own plane before it buckles
 MATERIAL = Material(poisson_ratio=0.3, bending_stiffness=K)

@@ -20,8 +20,10 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from benchmarks.meshes import ROW, in_space, rectangle
-from reference_sim import Cloth, Material, Potential
-from reference_sim.energies import BendHinge
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.material import Material
+from reference_sim.potential import Potential
 
 STIFFNESS = 1.0  # [J] k; every result is divided by it
 

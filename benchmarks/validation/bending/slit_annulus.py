@@ -16,8 +16,12 @@ import numpy as np
 from benchmarks.meshes import rectangle
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
-from reference_sim import Cloth, Material, Potential, minimise
-from reference_sim.energies import BendHinge, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.potential import Potential
 
 INNER, OUTER, LOAD = 6.0, 10.0, 0.8
 YOUNG, THICKNESS = 21e6, 0.03

@@ -6,10 +6,15 @@ import numpy as np
 
 from benchmarks.meshes import in_space, jittered_patch
 from benchmarks.validation.convergence import demand_converged
-from reference_sim import Cloth, Material, Obstacle, Potential, minimise
-from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
-from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS, ContactPenalty
+from reference_sim.energies.energy import Step
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.obstacle import Obstacle
+from reference_sim.potential import Potential
 
 
 def penalty_depth() -> float:

@@ -12,11 +12,20 @@ import numpy as np
 
 from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.convergence import demand_converged, fitted_order
-from reference_sim import Cloth, Material, Potential, minimise, simulate
-from reference_sim.energies import ContactPenalty, Gravity, Step, StretchStVK
-from reference_sim.energies.contact_penalty.definition import DEFAULT_MARGIN, DEFAULT_STIFFNESS
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.contact_penalty.definition import (
+    DEFAULT_MARGIN,
+    DEFAULT_STIFFNESS,
+    ContactPenalty,
+)
+from reference_sim.energies.energy import Step
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
+from reference_sim.minimise.methods import minimise
 from reference_sim.obstacle import Planes
+from reference_sim.potential import Potential
+from reference_sim.time_loop import simulate
 
 RADIUS = 1.0  # [m] of the sphere
 START = 0.3  # [rad] from the top

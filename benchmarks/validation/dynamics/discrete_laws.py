@@ -12,8 +12,17 @@ from benchmarks.scene import Scene
 from benchmarks.scenes import free_fall as fall
 from benchmarks.scenes import hanging_sheet
 from benchmarks.validation.convergence import demand_converged
-from reference_sim import Cloth, Material, Potential, Trajectory, minimise, simulate
-from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.inertia import Inertia
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.potential import Potential
+from reference_sim.time_loop import simulate
+from reference_sim.trajectory.trajectory import Trajectory
 
 DT = 1.0 / 30.0
 SPACING = 0.015  # [m] of the sheet that takes one step

@@ -10,7 +10,7 @@ from benchmarks.metrics.surface.curvature import curvature_series
 from benchmarks.scenes import hanging_sheet
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dynamics.discrete_laws import HANGING
-from reference_sim import simulate
+from reference_sim.time_loop import simulate
 
 CELLS, FRAMES = 10, 45
 FINER = 2  # times as many cells along each side

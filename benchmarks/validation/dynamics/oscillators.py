@@ -14,9 +14,11 @@ from scipy.optimize import brentq, fsolve
 
 from benchmarks.meshes import random_rotation
 from benchmarks.validation.convergence import demand_converged, fitted_order
-from reference_sim import Cloth, Material, simulate
-from reference_sim.energies import Gravity, StretchStVK
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
+from reference_sim.time_loop import simulate
 
 SOFT = Material(young_modulus=7e3)
 HEIGHT, BASE = 0.5, 0.4  # [m] of the triangle

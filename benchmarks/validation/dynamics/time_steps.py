@@ -17,9 +17,17 @@ from benchmarks.scenes import hanging_sheet
 from benchmarks.validation.contact.round_bodies import RoundBody
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from benchmarks.validation.dynamics.discrete_laws import HANGING, stretched_membrane
-from reference_sim import Cloth, Material, Potential, minimise, simulate
-from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, Step, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.energy import Energy, Step
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.methods import minimise
 from reference_sim.obstacle import Planes
+from reference_sim.potential import Potential
+from reference_sim.time_loop import simulate
 
 VISCOSITY = 0.25  # [N s/m] of an edge: waves faster than about 100 rad/s do not swing
 BALL = 0.1  # [m] radius

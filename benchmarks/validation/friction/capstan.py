@@ -19,10 +19,13 @@ import numpy as np
 from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.contact.round_bodies import DRUM, SLACK, RoundBody, wrapped
 from benchmarks.validation.convergence import demand_converged, fitted_order
-from reference_sim import Cloth, Material, simulate
-from reference_sim.energies import ContactFriction, ContactPenalty, StretchStVK
-from reference_sim.energies.contact_penalty.definition import DEFAULT_MARGIN
+from reference_sim.cloth import Cloth
+from reference_sim.energies.contact_friction import ContactFriction
+from reference_sim.energies.contact_penalty.definition import DEFAULT_MARGIN, ContactPenalty
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
 from reference_sim.obstacle import Planes
+from reference_sim.time_loop import simulate
 
 HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep in the margin as on a body
 PULL = 2.0  # [N/m], about

@@ -16,10 +16,14 @@ import numpy as np
 from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.contact.plane import box
 from benchmarks.validation.convergence import demand_converged
-from reference_sim import Cloth, Material, Obstacle, simulate
-from reference_sim.energies import ContactFriction, ContactPenalty, Gravity, StretchStVK
-from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.contact_friction import ContactFriction
+from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS, ContactPenalty
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
+from reference_sim.obstacle import Obstacle
+from reference_sim.time_loop import simulate
 
 MU = 0.5
 SPEED = 0.02  # [m/s] of the smoothing

@@ -27,9 +27,9 @@ from scipy.optimize import brentq
 from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.friction.plane import MU, slid
 from benchmarks.validation.membrane.hanging_strip import MATERIAL, WEIGHT, string_stretch
-from reference_sim import Cloth, Material
-from reference_sim.energies import StretchStVK
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
 
 SOFT = Material(young_modulus=7e3)  # a tenth of cotton's: the point breaks loose after 14 steps, and swings
 REACH, WIDTH = 0.3, 0.1  # [m] of the triangle

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.meshes import in_space, jittered_patch, random_rotation
-from reference_sim import Cloth, Material, Potential
-from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.potential import Potential
 
 STRETCH, SHEAR = 1.3, 0.4
 

@@ -12,9 +12,12 @@ from scipy.optimize import brentq
 
 from benchmarks.meshes import in_space, right_grid
 from benchmarks.validation.convergence import demand_converged, fitted_order
-from reference_sim import Cloth, Material, Potential, minimise
-from reference_sim.energies import Gravity, StretchStVK
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.potential import Potential
 
 E2 = 32.965  # [N/m] membrane modulus
 THICKNESS = 0.47e-3

@@ -12,12 +12,16 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import skfem
 
 from benchmarks.meshes import in_space, jittered_patch
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from benchmarks.validation.dead_load import DeadLoad
-from reference_sim import Cloth, Material, Potential, minimise
-from reference_sim.energies import StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.potential import Potential
 
 CELLS = (8, 16, 32)
 
@@ -54,7 +58,6 @@ def gradient_order() -> float:
 
 @cache
 def _errors(cells: int) -> tuple[float, float]:
-    import skfem
 
     material = Material()
     lam, mu = material.lame_lambda, material.lame_mu

@@ -16,8 +16,11 @@ import numpy as np
 import torch
 
 from benchmarks.validation.case import Measurement
-from reference_sim import Potential, Result, minimise
-from reference_sim.energies import BendHinge, Energy
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.energy import Energy
+from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.result import Result
+from reference_sim.potential import Potential
 
 RELATIVE_RESIDUAL = (
     1e-6  # of the relative residual: largest gradient component over the mean weight of a vertex

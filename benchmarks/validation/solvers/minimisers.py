@@ -6,8 +6,15 @@ import numpy as np
 
 from benchmarks.meshes import in_space, jittered_patch, right_grid
 from benchmarks.validation.convergence import demand_converged, fitted_order
-from reference_sim import Cloth, Material, Potential, minimise
-from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchStVK
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.inertia import Inertia
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.minimise.methods import minimise
+from reference_sim.potential import Potential
 
 LBFGS_STEPS = 60
 TWO_CYCLE = 1.0886617668

@@ -22,18 +22,17 @@ from benchmarks.validation.solvers.convergence_check import (
     solve_and_check,
 )
 from benchmarks.validation.stress.initial_conditions import INITIAL_POSITIONS, REST_SHAPES, initial_velocities
-from reference_sim import Cloth, Material, Obstacle, Potential
-from reference_sim.energies import (
-    AreaBarrier,
-    BendHinge,
-    ContactPenalty,
-    Energy,
-    Gravity,
-    Inertia,
-    Step,
-    StretchStVK,
-)
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.area_barrier import AreaBarrier
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.energy import Energy, Step
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.inertia import Inertia
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
+from reference_sim.obstacle import Obstacle
+from reference_sim.potential import Potential
 
 CELLS, SIZE, DT = 8, 0.4, 1.0 / 30.0
 PINS = {"corners": (0, CELLS), "none": (), "side": tuple(range(CELLS + 1))}

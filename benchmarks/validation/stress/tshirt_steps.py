@@ -17,12 +17,18 @@ from benchmarks.validation.solvers.convergence_check import (
 )
 from benchmarks.validation.stress.sheet_steps import DT, prepared
 from benchmarks.validation.stress.sheet_steps import warm_up as warm_up  # that of its cases too
-from reference_sim import Cloth, Material, Obstacle
-from reference_sim.energies import BendHinge, ContactPenalty, Energy, Gravity, StretchStVK
-from reference_sim.material import GRAVITY
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY, Material
+from reference_sim.obstacle import Obstacle
+from snug.body.parametric_body import Body
+from snug.garments.templates import tailor_tshirt
 
 if TYPE_CHECKING:
-    from snug.body.parametric_body import Body
     from snug.garments.garment import Garment
 
 VERTICES = 300
@@ -83,8 +89,6 @@ def shirt_step(
 
 @lru_cache(maxsize=1)
 def _dressed() -> tuple[Body, Garment]:
-    from snug.body.parametric_body import Body
-    from snug.garments.templates import tailor_tshirt
 
     body = Body.load()
     return body, tailor_tshirt(body, vertices=VERTICES)
