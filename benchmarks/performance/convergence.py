@@ -29,7 +29,6 @@ COLUMNS = ("step", "seconds", "loss", "validation", "strain", "bending", "gravit
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Train; return the end of the training and when the held-out energy came close to it, for good."""
-
     curve_path, path = settings.files
     path.parent.mkdir(parents=True, exist_ok=True)
     checkpoint = path.with_name(f".{path.stem}.checkpoint.safetensors")

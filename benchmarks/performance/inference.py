@@ -28,7 +28,6 @@ SWEPT = 48  # [MB] of other work between two cold frames: a solver, and what lie
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Return median, 95 % and least time of frames, the median of a cold one, and sizes of the network."""
-
     chosen = settings.chosen
     dressed, motions = dressed_body(vertices), training_motions()
     model = untrained_model(chosen.kind, dressed, motions, seed=0, recipe=chosen.recipe)
@@ -57,7 +56,6 @@ def _frame_seconds(
 
     swept: [MB] read and written before each frame, off the clock.
     """
-
     other = np.zeros(swept * 125_000)
     frames, seconds = prepare_frames(model, dressed, motion)(), []
     for _ in range(motion.frames):

@@ -16,12 +16,10 @@ if TYPE_CHECKING:
 
 def training_motions() -> list[Motion]:
     """Return all motions that networks may learn from, whole."""
-
     return embedded_motions(TRAIN)
 
 
 def dressed_body(vertices: int) -> DressedBody:
     """Return the body in a T-shirt of about so many vertices."""
-
     body = Body.load()
     return DressedBody(body, find_template(TSHIRT).tailor(body, vertices=vertices))

@@ -24,7 +24,6 @@ PAPER_STEPS = find_preset("paper").steps_of("snug", "snug")
 
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Return median and least time of a step over blocks, and the medians of its parts."""
-
     chosen, device = settings.chosen, find_device(settings.device)
     dressed, motions = dressed_body(vertices), training_motions()
     targets = {motion.name: dressed.skinned(motion) for motion in motions} if chosen.simulated else None
@@ -57,7 +56,6 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
 
 def _timed(trainer: Trainer, blocks: int) -> tuple[list[float], dict[str, list[float]]]:
     """Return mean seconds a step of each block, whole and by part."""
-
     numbers = itertools.count()
 
     def steps(count: int) -> float:

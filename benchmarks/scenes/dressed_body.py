@@ -103,7 +103,6 @@ def settled(
 
     Raises RuntimeError when the simulation of the approach did not stay finite.
     """
-
     body = assets.body
     first = motion.poses[0]
     t_pose = np.zeros_like(first)

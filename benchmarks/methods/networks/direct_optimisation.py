@@ -74,7 +74,6 @@ class DirectOptimisation(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Lay the frames out as one cloth and start from skinning. Raises ValueError for other terms."""
-
         assert scene.dressed is not None
         if _identity(scene.energies) != _identity(declared_energies(scene.cloth)):
             names = ", ".join(term.name for term in scene.energies)

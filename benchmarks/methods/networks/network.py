@@ -31,7 +31,6 @@ class Network(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Read the model, make the features and warm up. Not timed."""
-
         assert scene.dressed is not None
         self.model = TrainedModel.load(self.path).rounded(self.precision)
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
@@ -47,7 +46,6 @@ class Network(Method):
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Return a function of the frame that makes features and joint transforms."""
-
         assert scene.dressed is not None
         return prepare_frame_inputs(
             self.model, self.dressed, self.motion, self.betas, earlier=scene.dressed.before
@@ -55,12 +53,10 @@ class Network(Method):
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """Return a function that computes `copies` bodies in this motion at once, (T, copies, V, 3) [m]."""
-
         return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
 
     def quasi_static(self) -> Trajectory:
         """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock."""
-
         return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
 
 

@@ -23,7 +23,6 @@ class PostProcessedNetwork(Network):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Pose the body, compile the post-processing and prepare the network. Not timed."""
-
         assert scene.dressed is not None and scene.obstacle is not None
         body, garment = scene.dressed.body, scene.dressed.garment
         positions = np.asarray(scene.obstacle.positions)
@@ -36,7 +35,6 @@ class PostProcessedNetwork(Network):
 
     def run(self) -> Trajectory:
         """Roll out, each frame post-processed."""
-
         cleaned = super().run()
         facts = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}
         return replace(cleaned, provenance=cleaned.provenance | facts)

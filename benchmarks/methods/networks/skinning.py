@@ -24,7 +24,6 @@ class Skinning(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Smooth the weights and make the joint transforms. Not timed."""
-
         assert scene.dressed is not None
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
@@ -33,7 +32,6 @@ class Skinning(Method):
 
     def run(self) -> Trajectory:
         """Skin all frames."""
-
         positions, seconds = collect_frames(self.frames(), np.arange(self.motion.frames))
         return Trajectory(
             positions=positions,
@@ -45,7 +43,6 @@ class Skinning(Method):
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Return a function of the frame that makes joint transforms."""
-
         return prepare_frame_inputs(None, self.dressed, self.motion, self.betas)
 
     def quasi_static(self) -> Trajectory:

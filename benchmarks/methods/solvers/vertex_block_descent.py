@@ -10,5 +10,4 @@ from benchmarks.methods.solvers.simulation import Simulation
 
 def make(*, models: Path, seed: int, iterations: int) -> Simulation:
     """Make a simulation whose every step is `iterations` sweeps of vertex block descent."""
-
     return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})

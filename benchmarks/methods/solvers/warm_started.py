@@ -119,7 +119,6 @@ class WarmStarted(Method):
 
     def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
         """Return a function that yields world positions (V, 3) [m], frame after frame, at each call."""
-
         assert scene.dressed is not None
         motion, betas, before = scene.dressed.motion, scene.dressed.betas, scene.dressed.before
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)

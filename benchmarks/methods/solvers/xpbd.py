@@ -10,5 +10,4 @@ from benchmarks.methods.solvers.simulation import Simulation
 
 def make(*, models: Path, seed: int, iterations: int) -> Simulation:
     """Make a simulation whose every step is `iterations` sweeps of XPBD."""
-
     return Simulation(options={"method": XPBD, "max_iterations": iterations})

@@ -31,7 +31,6 @@ METRICS = (
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return median and 95th percentile of these distances over frames [degrees]."""
-
     dressed, known = roll_out.scene.dressed, roll_out.training_poses
     if dressed is None or known is None:
         return {}

@@ -25,7 +25,6 @@ def copied_terms(scene: BuiltScene) -> list[Energy]:
     A term may remember the step before, and read another term: so all are copied together, and what one of
     them knows of another is the other's copy. Arrays are shared with the scene's.
     """
-
     declared = (*scene.energies, Inertia(scene.cloth, scene.dt))
     twins = {id(term): copy.copy(term) for term in declared}
     for twin in twins.values():
@@ -56,7 +55,6 @@ def freeze_step(
 
 def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats | None = None) -> Step:
     """Return the step from frame - 1 of positions (T,V,3) [m] to `frame`, as a solver is given it."""
-
     previous = positions[frame - 1]
     velocity = (previous - positions[max(frame - 2, 0)]) / scene.dt
     guess = first_guess(scene, previous, velocity, frame) if guess is None else guess

@@ -62,5 +62,4 @@ def _folded(fold: float) -> tuple[Cloth, np.ndarray]:
 
 def _signs(cloth: Cloth) -> np.ndarray:
     """Return the sign of each hinge's angle where the strip is folded by a small negative angle, (H,)."""
-
     return np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))
