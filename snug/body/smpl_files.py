@@ -17,6 +17,7 @@ head, in weights and skeleton; the hand's joint is the mean of its knuckles. A r
 brought to the T pose, since that is what motions are relative to.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +34,9 @@ from snug.body.t_pose import arm_angles, arm_rotations, turn_rest_pose
 JOINTS = len(JOINT_NAMES)
 BODY_JOINTS = JOINT["left_hand"]  # these come first in SMPL, SMPL-H and SMPL-X alike
 FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
-MOST_VERTICES = 100_000
-LONGEST_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
+MAX_VERTICES = 100_000
+MAX_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
 T_POSE, A_POSE = np.radians(10.0), np.radians(60.0)  # angles up to which arms may hang down
-
-Arrays = dict[str, Any]  # of numpy, or sparse matrices, by the first of their names
 
 SYNONYMS = {
     "v_template": ("v_template", "vertices", "template"),
@@ -54,6 +53,46 @@ SYNONYMS = {
 REQUIRED = ("v_template", "f", "weights", "kintree_table")
 
 
+class _File:
+    """Arrays of a body file by the first of their names, and errors that name the file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        names = [name for synonyms in SYNONYMS.values() for name in synonyms]
+        try:
+            pickled = path.suffix in (".pkl", ".pickle")
+            content = read_plain_pickle(path) if pickled else read_arrays(path, names)
+        except PlainPickleError as error:
+            raise BodyError(str(error)) from error
+        except ArrayFileError as error:
+            remedy = "expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
+            raise BodyError(f"{error}; {remedy}") from error
+        if not isinstance(content, dict):
+            raise self.error(f"holds a {type(content).__name__}; expected a dict of arrays")
+        self.arrays: dict[str, Any] = {}  # of numpy, or sparse matrices
+        for key, synonyms in SYNONYMS.items():
+            if present := [content[name] for name in synonyms if name in content]:
+                self.arrays[key] = present[0] if scipy.sparse.issparse(present[0]) else np.asarray(present[0])
+
+    def error(self, problem: str) -> BodyError:
+        """Return the error that names the file."""
+        return BodyError(f"{self.path}: {problem}")
+
+    def numbers(self, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
+        """Return an array of that shape (None: any length) as float64. Raises BodyError."""
+        array = self.arrays[key]
+        fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
+        if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
+            wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+            raise self.error(f"{key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
+        dense = array.toarray() if scipy.sparse.issparse(array) else array
+        with np.errstate(over="ignore"):
+            dense = dense.astype(np.float64)
+        if not np.isfinite(dense).all():
+            raise self.error(f"{key} holds values that are not finite")
+        return dense
+
+
 def read_body(path: str | Path | None) -> Body:
     """Read and check a user's body, and bring it to the T pose.
 
@@ -66,98 +105,62 @@ def read_body(path: str | Path | None) -> Body:
     >>> read_body(None).shape_count
     10
     """
-    return Body.load() if path is None else Body(**_in_t_pose(Path(path), _rest_arrays(Path(path))))
+    if path is None:
+        return Body.load()
+    file = _File(Path(path))
+    return _in_t_pose(file, _make_body(file))
 
 
-def _rest_arrays(path: Path) -> dict[str, Any]:
-    """Return the arrays of a `Body` in the pose of its file, by its field names. Raises BodyError."""
-    stored = _stored_arrays(path)
-    missing = [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in stored]
+def _make_body(file: _File) -> Body:
+    """Make the body in the pose of its file. Raises BodyError."""
+    missing = [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in file.arrays]
     if missing:
-        raise BodyError(f"{path}: no array {', '.join(missing)}; expected SMPL's layout")
-    template = _float(path, stored, "v_template", (None, 3))
+        raise file.error(f"no array {', '.join(missing)}; expected SMPL's layout")
+    template = file.numbers("v_template", (None, 3))
     count = len(template)
-    if count > MOST_VERTICES:
-        raise BodyError(f"{path}: v_template has {count} vertices; at most {MOST_VERTICES} are read")
-    weights, places, folded = _skeleton(path, stored, count)
+    if count > MAX_VERTICES:
+        raise file.error(f"v_template has {count} vertices; at most {MAX_VERTICES} are read")
+    weights, places, folded = _skeleton(file, count)
     directions = np.zeros((count, 3, 0))
-    if "shapedirs" in stored:
-        directions = _float(path, stored, "shapedirs", (count, 3, None))[:, :, :SHAPES]
-    joints, joint_directions = _joints(path, stored, template, directions, len(folded))
-    rest = {
-        "template": template,
-        "shape_directions": directions,
-        "skinning_weights": weights @ folded,
-        "joint_template": places @ joints,
-        "joint_directions": np.einsum("ij,jas->ias", places, joint_directions),
-        "faces": _faces(path, stored["f"], template),
-        "parents": np.array(PARENTS),
-        "pose_directions": _correctives(path, stored, count, len(folded)),
-    }
-    _check_place(path, template, rest["joint_template"])
-    return rest
+    if "shapedirs" in file.arrays:
+        directions = file.numbers("shapedirs", (count, 3, None))[:, :, :SHAPES]
+    joints, joint_directions = _joints(file, template, directions, len(folded))
+    body = Body(
+        template=template,
+        shape_directions=directions,
+        skinning_weights=weights @ folded,
+        joint_template=places @ joints,
+        joint_directions=np.einsum("ij,jas->ias", places, joint_directions),
+        faces=_faces(file, template),
+        parents=np.array(PARENTS),
+        pose_directions=_correctives(file, count, len(folded)),
+    )
+    _check_place(file, template, body.joint_template)
+    return body
 
 
-def _stored_arrays(path: Path) -> Arrays:
-    """Return the arrays of the file, by the first of their names. Raises BodyError."""
-    names = [name for some in SYNONYMS.values() for name in some]
-    try:
-        content = read_plain_pickle(path) if path.suffix in (".pkl", ".pickle") else read_arrays(path, names)
-    except PlainPickleError as error:
-        raise BodyError(str(error)) from error
-    except ArrayFileError as error:
-        raise BodyError(
-            f"{error}; expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
-        ) from error
-    if not isinstance(content, dict):
-        raise BodyError(f"{path}: holds a {type(content).__name__}; expected a dict of arrays")
-    kept = {key: next((n for n in some if n in content), "") for key, some in SYNONYMS.items()}
-    return {
-        key: content[name] if scipy.sparse.issparse(content[name]) else np.asarray(content[name])
-        for key, name in kept.items()
-        if name
-    }
-
-
-def _float(path: Path, stored: Arrays, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Return a stored array of that shape (None: any length) as float64. Raises BodyError."""
-    array = stored[key]
-    fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
-    if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
-        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
-        raise BodyError(f"{path}: {key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
-    dense = array.toarray() if scipy.sparse.issparse(array) else array
-    with np.errstate(over="ignore"):
-        dense = dense.astype(np.float64)
-    if not np.isfinite(dense).all():
-        raise BodyError(f"{path}: {key} holds values that are not finite")
-    return dense
-
-
-def _skeleton(path: Path, stored: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _skeleton(file: _File, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return weights (B, J), rows summing to one, and two matrices that make 24 joints of J.
 
     The first, (24, J), averages positions of joints; the second, (J, 24), adds up weights.
     """
-    table = stored["kintree_table"]
+    table = file.arrays["kintree_table"]
     parents = table[0] if table.ndim == 2 else table
     wanted = "kintree_table (2, J) or parents (J,) of J = 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints"
     if parents.ndim != 1 or len(parents) not in (24, 52, 55) or table.dtype.kind not in "iuf":
-        raise BodyError(f"{path}: the tree of joints is {table.dtype} {table.shape}; expected {wanted}")
+        raise file.error(f"the tree of joints is {table.dtype} {table.shape}; expected {wanted}")
     joints = len(parents)
-    weights = _float(path, stored, "weights", (count, joints))
+    weights = file.numbers("weights", (count, joints))
     sums = weights.sum(axis=1, keepdims=True)
     if weights.min() < -1e-6 or np.abs(sums - 1.0).max() > 1e-3:
-        raise BodyError(f"{path}: weights must be non-negative with rows that sum to one")
-    if "rest_pose" in stored and not _is_identity(stored["rest_pose"]):
-        raise BodyError(
-            f"{path}: rest_pose gives bones axes of their own; give a body without, and its motion too"
-        )
+        raise file.error("weights must be non-negative with rows that sum to one")
+    if "rest_pose" in file.arrays and not _is_identity(file.arrays["rest_pose"]):
+        raise file.error("rest_pose gives bones axes of their own; give a body without, and its motion too")
     kept = JOINTS if joints == JOINTS else BODY_JOINTS
     wrong = [j for j in range(1, kept) if parents[j] != PARENTS[j]]
     if wrong:
         difference = f"joint {wrong[0]} hangs on {parents[wrong[0]]}, expected {PARENTS[wrong[0]]}"
-        raise BodyError(f"{path}: kintree_table is not SMPL's: the parent of each joint; {difference}")
+        raise file.error(f"kintree_table is not SMPL's: the parent of each joint; {difference}")
     if joints == JOINTS:
         return weights / sums, np.eye(JOINTS), np.eye(JOINTS)
     places, folded = np.zeros((JOINTS, joints)), np.zeros((joints, JOINTS))
@@ -165,9 +168,7 @@ def _skeleton(path: Path, stored: Arrays, count: int) -> tuple[np.ndarray, np.nd
     for joint in range(kept, joints):
         parent = int(parents[joint])
         if not (parent in FOLDED or kept <= parent < joint):
-            raise BodyError(
-                f"{path}: kintree_table: joint {joint} hangs on {parent}; expected head, hand, finger"
-            )
+            raise file.error(f"kintree_table: joint {joint} hangs on {parent}; expected head, hand, finger")
         if parent in FOLDED:
             folded[joint, FOLDED[parent]] = 1.0
             places[FOLDED[parent], joint] = parent != FOLDED[parent]  # knuckles; the head stays where it is
@@ -175,7 +176,7 @@ def _skeleton(path: Path, stored: Arrays, count: int) -> tuple[np.ndarray, np.nd
             folded[joint] = folded[parent]
     knuckles = places.sum(axis=1, keepdims=True)
     if knuckles.min() == 0:
-        raise BodyError(f"{path}: kintree_table: a wrist without a finger")
+        raise file.error("kintree_table: a wrist without a finger")
     return weights / sums, places / knuckles, folded
 
 
@@ -188,121 +189,111 @@ def _is_identity(turns: np.ndarray) -> bool:
 
 
 def _joints(
-    path: Path, stored: Arrays, template: np.ndarray, directions: np.ndarray, joints: int
+    file: _File, template: np.ndarray, directions: np.ndarray, joints: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the joints (J, 3) and what a unit of each shape coefficient adds to them (J, 3, S)."""
-    if "J_regressor" in stored:
-        regressor = _float(path, stored, "J_regressor", (joints, len(template)))
+    if "J_regressor" in file.arrays:
+        regressor = file.numbers("J_regressor", (joints, len(template)))
         return regressor @ template, np.einsum("jv,vcs->jcs", regressor, directions)
-    if "J_template" not in stored or ("J_shapedirs" not in stored and directions.shape[2]):
-        raise BodyError(
-            f"{path}: no joints; expected the array J_regressor, or joints, with shapedirs also J_shapedirs"
-        )
+    if "J_template" not in file.arrays or ("J_shapedirs" not in file.arrays and directions.shape[2]):
+        raise file.error("no joints; expected J_regressor, or joints, with shapedirs also J_shapedirs")
     joint_directions = np.zeros((joints, 3, 0))
     if directions.shape[2]:
-        joint_directions = _float(path, stored, "J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
+        joint_directions = file.numbers("J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
     if joint_directions.shape[2] != directions.shape[2]:
-        raise BodyError(
-            f"{path}: J_shapedirs has {joint_directions.shape[2]} shapes, shapedirs {directions.shape[2]}"
-        )
-    return _float(path, stored, "J_template", (joints, 3)), joint_directions
+        shapes = f"{joint_directions.shape[2]} shapes, shapedirs {directions.shape[2]}"
+        raise file.error(f"J_shapedirs has {shapes}")
+    return file.numbers("J_template", (joints, 3)), joint_directions
 
 
-def _correctives(path: Path, stored: Arrays, count: int, joints: int) -> np.ndarray | None:
+def _correctives(file: _File, count: int, joints: int) -> np.ndarray | None:
     """Return the pose correctives of the joints that are kept.
 
     Folded fingers, jaw and eyes stay straight and need none.
     """
-    if "posedirs" not in stored:
+    if "posedirs" not in file.arrays:
         return None
     kept = JOINTS if joints == JOINTS else BODY_JOINTS
-    return _float(path, stored, "posedirs", (count, 3, 9 * (joints - 1)))[:, :, : 9 * (kept - 1)].copy()
+    return file.numbers("posedirs", (count, 3, 9 * (joints - 1)))[:, :, : 9 * (kept - 1)].copy()
 
 
-def _check_place(path: Path, template: np.ndarray, joints: np.ndarray) -> None:
+def _check_place(file: _File, template: np.ndarray, joints: np.ndarray) -> None:
     """Raise BodyError unless this is a person in metres, y up, facing +z, at x = 0."""
     low, high = template.min(axis=0), template.max(axis=0)
     size = high - low
     if not 0.5 < size[1] < 3.0 or max(size) > 3.0:
-        raise BodyError(
-            f"{path}: v_template is {size[1]:.3g} high along y, {size[0]:.3g} wide and {size[2]:.3g} deep; "
+        raise file.error(
+            f"v_template is {size[1]:.3g} high along y, {size[0]:.3g} wide and {size[2]:.3g} deep; "
             "expected a standing body in metres, y up"
         )
     outside = np.flatnonzero((joints < low - 0.02).any(axis=1) | (joints > high + 0.02).any(axis=1))
     if len(outside):
         place = ", ".join(f"{x:.3g}" for x in joints[outside[0]])
-        raise BodyError(
-            f"{path}: joint {JOINT_NAMES[outside[0]]} at ({place}) is outside of the body; "
+        raise file.error(
+            f"joint {JOINT_NAMES[outside[0]]} at ({place}) is outside of the body; "
             "give joints in metres and in SMPL's order"
         )
     at = {name: joints[JOINT[name]] for name in JOINT}
     if at["left_shoulder"][0] < at["right_shoulder"][0] + 0.05 or at["neck"][1] < at["pelvis"][1] + 0.05:
-        raise BodyError(
-            f"{path}: the left shoulder is not at larger x, or the neck not above; turn it to face +z"
-        )
+        raise file.error("the left shoulder is not at larger x, or the neck not above; turn it to face +z")
     if abs(at["pelvis"][0]) > 0.05:
-        raise BodyError(f"{path}: the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
+        raise file.error(f"the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
 
 
-def _in_t_pose(path: Path, rest: dict[str, Any]) -> dict[str, Any]:
-    """Return the arrays of `_rest_arrays` with horizontal arms. Raises BodyError."""
-    lowered = arm_angles(rest["joint_template"])
+def _in_t_pose(file: _File, body: Body) -> Body:
+    """Return the body with horizontal arms. Raises BodyError."""
+    lowered = arm_angles(body.joint_template)
     if np.abs(lowered).max() <= T_POSE:
-        return rest
+        return body
     degrees = " and ".join(f"{angle:.0f}" for angle in np.degrees(lowered))
     if np.abs(lowered).max() > A_POSE:
-        raise BodyError(
-            f"{path}: the arms hang by {degrees} degrees; give the body in T pose or A pose (to 60)"
-        )
-    if rest["pose_directions"] is not None:
-        raise BodyError(f"{path}: the arms hang by {degrees} degrees; posedirs need a T pose, leave them out")
-    points, joints = (
-        np.concatenate([rest[f"{what}template"][..., None], rest[directions]], axis=2)
-        for what, directions in (("", "shape_directions"), ("joint_", "joint_directions"))
+        raise file.error(f"the arms hang by {degrees} degrees; give the body in T pose or A pose (to 60)")
+    if body.pose_directions is not None:
+        raise file.error(f"the arms hang by {degrees} degrees; posedirs need a T pose, leave them out")
+    points = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
+    joints = np.concatenate([body.joint_template[..., None], body.joint_directions], axis=2)
+    points, joints = turn_rest_pose(points, joints, body.skinning_weights, arm_rotations(lowered))
+    return replace(
+        body,
+        template=points[..., 0],
+        shape_directions=points[..., 1:],
+        joint_template=joints[..., 0],
+        joint_directions=joints[..., 1:],
+        arms_lowered=lowered,
     )
-    points, joints = turn_rest_pose(points, joints, rest["skinning_weights"], arm_rotations(lowered))
-    return {
-        **rest,
-        "template": points[..., 0],
-        "shape_directions": points[..., 1:],
-        "joint_template": joints[..., 0],
-        "joint_directions": joints[..., 1:],
-        "arms_lowered": lowered,
-    }
 
 
-def _faces(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
+def _faces(file: _File, template: np.ndarray) -> np.ndarray:
     """Return the triangles (F, 3) of a closed surface, wound outward. Raises BodyError."""
+    faces = file.arrays["f"]
     if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu" or faces.size == 0:
-        raise BodyError(
-            f"{path}: f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)"
-        )
+        raise file.error(f"f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)")
     faces = faces.astype(np.int64)
     if faces.min() < 0 or faces.max() >= len(template):
-        raise BodyError(f"{path}: f names vertex {faces.max()}; the body has {len(template)}")
+        raise file.error(f"f names vertex {faces.max()}; the body has {len(template)}")
     if faces.shape[1] == 4:
         faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     edges = half_edges(faces)
     if len(np.unique(edges, axis=0)) != len(edges) or (edges[:, 0] == edges[:, 1]).any():
-        raise BodyError(f"{path}: f is not a closed surface with one winding; inside and outside need one")
-    faces = _fill_holes(path, faces, template)
+        raise file.error("f is not a closed surface with one winding; inside and outside need one")
+    faces = _fill_holes(file, faces, template)
     a, b, c = (template[faces[:, k]] for k in range(3))
     if np.einsum("ij,ij->", a, np.cross(b, c)) < 0:
-        raise BodyError(f"{path}: f winds inwards; reverse the order of each triangle's vertices")
+        raise file.error("f winds inwards; reverse the order of each triangle's vertices")
     return faces
 
 
-def _fill_holes(path: Path, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
+def _fill_holes(file: _File, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
     """Return the faces with small holes, as the eyes of SMPL-X, closed by fans of triangles."""
     try:
         loops = boundary_loops(faces)
     except ValueError as error:
-        raise BodyError(f"{path}: f is not a closed surface: {error}") from error
+        raise file.error(f"f is not a closed surface: {error}") from error
     for loop in loops:
         around = np.linalg.norm(template[loop] - template[np.roll(loop, 1)], axis=1).sum()
-        if around > LONGEST_HOLE:
-            raise BodyError(
-                f"{path}: f is not a closed surface: a hole at vertex {loop[0]} is {around:.2g} m around"
+        if around > MAX_HOLE:
+            raise file.error(
+                f"f is not a closed surface: a hole at vertex {loop[0]} is {around:.2g} m around"
             )
         fan = np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1)
         faces = np.concatenate([faces, fan])
