@@ -33,7 +33,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     path.parent.mkdir(parents=True, exist_ok=True)
     checkpoint = path.with_name(f".{path.stem}.checkpoint.safetensors")
     checkpoint = Checkpoint(path=checkpoint, resume=True, key=settings.key)
-    chosen, every = settings.chosen, max(1, settings.steps // POINTS)
+    chosen, every = settings.training, max(1, settings.steps // POINTS)
     dressed, motions = dressed_body(vertices), training_motions()
     held_out = [motion for motion in motions if motion.name == HELD_OUT]
     model = train_network(

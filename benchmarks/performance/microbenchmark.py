@@ -10,7 +10,10 @@ import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from benchmarks.training import Training
 
 SUITE = "performance"
 
@@ -30,11 +33,18 @@ class Settings:
 
     method: str
     repeats: int
-    chosen: Any = None
+    chosen: Training | None = None
     device: str = "cpu"
     steps: int = 0
     files: tuple[Path, ...] = ()
     key: str = ""
+
+    @property
+    def training(self) -> Training:
+        """Training of the network. Raises ValueError for a method that is no network."""
+        if self.chosen is None:
+            raise ValueError(f"{self.method} is no network: it has no training")
+        return self.chosen
 
 
 @dataclass(frozen=True, kw_only=True)

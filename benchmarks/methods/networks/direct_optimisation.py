@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -154,7 +153,7 @@ class DirectOptimisation(Method):
             whole.normals = _by_kind(np.stack([p.normals for p in planes]), kinds)
 
 
-def _identity(terms: Sequence[Energy]) -> list[Any]:
+def _identity(terms: Sequence[Energy]) -> list[tuple[type[Energy], object]]:
     """Return type and parameters of each term, which tell two lists of terms apart."""
     return [(type(term), term.parameters()) for term in terms]
 

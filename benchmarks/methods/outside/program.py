@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks.external.roll_out_option import FileConventions
 from benchmarks.external.scene_files import write_for_program
 from benchmarks.method import MethodEntry
@@ -132,7 +134,7 @@ def _last_line(output: Path) -> str:
     return f": {last}" if last else ""
 
 
-def _milliseconds(seconds: Any) -> float:
+def _milliseconds(seconds: np.ndarray) -> float:
     """Return [ms] of the program's number [s]. Raises ValueError where it is none."""
     if seconds.size != 1 or not 0.0 < float(seconds.item()) < 1e6:
         raise ValueError("seconds_per_frame of the program is no positive number of seconds")

@@ -7,8 +7,6 @@ the vertex.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from torch import Tensor
 
@@ -26,7 +24,7 @@ class ResidualTransport:
     def __init__(self, weights: Tensor, transforms: Tensor) -> None:
         self._weights = weights.numpy()
         self._transforms = transforms.numpy()
-        self._last: tuple[int, Any] = (-1, None)  # a frame, and the blended transforms there
+        self._last: tuple[int, np.ndarray] = (-1, np.zeros((0, 9)))  # a frame, its blended transforms
 
     def _blended(self, frame: int) -> np.ndarray:
         """Return the blended linear parts (V, 9) of a frame."""
