@@ -81,10 +81,7 @@ class SuperLUSolver:
         A = sp.csc_matrix(lower + sp.tril(lower, -1).T)[self._order][:, self._order]
         try:
             lu = spla.splu(
-                sp.csc_matrix(A),
-                permc_spec="NATURAL",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
+                sp.csc_matrix(A), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
             )
         except RuntimeError:  # exactly singular
             return False

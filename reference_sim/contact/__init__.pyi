@@ -2,8 +2,4 @@ from .closest_point import Closest as Closest
 from .closest_point import FaceTree as FaceTree
 from .collisions import Collisions as Collisions
 
-__all__ = [
-    "Closest",
-    "Collisions",
-    "FaceTree",
-]
+__all__ = ["Closest", "Collisions", "FaceTree"]

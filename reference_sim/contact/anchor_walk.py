@@ -67,11 +67,7 @@ def walk_to_foot(
         s0, s1, s2 = skin[j, 0] - o0, skin[j, 1] - o1, skin[j, 2] - o2
         t0, t1, t2 = skin[k, 0] - o0, skin[k, 1] - o1, skin[k, 2] - o2
         r0, r1, r2 = x0 - o0, x1 - o1, x2 - o2
-        ss, tt, st = (
-            s0 * s0 + s1 * s1 + s2 * s2,
-            t0 * t0 + t1 * t1 + t2 * t2,
-            s0 * t0 + s1 * t1 + s2 * t2,
-        )
+        ss, tt, st = (s0 * s0 + s1 * s1 + s2 * s2, t0 * t0 + t1 * t1 + t2 * t2, s0 * t0 + s1 * t1 + s2 * t2)
         sr, tr = s0 * r0 + s1 * r1 + s2 * r2, t0 * r0 + t1 * r1 + t2 * r2
         determinant = ss * tt - st * st
         v, w = (tt * sr - st * tr) / determinant, (ss * tr - st * sr) / determinant

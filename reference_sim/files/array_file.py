@@ -111,10 +111,7 @@ def _check_member(info: zipfile.ZipInfo) -> None:
 def _array(stream: IO[bytes], length: int, limit: int) -> np.ndarray:
     """Read the array of a stream of `length` bytes; raise whatever its bytes make numpy or zipfile raise."""
     version = np.lib.format.read_magic(stream)
-    readers = {
-        (1, 0): np.lib.format.read_array_header_1_0,
-        (2, 0): np.lib.format.read_array_header_2_0,
-    }
+    readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
     if version not in readers:
         raise ValueError(f"is of version {version} of the format, only 1.0 and 2.0 are read")
     # Of a damaged length of the header no more is read than numpy believes.

@@ -17,13 +17,13 @@ from typing import Protocol, TypeVar
 from reference_sim.minimise.descent import Descent
 from reference_sim.minimise.result import Stop
 
-Run = TypeVar("Run", bound=Descent, contravariant=True)
+RunState = TypeVar("RunState", bound=Descent, contravariant=True)
 
 
 NOT_FINITE = Stop("diverged", "energy or gradient is not finite at the starting point")
 
 
-class Solver(Protocol[Run]):
+class Solver(Protocol[RunState]):
     """One way to minimise a potential; what a minimisation changes is in its `run`.
 
     Attributes:
@@ -34,20 +34,20 @@ class Solver(Protocol[Run]):
     max_iterations: int
     timeout: float
 
-    def init(self, run: Run) -> Stop | None:
+    def init(self, run: RunState) -> Stop | None:
         """Prepare the first step; return a Stop if there cannot be one."""
         ...
 
-    def terminate(self, run: Run) -> Stop | None:
+    def terminate(self, run: RunState) -> Stop | None:
         """Return a Stop if the point reached is an answer, or no step can lead on from it."""
         ...
 
-    def step(self, run: Run) -> Stop | None:
+    def step(self, run: RunState) -> Stop | None:
         """Take one step; return a Stop if there is none."""
         ...
 
 
-def iterate(solver: Solver[Run], run: Run) -> Stop:  # type: ignore[misc]
+def iterate(solver: Solver[RunState], run: RunState) -> Stop:  # type: ignore[misc]
     """Minimise from where `run` is; return why that ended. Limits give "max_iterations" and "timeout"."""
     if stop := solver.init(run):
         return stop

@@ -271,10 +271,7 @@ BAD = {
         ["sheet.obj", "--obstacle", "ball", "--barrier-distance", "0.01"],
         "--barrier-distance needs --barrier or --self-contact",
     ),
-    "barrier too wide": (
-        ["sheet.obj", "--self-contact", "--barrier-distance", "0.5"],
-        "0.5",
-    ),
+    "barrier too wide": (["sheet.obj", "--self-contact", "--barrier-distance", "0.5"], "0.5"),
     "method": (["sheet.obj", "--method", "bfgs"], "argument --method: invalid choice: 'bfgs'"),
     "mesh": (["twice.obj"], "twice.obj: vertices 0 and 9 coincide: merge them"),
     "material": (
