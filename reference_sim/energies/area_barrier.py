@@ -34,9 +34,11 @@ class AreaBarrier(Energy):
         self.stiffness, self.threshold = float(stiffness), float(threshold)
 
     def parameters(self) -> dict[str, Any]:
+        """Return stiffness and threshold."""
         return {"stiffness_J_per_m2": self.stiffness, "threshold": self.threshold}
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each face: u (..., N, 3, 3) [m] -> (..., N)."""
         import torch
 
         Ds = torch.stack([u[..., 1, :] - u[..., 0, :], u[..., 2, :] - u[..., 0, :]], dim=-1)
@@ -48,20 +50,22 @@ class AreaBarrier(Energy):
         return -torch.as_tensor(self.scales).to(u) * gap**2 * torch.log(inside / self.threshold)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 9, 9) [N/m] of each face at x (V, 3) [m]."""
         return self.expanded(*self.active_hessian_blocks(x))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """E'' grad q grad q^T is never negative; the term with Hess q is reduced by `convexity`."""
+        """Return the blocks, see Energy: E'' grad q grad q^T, and E' Hess q reduced by `convexity`."""
         return _hessian(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, convexity)
 
 
 @njit(cache=True, inline="always")
 def _squared_area_ratio(x, face, D, F, C):
-    """q; F (3, 2) and C = F^T F, as (C00, C11, C01), are written into."""
+    """Return q; F (3, 2) and C = F^T F, as (C00, C11, C01), are written into."""
     for i in range(3):
         e1 = x[face[1], i] - x[face[0], i]
         e2 = x[face[2], i] - x[face[0], i]
@@ -75,7 +79,7 @@ def _squared_area_ratio(x, face, D, F, C):
 
 @njit(cache=True, error_model="numpy")
 def _gradient(x, faces, Dm_inverse, scales, q0, gradient):
-    """dE/dx_a = 2 E'(q) F adj(C) b_a."""
+    """Add dE/dx_a = 2 E'(q) F adj(C) b_a to gradient; returns the energy [J]."""
     total = 0.0
     F, C = np.empty((3, 2)), np.empty(3)
     for f in range(faces.shape[0]):
@@ -98,7 +102,7 @@ def _gradient(x, faces, Dm_inverse, scales, q0, gradient):
 
 @njit(cache=True, error_model="numpy")
 def _hessian(x, faces, Dm_inverse, scales, q0, convexity):
-    """E'' grad q grad q^T + E' Hess q.
+    """Return the faces below q0 and E'' grad q grad q^T + E' Hess q of each.
 
     grad_a q = 2 F adj(C) b_a
     Hess_ac q = 2 [(b_a.adj(C) b_c) I + 2 Fb_a Fb_c^T - Fb_c Fb_a^T - (b_a.b_c) F F^T]

@@ -51,9 +51,11 @@ class BarrierFriction(Energy):
         self._pairs = barrier.collisions.package.TangentialCollisions()
 
     def parameters(self) -> dict[str, Any]:
+        """Return coefficient and speed."""
         return {"coefficient": self.coefficient, "speed_m_per_s": self.speed}
 
     def energy(self, x: Tensor) -> Tensor:
+        """Raise NotImplementedError: the definition is that of ipctk."""
         raise NotImplementedError(
             "BarrierFriction has no definition in torch, its energy is ipctk's: call value_and_gradient(x), "
             "or train with ContactFriction"
@@ -81,6 +83,7 @@ class BarrierFriction(Energy):
         return self._near.stack(x, collisions.obstacle_at(collisions.progress)) - self._start
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         if not len(self._pairs):
             return 0.0, np.zeros(x.shape)
         slip = self._slip(x)

@@ -76,12 +76,13 @@ class ContactBarrier(Energy):
         self._hessians: dict[str, sp.csc_matrix] = {}
 
     def __copy__(self) -> ContactBarrier:
-        """With collisions of its own: they hold where the obstacle is in a step."""
+        """Return a copy with its own collisions: they hold where the obstacle is in a step."""
         twin = object.__new__(type(self))
         vars(twin).update(vars(self), collisions=copy.copy(self.collisions))
         return twin
 
     def parameters(self) -> dict[str, Any]:
+        """Return distance, stiffness, self-contact and the version of the package."""
         return {
             "distance_m": self.distance,
             "stiffness_Pa": self.stiffness,
@@ -90,6 +91,7 @@ class ContactBarrier(Energy):
         }
 
     def energy(self, x: Tensor) -> Tensor:
+        """Raise NotImplementedError: the definition is that of ipctk."""
         raise NotImplementedError(
             "ContactBarrier has no definition in torch, its energy is ipctk's: call value_and_gradient(x), "
             "or train with ContactPenalty"
@@ -112,6 +114,7 @@ class ContactBarrier(Energy):
         self.collisions.begin(step.obstacle.faces, before, after)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         if not np.isfinite(x).all():
             return float("nan"), np.full(x.shape, np.nan)
         pairs, near, positions = self.collisions.pairs(x)
@@ -119,6 +122,7 @@ class ContactBarrier(Energy):
         return self.potential(pairs, near.mesh, positions), gradient.reshape(-1, 3)[: len(x)]
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
+        """Return the second derivatives (3V, 3V) [N/m] at x (V, 3) [m]; see Energy."""
         if convexity == 0:
             return self._hessian(x, "NONE")
         if convexity == 1:
@@ -126,33 +130,36 @@ class ContactBarrier(Energy):
         return (1 - convexity) * self._hessian(x, "NONE") + convexity * self._hessian(x, "CLAMP")
 
     def _hessian(self, x: np.ndarray, projection: str) -> sp.csc_matrix:
-        """(3V, 3V), with the negative eigenvalues of each pair or without; kept while x stays."""
-        found = self.collisions.pairs(x)
-        if self._hessians_of is not found:
-            self._hessians_of, self._hessians = found, {}
+        """Return (3V, 3V), with the negative eigenvalues of each pair or without; kept while x stays."""
+        candidates = self.collisions.pairs(x)
+        if self._hessians_of is not candidates:
+            self._hessians_of, self._hessians = candidates, {}
         if projection not in self._hessians:
-            pairs, near, positions = found
+            pairs, near, positions = candidates
             method = getattr(self.collisions.package.PSDProjectionMethod, projection)
             hessian, size = self.potential.hessian(pairs, near.mesh, positions, method), 3 * len(x)
             self._hessians[projection] = hessian[:, :size][:size]
         return self._hessians[projection]
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
+        """Return the share of `direction` that may be gone before anything meets; see Energy."""
         return self.collisions.largest_step(x, direction) if np.isfinite(direction).all() else 1.0
 
     def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+        """Return the share of the joint way to goal (V, 3) [m] that is free of collisions; see Energy."""
         return self.collisions.ccd_fraction(x, goal, progress)
 
     def set_progress(self, progress: float) -> None:
+        """Put the obstacle at `progress` of its motion in this step."""
         self.collisions.place(progress)
 
     def infeasibility(self, x: np.ndarray) -> str:
-        """An edge that cuts a face, as far as the obstacle has come; "" if there is none."""
+        """Name an edge that cuts a face, as far as the obstacle has come; "" if there is none."""
         return self.collisions.first_intersection(x) if np.isfinite(x).all() else ""
 
 
 def _check_heights(cloth: Cloth, distance: float) -> None:
-    """A barrier that reaches across a triangle would push the resting cloth apart."""
+    """Raise ValueError where a barrier reaches across a triangle: it would push the resting cloth apart."""
     corners = cloth.rest_corners
     edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
     heights = 2 * cloth.areas / edges.max(axis=1)

@@ -58,9 +58,11 @@ class ContactFriction(Energy):
         self._last: tuple[Step, Planes] | None = None
 
     def parameters(self) -> dict[str, Any]:
+        """Return coefficient and speed."""
         return {"coefficient": self.coefficient, "speed_m_per_s": self.speed}
 
     def prepare(self, step: Step) -> None:
+        """Freeze planes and normal forces. Raises ValueError unless the contact is prepared for this step."""
         planes = self.contact.planes
         if self.contact.step is not step or step.obstacle is None or planes is None:
             raise ValueError("ContactFriction needs its own ContactPenalty before it in the terms")
@@ -80,7 +82,7 @@ class ContactFriction(Energy):
         self.threshold = self.speed * step.dt
 
     def _coulomb(self, samples: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """mu N (S,) [N] of samples (S, 3) [m] on planes."""
+        """Return mu N (S,) [N] of samples (S, 3) [m] on planes."""
         gap = np.einsum("si,si->s", normals, samples - points)
         depth = np.maximum(self.contact.margin - gap, 0.0)
         return self.coefficient * 3 * self.contact.stiffness * depth**2
@@ -93,6 +95,7 @@ class ContactFriction(Energy):
         return self.forces
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each sample: u (..., N, 3, 3) [m] -> (..., N)."""
         import torch
 
         normals = torch.as_tensor(self.normals).to(u)
@@ -106,21 +109,24 @@ class ContactFriction(Energy):
         return torch.as_tensor(self._known_forces()).to(u) * torch.where(square < h * h, near, y)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         state = (self._known_forces(), self.anchors, self.normals, self.threshold)
         return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 9, 9) [N/m] of each sample at x (V, 3) [m]."""
         return self.expanded(*self.active_hessian_blocks(x))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the samples (n,) with second derivatives, and these (n, 9, 9) [N/m]; see Energy."""
         forces = self._known_forces()
         elements = np.flatnonzero(forces)
         state = (forces, self.anchors, self.normals, self.threshold)
         return elements, _hessian(x, elements, self.stencils, self.weights, *state)
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The curvature of sticking, 2 mu N / h, in every direction."""
+        """Return the curvature of sticking, 2 mu N / h, in every direction; see Energy."""
         forces = self._known_forces()
         elements = np.flatnonzero(forces)
         w = self.weights[elements]
@@ -129,14 +135,14 @@ class ContactFriction(Energy):
 
 
 def _same_step(one: Step, other: Step) -> bool:
-    """Whether both lead from the same positions to the same frame."""
+    """Return whether both lead from the same positions to the same frame."""
     same = one.obstacle is other.obstacle and one.frame == other.frame
     return same and np.array_equal(one.previous, other.previous)
 
 
 @njit(cache=True, inline="always")
 def _slip(x, stencil, w, anchor, n, u):
-    """Tangential slip vector into u; its length is returned."""
+    """Write the tangential slip vector into u; returns its length."""
     along = 0.0
     for i in range(3):
         u[i] = w[0] * x[stencil[0], i] + w[1] * x[stencil[1], i] + w[2] * x[stencil[2], i] - anchor[i]
@@ -170,7 +176,7 @@ def _gradient(x, stencils, weights, forces, anchors, normals, h, gradient):
 
 @njit(cache=True)
 def _hessian(x, elements, stencils, weights, forces, anchors, normals, h):
-    """w_a w_b mu N [f'/y (I - n n^T) + (f'' - f'/y) t t^T] with the slip direction t."""
+    """Return w_a w_b mu N [f'/y (I - n n^T) + (f'' - f'/y) t t^T] with the slip direction t."""
     blocks = np.empty((elements.shape[0], 9, 9))
     u, K = np.empty(3), np.empty((3, 3))
     for k in range(elements.shape[0]):

@@ -1,8 +1,10 @@
-"""What every physical term is: a definition in torch on one stencil, and its derivatives.
+"""Base class of the physical terms: a definition in torch on one stencil, and its derivatives.
 
 A term states `element_energy` once, in torch. Gradient and Hessian follow from it by automatic
-differentiation; a term may override them with closed-form kernels in its own file. tests/reference_sim/energies/test_derivatives.py
-holds every override to the default. Torch is imported only where the definition is evaluated.
+differentiation; a term may override them with closed-form kernels in its own file, and declare further
+kernels for solvers and training (`Energy.kernels`). The test
+tests/reference_sim/energies/test_derivatives.py holds every override to the default. Torch is imported only
+where the definition is evaluated.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Step:
-    """What a term may read before one backward-Euler step: all of it is frozen during the step.
+    """State before one backward-Euler step, as a term may read it; all of it is frozen during the step.
 
     previous: (V, 3) positions [m] and velocity: (V, 3) [m/s] at the start, guess: (V, 3) initial guess of the
     end [m], dt [s], obstacle and its frame at the end of the step.
@@ -52,8 +54,8 @@ class Energy:
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
             judged without preparing the one before it.
         impassable: whether an obstacle may have to stop on its way to the end of a step.
-        kernels: fast kernels by use, "module:function" each, or the name of a function of the term's own file;
-            the uses are listed in kernels.fast_kernels. A subclass does not inherit them.
+        kernels: fast kernels by use, "module:function" each, or the name of a function of the term's own
+            file; the uses are listed in kernels.fast_kernels. A subclass does not inherit them.
     """
 
     name: str
@@ -66,21 +68,21 @@ class Energy:
     kernels: ClassVar[Mapping[str, str]] = {}
 
     def energy(self, x: Tensor) -> Tensor:
-        """Energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""
+        """Return the energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""
         import torch
 
         index = torch.as_tensor(self.stencils, device=x.device)
         return self.element_energy(x[..., index, :])
 
     def element_energy(self, u: Tensor) -> Tensor:
-        """Energy of each element from its own vertices: u (..., N, k, 3) [m] -> (..., N) [J]."""
+        """Return the energy of each element from its own vertices: u (..., N, k, 3) [m] -> (..., N) [J]."""
         raise NotImplementedError(f"{type(self).__name__} defines no element_energy")
 
     def prepare(self, step: Step) -> None:
         """Freeze what this term needs for one step; most terms need nothing."""
 
     def parameters(self) -> dict[str, Any]:
-        """Numbers that identify the term in a result file."""
+        """Return the numbers that identify the term in a result file."""
         return {}
 
     def _elements(self, x: np.ndarray) -> Tensor:
@@ -90,7 +92,7 @@ class Energy:
         return u.requires_grad_(True)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Sum over elements [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
+        """Return the sum over elements [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         import torch
 
         u = self._elements(x)
@@ -101,7 +103,7 @@ class Energy:
         return float(value.detach()), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Second derivatives of each element at x (V, 3): (N, 3k, 3k) [N/m]."""
+        """Return the second derivatives of each element at x (V, 3): (N, 3k, 3k) [N/m]."""
         import torch
 
         u = self._elements(x)
@@ -117,17 +119,19 @@ class Energy:
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
 
     def expanded(self, elements: np.ndarray, active: np.ndarray) -> np.ndarray:
-        """The blocks (n, 3k, 3k) of some elements (n,) among those of all (N, 3k, 3k), zero elsewhere."""
+        """Return blocks (N, 3k, 3k) of all elements: `active` (n, 3k, 3k) of some (n,), zero elsewhere."""
         blocks = np.zeros((len(self.stencils), *active.shape[1:]))
         blocks[elements] = active
         return blocks
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k) [N/m].
+        """Return the elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k) [N/m].
 
-        convexity is the share of the negative curvature that is taken out: 0 gives the true second
-        derivatives, 1 positive semi-definite blocks. Here by eigenvalues; terms with a closed form know
-        where their negative curvature sits.
+        Args:
+            x: (V, 3) [m].
+            convexity: share of the negative curvature that is taken out: 0 gives the true second derivatives,
+                1 positive semi-definite blocks. Here by eigenvalues; terms with a closed form know where
+                their negative curvature sits.
         """
         blocks = self.hessian_blocks(x)
         if convexity > 0:
@@ -144,18 +148,21 @@ class Energy:
         places.add(*self.active_hessian_blocks(x, convexity), data)
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
-        """Of a dynamic term: its second derivatives (3V, 3V) [N/m] at x (V, 3), as active_hessian_blocks."""
+        """Return the second derivatives (3V, 3V) [N/m] of a dynamic term at x (V, 3) [m].
+
+        convexity is that of `active_hessian_blocks`.
+        """
         raise NotImplementedError
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
-        """Largest share of `direction` (V, 3) [m] that may be gone from x (V, 3); 1 if nothing forbids.
+        """Return the largest share of `direction` (V, 3) [m] that may be gone from x (V, 3), 1 at most.
 
         For terms that are infinite beyond a first touch.
         """
         return 1.0
 
     def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        """Share (0 to 1) of the joint way from x (V, 3) to goal (V, 3) that is free of collisions.
+        """Return the share (0 to 1) of the joint way from x (V, 3) to goal (V, 3) without a collision.
 
         On that way the obstacle moves from its place at `progress` (0: start of the step, 1: end) to its
         place at the end.
@@ -176,17 +183,18 @@ class Energy:
         """Let the Hessian be the true second derivatives again."""
 
     def infeasibility(self, x: np.ndarray) -> str:
-        """What makes x (V, 3) impossible for this term, in words with the elements; "" if nothing does."""
+        """Say what makes x (V, 3) impossible for this term, with the elements; "" if nothing does."""
         return ""
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A positive semi-definite stand-in for the Hessian that treats x, y and z alike.
+        """Return a positive semi-definite stand-in for the Hessian that treats x, y and z alike.
 
-        Elements (n,) and matrices (n, k, k) [N/m] over their vertices, for preconditioning. Terms without one
-        are left out of a preconditioner.
+        It is elements (n,) and matrices (n, k, k) [N/m] over their vertices, for preconditioning. Terms
+        without one are left out of a preconditioner.
         """
         raise NotImplementedError
 
     @property
     def has_scalar_stiffness(self) -> bool:
+        """True if the term defines `scalar_stiffness`."""
         return type(self).scalar_stiffness is not Energy.scalar_stiffness

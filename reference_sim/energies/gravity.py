@@ -35,22 +35,27 @@ class Gravity(Energy):
         self.origin_height = float(origin_height)
 
     def parameters(self) -> dict[str, Any]:
+        """Return y0 [m] and the total weight [N]."""
         return {"origin_height_m": self.origin_height, "total_weight_N": float(self.weights.sum())}
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each vertex: u (..., N, 1, 3) [m] -> (..., N)."""
         import torch
 
         return torch.as_tensor(self.weights).to(u) * (u[..., 0, 1] - self.origin_height)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         gradient[:, 1] = self.weights
         return float(self.weights @ (x[:, 1] - self.origin_height)), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 3, 3) [N/m] of each vertex at x (V, 3) [m]."""
         return np.zeros((len(self.stencils), 3, 3))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the vertices (n,) with second derivatives, and these (n, 3, 3) [N/m]; see Energy."""
         return np.arange(0), np.zeros((0, 3, 3))
 
 

@@ -34,13 +34,18 @@ class Inertia(Energy):
         self.x_hat = cloth.rest_positions
 
     def parameters(self) -> dict[str, Any]:
+        """Return dt [s]."""
         return {"dt_s": self.dt}
 
     def prepare(self, step: Step) -> None:
+        """Set x_hat = x_t + dt v_t."""
         self.x_hat = step.previous + step.dt * step.velocity
 
     def energy(self, x: Tensor, x_hat: Tensor | None = None) -> Tensor:
-        """x, x_hat (..., V, 3) [m] -> (..., V) [J]; x_hat defaults to the prepared one."""
+        """Return E [J] of each vertex: x, x_hat (..., V, 3) [m] -> (..., V).
+
+        x_hat defaults to the prepared one.
+        """
         import torch
 
         target = torch.as_tensor(self.x_hat).to(x) if x_hat is None else x_hat
@@ -48,20 +53,25 @@ class Inertia(Energy):
         return 0.5 / self.dt**2 * mass * ((x - target) ** 2).sum(-1)
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each vertex: u (..., N, 1, 3) [m] -> (..., N)."""
         return self.energy(u[..., 0, :])
 
     def value_and_gradient(self, x: np.ndarray, x_hat: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         offset = x - (self.x_hat if x_hat is None else x_hat)
         gradient = (self.masses / self.dt**2)[:, None] * offset
         return 0.5 * float(np.einsum("vi,vi", gradient, offset)), gradient  # BLAS would start threads
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 3, 3) [N/m] of each vertex at x (V, 3) [m]."""
         return (self.masses / self.dt**2)[:, None, None] * np.eye(3)
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the vertices (n,) with second derivatives, and these (n, 3, 3) [N/m]; see Energy."""
         return np.arange(len(self.masses)), self.hessian_blocks(x)
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the vertices (V,) and m / dt^2 (V, 1, 1) [N/m]."""
         return np.arange(len(self.masses)), (self.masses / self.dt**2)[:, None, None]
 
 

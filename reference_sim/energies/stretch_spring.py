@@ -27,23 +27,30 @@ class StretchSpring(Energy):
         self.stiffness = float(stiffness)
 
     def parameters(self) -> dict[str, Any]:
+        """Return the stiffness [N/m]."""
         return {"stiffness_N_per_m": self.stiffness}
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each edge: u (..., N, 2, 3) [m] -> (..., N)."""
         import torch
 
         length = torch.linalg.vector_norm(u[..., 1, :] - u[..., 0, :], dim=-1)
         return self.stiffness * (length - torch.as_tensor(self.rest_lengths).to(u)) ** 2
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.rest_lengths, self.stiffness, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 6, 6) [N/m] of each edge at x (V, 3) [m]."""
         return self.active_hessian_blocks(x)[1]
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """+-2k [n n^T + (1 - l0/l)(I - n n^T)]; a spring shorter than l0 is negative across itself."""
+        """Return +-2k [n n^T + (1 - l0/l)(I - n n^T)], see Energy.
+
+        A spring shorter than l0 is negative across itself.
+        """
         d = x[self.stencils[:, 1]] - x[self.stencils[:, 0]]
         length = np.linalg.norm(d, axis=1)
         n = d / length[:, None]
@@ -54,6 +61,7 @@ class StretchSpring(Energy):
         return np.arange(len(block)), np.block([[block, -block], [-block, block]])
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the edges (N,) and their stiffness (N, 2, 2) [N/m] along themselves, in every direction."""
         block = 2 * self.stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
         return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
 

@@ -1,4 +1,4 @@
-"""Where the blocks of elements lie among the values of a matrix."""
+"""Places of the blocks of elements among the values of a matrix."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from reference_sim.kernels.kernel_cache import njit
 
 @dataclass(frozen=True)
 class BlockPlaces:
-    """Where the blocks of elements with k corners go in an array of values.
+    """Places of the blocks of elements with k corners in an array of values.
 
-    slots: (N, k k) number of each element's block of corners a, b at a k + b; -1 where it is not stored.
-    base, stride: by number; entry (i, j) of a block belongs at base + j stride + i.
-    size: of a block, 3 or 1.
+    Attributes:
+        slots: (N, k k) number of each element's block of corners a, b at a k + b; -1 where it is not stored.
+        base, stride: by number; entry (i, j) of a block belongs at base + j stride + i.
+        size: of a block, 3 or 1.
     """
 
     slots: np.ndarray
@@ -25,7 +26,7 @@ class BlockPlaces:
 
     @classmethod
     def one_by_one(cls, count: int, corners: int) -> BlockPlaces:
-        """Of `count` elements whose matrices (3k, 3k) lie one after the other, column by column."""
+        """Return the places of `count` elements whose matrices (3k, 3k) lie in a row, by columns."""
         a, b = np.divmod(np.arange(corners**2), corners)
         width = 3 * corners
         base = (width**2 * np.arange(count)[:, None] + 3 * width * b + 3 * a).ravel()

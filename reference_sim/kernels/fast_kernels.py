@@ -1,8 +1,8 @@
 """How a term declares its fast kernels, and how a solver or a training finds them.
 
-An `Energy` names in its class attribute `kernels` what it has, by use (USES): "module:function", or the name of
-a function of its own file. The module is imported when a solver asks. Nobody keeps a list of terms. Where a
-kernel is missing, a solver that has a slower way says so once (`warn_slow_path`); the others refuse the term.
+An `Energy` names in its class attribute `kernels` what it has, by use (USES): "module:function", or the name
+of a function of its own file. The module is imported when a solver asks. Nobody keeps a list of terms. Where
+a kernel is missing, a solver with a slower way says so once (`warn_slow_path`); the others refuse the term.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 USES = {
     "vertex_inertia": "(V,) [N/m] of a pull towards term.x_hat: early-stopped L-BFGS, block descent, XPBD",
     "vertex_weights": "(V,) [N] of a constant pull along -y: early-stopped L-BFGS, block descent, XPBD",
-    "float32_lanes": "kernels.float32_lanes.Float32Lanes: early-stopped L-BFGS, and with it the start of LBFGS",
+    "float32_lanes": "kernels.float32_lanes.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS",
     "vertex_block": "kernels.element_sweeps.VertexBlocks: vertex block descent",
     "constraint": "kernels.element_sweeps.Constraints: XPBD",
     "training_batch": "kernels.training_lanes.BatchKernel: the loss of trainings on a CPU",

@@ -71,9 +71,10 @@ def empty_state(vertices: np.ndarray, quantities: int) -> np.ndarray:
 
 @njit(cache=True)
 def set_edges(x, vertices, columns, out):
-    """Write into out (B, 3 columns LANES_FLOAT32) float32 the edges x_(k+1) - x_0, k < columns, of each element.
+    """Write the edges x_(k+1) - x_0, k < columns, of each element into out.
 
-    They are taken from x (V, 3) float64 [m]. vertices (B, k LANES_FLOAT32): 3 times the vertex.
+    They are taken from x (V, 3) float64 [m]. With L for LANES_FLOAT32: vertices (B, k L), 3 times the vertex;
+    out (B, 3 columns L) float32.
     """
     for b in range(len(vertices)):
         for g in range(LANES_FLOAT32):

@@ -1,8 +1,8 @@
-"""Elements worked out LANES_FLOAT64 at a time in float64: what is shared by kernels that do so.
+"""Layout of the kernels beside the definitions: float64, LANES_FLOAT64 elements at a time.
 
-A kernel copies corners and constants of LANES_FLOAT64 elements into one array u of known size, row after row, works
-them out in a loop of fixed length without a branch, which the compiler turns into vector instructions, and
-hands the results out one by one. Within one array it knows that nothing overlaps.
+A kernel copies corners and constants of LANES_FLOAT64 elements into one array u of known size, row after row,
+works them out in a loop of fixed length without a branch, which the compiler turns into vector instructions,
+and hands the results out one by one. Within one array it knows that nothing overlaps.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _P6, _P7, _P8, _P9, _P10, _P11 = (
 
 @njit(cache=True, inline="always", error_model="numpy")
 def arctan2(y, x):
-    """Without a branch, within 2e-16 of the angle; (0, 0) gives NaN."""
+    """Return the angle without a branch, within 2e-16; (0, 0) gives NaN."""
     along, across = abs(x), abs(y)
     low, high = min(along, across), max(along, across)
     steep = low > _STEEP * high

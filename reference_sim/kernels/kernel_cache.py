@@ -37,7 +37,7 @@ _folders: dict[str, Path | None] = {}
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
-    """Decorator `numba.njit(**options)`, where cache=True means a cache that sees other files too.
+    """Return the decorator `numba.njit(**options)`, where cache=True means a cache that sees other files too.
 
     What a kernel takes from another file is to be imported above the first kernel of its own file. Where no
     folder can be written, every process compiles for itself.
@@ -56,22 +56,24 @@ def njit(**options: Any) -> Callable[[Any], Any]:
 
 
 class KernelLocator(InTreeCacheLocator):
-    """Tells numba where the compiled kernels of a function lie and whether they are still good."""
+    """Answer to numba where the compiled kernels of a function lie and whether they are still good."""
 
     def __init__(self, function: Any, file: str) -> None:
         super().__init__(function, file)
         self._module = function.__module__
 
     def get_cache_path(self) -> str:
+        """Return the folder of the compiled kernels."""
         return str(_folders[self._module])
 
     def get_source_stamp(self) -> str:
+        """Return the digest by which numba knows that the source is the same."""
         return _digests[self._module]
 
 
 @contextlib.contextmanager
 def _locator_in_use() -> Iterator[None]:
-    """numba asks for a locator when it decorates; kernels of other packages keep their own."""
+    """Let numba ask this locator while it decorates; kernels of other packages keep their own."""
     given = _config.CACHE_LOCATOR_CLASSES
     _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
     try:
@@ -103,7 +105,7 @@ def _digest(function: Any) -> str:
 
 
 def _folder(function: Any, digest: str) -> Path | None:
-    """The writable folder for a module's kernels of this digest; None if there can be none."""
+    """Return the writable folder for a module's kernels of this digest; None if there can be none."""
     beside = Path(function.__code__.co_filename).parent / "__pycache__"
     given, of_user = _config.CACHE_DIR, AppDirs(appname="numba", appauthor=False).user_cache_dir
     for base in [given] if given else [beside, of_user]:

@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.training_lanes import TRAINING_LANES as L
 
 WIDE = ir.IntType(64)
 _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
@@ -21,17 +21,12 @@ _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the funct
 
 @_intrinsic
 def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
-    """Row j of target becomes row i of source: rows of TRAINING_LANES numbers in flat float32 arrays."""
+    """Copy row i of source to row j of target: rows of TRAINING_LANES numbers in flat float32 arrays."""
 
     def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = builder.load(
-            _place(context, builder, signature.args[:2], args[:2], TRAINING_LANES, TRAINING_LANES), align=4
-        )
-        builder.store(
-            numbers,
-            _place(context, builder, signature.args[2:], args[2:], TRAINING_LANES, TRAINING_LANES),
-            align=4,
-        )
+        source_row = _place(context, builder, signature.args[:2], args[:2], L, L)
+        target_row = _place(context, builder, signature.args[2:], args[2:], L, L)
+        builder.store(builder.load(source_row, align=4), target_row, align=4)
         return context.get_dummy_value()
 
     return types.void(source, i, target, j), built
@@ -39,13 +34,11 @@ def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
 
 @_intrinsic
 def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
-    """Row i of source is added to row j of target, which may also be one of float64."""
+    """Add row i of source to row j of target, which may also be one of float64."""
 
     def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = builder.load(
-            _place(context, builder, signature.args[:2], args[:2], TRAINING_LANES, TRAINING_LANES), align=4
-        )
-        place = _place(context, builder, signature.args[2:], args[2:], TRAINING_LANES, TRAINING_LANES)
+        numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], L, L), align=4)
+        place = _place(context, builder, signature.args[2:], args[2:], L, L)
         if signature.args[2].dtype == types.float64:
             numbers = builder.fpext(numbers, place.type.pointee)
         builder.store(builder.fadd(builder.load(place, align=4), numbers), place, align=4)
@@ -56,8 +49,9 @@ def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
 
 @_intrinsic
 def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
-    """u rows[i] + v rows[j] + w rows[k], three numbers: rows of three in a flat float32 array, and one number
-    more after the last, for a row is loaded as four.
+    """Return u rows[i] + v rows[j] + w rows[k], three numbers.
+
+    Rows of three lie in a flat float32 array, with one number more after the last: a row is loaded as four.
     """
 
     def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -77,7 +71,7 @@ def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any
 
 
 def _place(context: Any, builder: Any, kinds: Any, args: Any, size: int, loaded: int) -> Any:
-    """Where a row of `size` numbers begins, as a vector. kinds, args: of array and row number."""
+    """Return where a row of `size` numbers begins, as a vector. kinds, args: of array and row number."""
     array, number = kinds
     start = context.make_array(array)(context, builder, args[0]).data
     place = builder.gep(start, [builder.mul(context.cast(builder, args[1], number, types.intp), WIDE(size))])

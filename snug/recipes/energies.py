@@ -2,7 +2,8 @@
 
 Whatever stands in the registry `reference_sim.energies.MODULE_OF`, and every other subclass of Energy that
 has been imported, can be named in `Recipe.terms`, if the rest state of the garment is all that it needs. No
-list has to be edited: a term without a kernel is trained by its definition in torch and automatic gradients.
+list has to be edited: a term that declares no kernel "training_batch" is trained more slowly, and one line
+says so.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from reference_sim.energies import Energy
 def find_energy(name: str) -> Callable[..., Energy]:
     """Return the function that makes the energy of that name from a Cloth, its options at their defaults.
 
-    Raises ValueError for an unknown name, for one that two have, and for what cannot be trained.
-    That is what is made of more than a cloth, what must be prepared for each step of a simulation (see
-    Energy.prepare), and what finds its stencils anew as vertices move (Energy.dynamic).
+    Raises:
+        ValueError: an unknown name, one that two have, or an energy that cannot be trained: it is made of
+            more than a cloth, must be prepared for each step of a simulation (Energy.prepare), or finds its
+            stencils anew as vertices move (Energy.dynamic).
     """
     for class_name in energies.MODULE_OF:
         getattr(energies, class_name)  # imported by it
@@ -46,7 +48,7 @@ def _subclasses(of: type[Energy]) -> Iterator[type[Energy]]:
 
 
 def _reason_against(term: type[Energy]) -> str:
-    """Why a term cannot be part of a loss; empty if it can."""
+    """Say why a term cannot be part of a loss; empty if it can."""
     parameters = inspect.signature(term).parameters.values()
     variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     needed = [p.name for p in parameters if p.default is p.empty and p.kind not in variadic]

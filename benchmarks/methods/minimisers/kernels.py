@@ -1,4 +1,7 @@
-"""Sweeps over vertices and over constraints; the kernels of the terms are arguments of them (kernels.element_sweeps)."""
+"""Sweeps over vertices and over constraints, with the kernels of the terms as arguments.
+
+See reference_sim.kernels.element_sweeps for the kernels.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,10 @@ def sweep_vertices(x, free, inertia, terms):
 
 @njit(cache=True, error_model="numpy")
 def block(x, v, inertia, terms, g, H, scratch, out):
-    """Write the gradient g (3,) and the convex block H (3, 3) of vertex v; scratch and out (terms,) are room."""
+    """Write the gradient g (3,) and the convex block H (3, 3) of vertex v.
+
+    scratch and out (terms,) are room for the kernels.
+    """
     mass, x_hat, weight = inertia
     for i in range(3):
         g[i] = mass[v] * (x[v, i] - x_hat[v, i])

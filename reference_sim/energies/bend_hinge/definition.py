@@ -69,6 +69,7 @@ class BendHinge(Energy):
         self.rest_angles = np.array(angles)  # its own: a broadcast view is read-only
 
     def parameters(self) -> dict[str, Any]:
+        """Return scaling, mean stiffness and a fingerprint of stiffness and rest angles."""
         mean = float(self.stiffness.mean()) if len(self.stiffness) else 0.0
         return {
             "scaling": self.scaling,
@@ -77,6 +78,7 @@ class BendHinge(Energy):
         }
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each hinge: u (..., N, 4, 3) [m] -> (..., N)."""
         import torch
 
         stiffness = torch.as_tensor(self.stiffness).to(u)
@@ -89,19 +91,22 @@ class BendHinge(Energy):
         return 0.5 * stiffness * _wrap(theta - rest) ** 2
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.stiffness, self.rest_angles, gradient), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 12, 12) [N/m] of each hinge at x (V, 3) [m]."""
         return self.active_hessian_blocks(x)[1]
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """grad theta grad theta^T is never negative; the term with Hess theta is reduced by `convexity`."""
+        """Return the blocks, see Energy: grad theta grad theta^T, and Hess theta reduced by `convexity`."""
         blocks = np.zeros((len(self.stencils), 12, 12))
         self.add_hessian(x, convexity, BlockPlaces.one_by_one(len(blocks), 4), blocks.reshape(-1))
         return np.arange(len(blocks)), blocks
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
+        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix."""
         _hessian(
             x, self.stencils, self.stiffness, self.rest_angles, convexity, places.slots, places.base,
             places.stride, data,
@@ -109,7 +114,7 @@ class BendHinge(Energy):
 
 
 def _wrap(angle):
-    """The same angle in [-pi, pi): a hinge past half a turn is nearer from the other side."""
+    """Return the same angle in [-pi, pi): a hinge past half a turn is nearer from the other side."""
     import torch
 
     return torch.remainder(angle + np.pi, 2 * np.pi) - np.pi
@@ -117,7 +122,7 @@ def _wrap(angle):
 
 @njit(cache=True, inline="always", error_model="numpy")
 def _from_rest(theta, rest):
-    """theta - theta_0 in [-pi, pi)."""
+    """Return theta - theta_0 in [-pi, pi)."""
     theta -= rest
     return theta - 2 * np.pi * np.floor((theta + np.pi) / (2 * np.pi))
 
@@ -139,8 +144,10 @@ def dihedral_angles(x, hinges):
 
 @njit(cache=True, error_model="numpy")
 def _gradient(x, hinges, stiffness, rest, gradient):
-    """LANES_FLOAT64 hinges side by side, in vector instructions: from corners, stiffness and rest angle in u to
-    forces and energy. An incomplete group is filled up with the last hinge.
+    """Add the forces (V, 3) [N] to gradient; returns the energy [J].
+
+    LANES_FLOAT64 hinges lie side by side, for vector instructions: from corners, stiffness and rest angle in
+    u to forces and energy. An incomplete group is filled up with the last hinge.
     """
     L, count, total = LANES_FLOAT64, len(hinges), 0.0
     u = np.empty(14 * L)
@@ -183,7 +190,9 @@ def _gradient(x, hinges, stiffness, rest, gradient):
 
 @njit(cache=True, error_model="numpy")
 def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
-    """k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta], LANES_FLOAT64 hinges side by side.
+    """Add k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta] to data.
+
+    LANES_FLOAT64 hinges lie side by side.
 
     With the edge's length L and direction e, the foot t of a face's tip, m = n/|n|^2, p = m x e, the weights
     w = (L - t, t, -L) and signs r = (-1, 1, 0) of the edge's ends and the tip, and c = |n|^2 / (2 L^2), the
@@ -249,7 +258,7 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
 
 @njit(cache=True, inline="always")
 def _block(u, n, place, a, b, ra, rb):
-    """Block of corners a, b of the hinge in lane n, from what _hessian has put into u."""
+    """Write the block of corners a, b of the hinge in lane n, from what _hessian has put into u."""
     L = LANES_FLOAT64
     k, s = u[12 * L + n], u[13 * L + n]
     wa, wb, va, vb = u[(20 + a) * L + n], u[(20 + b) * L + n], u[(24 + a) * L + n], u[(24 + b) * L + n]

@@ -1,4 +1,7 @@
-"""Hinges in float32, LANES_FLOAT32 at a time: the kernel of early-stopped L-BFGS (kernels.float32_lanes)."""
+"""Hinges in float32, LANES_FLOAT32 at a time: the kernel of early-stopped L-BFGS.
+
+See kernels.float32_lanes for the layout.
+"""
 
 from __future__ import annotations
 
@@ -53,8 +56,8 @@ def lanes(term: BendHinge) -> Float32Lanes:
 def hinge_gradient(data, u, gradient, s):
     """Return the energy [J] of the hinges and add to gradient (3V,) [N].
 
-    vertices (B, 4 LANES_FLOAT32): 3 times the vertex. constants (B, 2 LANES_FLOAT32): stiffness [J], rest angle [rad]. edges
-    (B, 9 LANES_FLOAT32): of x_0.
+    With L for LANES_FLOAT32: vertices (B, 4 L): 3 times the vertex. constants (B, 2 L): stiffness [J], rest
+    angle [rad]. edges (B, 9 L): of x_0.
     """
     vertices, constants, edges = data
     total = 0.0

@@ -1,4 +1,7 @@
-"""One hinge at a time: the kernels of vertex block descent and XPBD (kernels.element_sweeps)."""
+"""One hinge at a time: the kernels of vertex block descent and XPBD.
+
+See kernels.element_sweeps for the layout.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Hinges of many configurations at once, in float32: the kernel of training on a CPU (kernels.training_lanes)."""
+"""Hinges of many configurations at once in float32: the kernel of training on a CPU.
+
+See kernels.training_lanes for the layout.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +57,7 @@ def _bending(
     values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:
-    """theta = atan2(e . (n1 x n2) / |e|, n1 . n2); d theta/d x_a = +- w_a n/|n|^2, see definition."""
+    """Set values [J] and add to gradients [N]; d theta / d x_a = +- w_a n / |n|^2, as in definition."""
     L = TRAINING_LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
     for block in range(len(values)):

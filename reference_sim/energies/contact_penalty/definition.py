@@ -90,6 +90,7 @@ class ContactPenalty(Energy):
         self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
 
     def parameters(self) -> dict[str, Any]:
+        """Return the kind of samples, margin and mean stiffness."""
         return {
             "samples": self.samples,
             "margin_m": self.margin,
@@ -97,6 +98,7 @@ class ContactPenalty(Energy):
         }
 
     def prepare(self, step: Step) -> None:
+        """Freeze one contact plane for each sample, at the guess. Raises ValueError without an obstacle."""
         if step.obstacle is None:
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
         samples = self.sample_matrix @ step.guess
@@ -108,7 +110,7 @@ class ContactPenalty(Energy):
         self.step = step
 
     def _reach(self, step: Step) -> np.ndarray:
-        """(S,) [m] from the guess within which a sample may meet the body in this step.
+        """Return how far (S,) [m] from the guess a sample may meet the body in this step.
 
         Left alone it flies to x + dt v, its weight pulls it another g dt^2 down, and a pin takes it along.
         """
@@ -118,7 +120,10 @@ class ContactPenalty(Energy):
         return np.maximum(flight, pulled) + GRAVITY * step.dt**2 + self.margin + SLACK
 
     def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
-        """x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S) [J]; default: the prepared planes."""
+        """Return E [J] of each sample: x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S).
+
+        Planes default to the prepared ones.
+        """
         import torch
 
         index = torch.as_tensor(self.stencils, device=x.device)
@@ -127,6 +132,7 @@ class ContactPenalty(Energy):
     def element_energy(
         self, u: Tensor, points: Tensor | None = None, normals: Tensor | None = None
     ) -> Tensor:
+        """Return E [J] of each sample: u (..., N, 3, 3) [m] -> (..., N)."""
         import torch
 
         c = torch.as_tensor(self.points).to(u) if points is None else points
@@ -138,6 +144,7 @@ class ContactPenalty(Energy):
     def value_and_gradient(
         self, x: np.ndarray, points: np.ndarray | None = None, normals: np.ndarray | None = None
     ) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         c = self.points if points is None else points
         n = self.normals if normals is None else normals
@@ -145,33 +152,36 @@ class ContactPenalty(Energy):
         return value, gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 9, 9) [N/m] of each sample at x (V, 3) [m]."""
         return self.expanded(*self.active_hessian_blocks(x))
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the samples (n,) with second derivatives, and these (n, 9, 9) [N/m]; see Energy."""
         elements, curvatures = self._curvatures(x)
         along = (self.weights[elements, :, None] * self.normals[elements, None, :]).reshape(-1, 9)
         return elements, curvatures[:, None, None] * along[:, :, None] * along[:, None, :]
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
+        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix."""
         _add_hessian(
             *self._curvatures(x), self.weights, self.normals, places.slots, places.base, places.stride, data
         )
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The curvature along the normal, taken in every direction; for samples in contact at x."""
+        """Return the curvature along the normal, in all directions, of samples in contact; see Energy."""
         elements, curvatures = self._curvatures(x)
         w = self.weights[elements]
         return elements, curvatures[:, None, None] * w[:, :, None] * w[:, None, :]
 
     def _curvatures(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Samples in contact at x (n,) and their curvatures along the normal (n,) [N/m]."""
+        """Return samples in contact at x (n,) and their curvatures along the normal (n,) [N/m]."""
         return _curvatures(
             x, self.stencils, self.weights, self.stiffness, self.margin, self.points, self.normals
         )
 
 
 def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stencils (S, 3), weights (S, 3) and areas (S,) of the contact samples.
+    """Return stencils (S, 3), weights (S, 3) and areas (S,) of the contact samples.
 
     All stencils have three vertices so that one kernel serves them; a vertex sample repeats itself with
     weight 0.
@@ -193,7 +203,7 @@ def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 @njit(cache=True, inline="always")
 def _depth(x, stencil, weight, margin, c, n):
-    """max(eps - n.(x_s - c), 0)."""
+    """Return max(eps - n.(x_s - c), 0)."""
     distance = 0.0
     for i in range(3):
         sample = weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
@@ -217,7 +227,7 @@ def _gradient(x, stencils, weights, stiffness, margin, points, normals, gradient
 
 @njit(cache=True)
 def _curvatures(x, stencils, weights, stiffness, margin, points, normals):
-    """6 k a_s depth of the samples in contact."""
+    """Return the samples in contact and their curvatures 6 k a_s depth."""
     elements, curvatures, count = np.empty(len(stencils), np.int64), np.empty(len(stencils)), 0
     for s in range(len(stencils)):
         depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
@@ -229,7 +239,7 @@ def _curvatures(x, stencils, weights, stiffness, margin, points, normals):
 
 @njit(cache=True)
 def _add_hessian(elements, curvatures, weights, normals, slots, base, stride, data):
-    """Each curvature times n n^T, spread by the sample's weights."""
+    """Add each curvature times n n^T, spread by the sample's weights."""
     for k in range(len(elements)):
         s = elements[k]
         for a in range(3):

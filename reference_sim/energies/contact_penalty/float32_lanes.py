@@ -84,9 +84,9 @@ def _depths(x, order, vertices, constants, points, normals, margin, far, state):
 def contact_gradient(data, u, gradient, s):
     """Return the energy [J] of the contact penalty and add to gradient (3V,) [N].
 
-    near: the blocks that are looked at. vertices (B, 3 LANES_FLOAT32): 3 times the vertex. constants (B, 4 LANES_FLOAT32):
-    weights, stiffness [J/m^3]. planes (B, 4 LANES_FLOAT32): normal, and the depth of x_0 under the margin [m], below
-    zero above it.
+    near: the blocks that are looked at. With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the vertex.
+    constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the depth of x_0 under the
+    margin [m], below zero above it.
     """
     near, vertices, constants, planes = data
     total = 0.0

@@ -1,4 +1,7 @@
-"""The contact penalty of one sample at a time: the kernels of vertex block descent and XPBD (kernels.element_sweeps)."""
+"""The contact penalty of one sample at a time: the kernels of vertex block descent and XPBD.
+
+See kernels.element_sweeps for the layout.
+"""
 
 from __future__ import annotations
 

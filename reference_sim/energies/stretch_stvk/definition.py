@@ -49,9 +49,11 @@ class StretchStVK(Energy):
         self._predicted_stress: np.ndarray | None = None  # (F, 3) stresses S00, S11, S01 [N/m]
 
     def parameters(self) -> dict[str, Any]:
+        """Return lambda and mu [N/m]."""
         return {"lambda_N_per_m": self.lam, "mu_N_per_m": self.mu}
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each face: u (..., N, 3, 3) [m] -> (..., N)."""
         import torch
 
         Dm_inverse = torch.as_tensor(self.Dm_inverse).to(u)
@@ -63,20 +65,23 @@ class StretchStVK(Energy):
         return area * (0.5 * self.lam * trace**2 + self.mu * (G * G).sum((-1, -2)))
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         value = _gradient(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, gradient)
         return value, gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (N, 9, 9) [N/m] of each face at x (V, 3) [m]."""
         return self.active_hessian_blocks(x)[1]
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Negative curvature comes from compressive stress alone, so only that is reduced by `convexity`."""
+        """Return the blocks, see Energy; compressive stress alone is negative and reduced by `convexity`."""
         blocks = np.zeros((len(self.stencils), 9, 9))
         self.add_hessian(x, convexity, BlockPlaces.one_by_one(len(blocks), 3), blocks.reshape(-1))
         return np.arange(len(blocks)), blocks
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
+        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix."""
         stress = self._predicted_stress
         if stress is None:
             stress = self._stress(x, np.zeros_like(x))
@@ -88,9 +93,11 @@ class StretchStVK(Energy):
         )  # fmt: skip
 
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
+        """Let the Hessian take the stress that linear strain predicts at x + step; see Energy."""
         self._predicted_stress = self._stress(x, step)
 
     def forget(self) -> None:
+        """Let the Hessian take the stress at x again."""
         self._predicted_stress = None
 
     def _stress(self, x: np.ndarray, step: np.ndarray) -> np.ndarray:
@@ -99,7 +106,7 @@ class StretchStVK(Energy):
         return stress
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(mu + lambda/2) times the cotangent Laplacian.
+        """Return (mu + lambda/2) times the cotangent Laplacian.
 
         At rest the Hessian's mean over directions is (lambda + 3 mu)/2 of it in the plane of the cloth and
         lambda/3 + mu of it in space; this lies between the two.
@@ -111,7 +118,7 @@ class StretchStVK(Energy):
 
 @njit(cache=True, inline="always")
 def _deformation(x, face, D, fa, fb):
-    """Strain (G00, G11, G01); the columns of F are written into fa and fb."""
+    """Return the strain (G00, G11, G01); the columns of F are written into fa and fb."""
     for i in range(3):
         e1 = x[face[1], i] - x[face[0], i]
         e2 = x[face[2], i] - x[face[0], i]
@@ -125,10 +132,11 @@ def _deformation(x, face, D, fa, fb):
 
 @njit(cache=True, error_model="numpy")
 def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
-    """dE/dx_a = A F S b_a with S = lambda tr(G) I + 2 mu G and b_a the gradient of the hat function.
+    """Add dE/dx_a = A F S b_a to gradient; returns the energy [J].
 
-    LANES_FLOAT64 faces side by side, in vector instructions: from corners, Dm^-1 and area in u to forces and energy.
-    An incomplete group is filled up with the last face.
+    S = lambda tr(G) I + 2 mu G, and b_a is the gradient of the hat function. LANES_FLOAT64 faces lie side by
+    side, for vector instructions: from corners, Dm^-1 and area in u to forces and energy. An incomplete group
+    is filled up with the last face.
     """
     L, count, total = LANES_FLOAT64, len(faces), 0.0
     u = np.empty(14 * L)
@@ -174,7 +182,7 @@ def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
 
 @njit(cache=True)
 def _less_compressed(stress, keep):
-    """Of stresses S00, S11, S01 (F, 3) as symmetric matrices, the negative eigenvalues times `keep`."""
+    """Multiply the negative eigenvalues of stresses S00, S11, S01 (F, 3) by `keep`."""
     reduced = stress.copy()
     for f in range(len(stress)):
         mean, half = 0.5 * (stress[f, 0] + stress[f, 1]), 0.5 * (stress[f, 0] - stress[f, 1])
@@ -198,7 +206,10 @@ def _less_compressed(stress, keep):
 
 @njit(cache=True)
 def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
-    """S00, S11, S01 of S = lambda tr(G) I + 2 mu G with G(x) + sym(F(x)^T dF), linear in the step."""
+    """Write S00, S11, S01 into stress (F, 3), linear in the step.
+
+    S = lambda tr(G) I + 2 mu G with G(x) + sym(F(x)^T dF) in place of G.
+    """
     fa, fb, da, db = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for f in range(faces.shape[0]):
         G00, G11, G01 = _deformation(x, faces[f], Dm_inverse[f], fa, fb)
@@ -213,9 +224,9 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
 
 @njit(cache=True, error_model="numpy")
 def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, data):
-    """K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)].
+    """Add K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)].
 
-    LANES_FLOAT64 faces side by side; stress (F, 3) holds S00, S11, S01.
+    LANES_FLOAT64 faces lie side by side; stress (F, 3) holds S00, S11, S01.
     """
     L, count = LANES_FLOAT64, len(faces)
     u = np.empty((BLOCKS + 54) * L)
@@ -259,7 +270,7 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, 
 
 @njit(cache=True, inline="always")
 def _block(u, n, place, a, c, lam, mu):
-    """Block of corners a, c of the face in lane n, from what _hessian has put into u."""
+    """Write the block of corners a, c of the face in lane n, from what _hessian has put into u."""
     L = LANES_FLOAT64
     ax, ay, az = u[3 * a * L + n], u[(3 * a + 1) * L + n], u[(3 * a + 2) * L + n]
     cx, cy, cz = u[3 * c * L + n], u[(3 * c + 1) * L + n], u[(3 * c + 2) * L + n]

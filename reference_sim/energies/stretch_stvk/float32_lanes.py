@@ -1,4 +1,7 @@
-"""StVK in float32, LANES_FLOAT32 faces at a time: the kernel of early-stopped L-BFGS (kernels.float32_lanes)."""
+"""StVK in float32, LANES_FLOAT32 faces at a time: the kernel of early-stopped L-BFGS.
+
+See kernels.float32_lanes for the layout.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +42,8 @@ def lanes(term: StretchStVK) -> Float32Lanes:
 def membrane_gradient(data, u, gradient, s):
     """Return the energy [J] of StVK and add to gradient (3V,) [N].
 
-    vertices (B, 3 LANES_FLOAT32): 3 times the vertex. constants (B, 5 LANES_FLOAT32): Dm^-1 by rows, rest area. edges
-    (B, 6 LANES_FLOAT32): of x_0.
+    With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the vertex. constants (B, 5 L): Dm^-1 by rows, rest
+    area. edges (B, 6 L): of x_0.
     """
     vertices, constants, edges, lam, mu = data
     total = 0.0

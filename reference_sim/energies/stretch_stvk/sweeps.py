@@ -1,4 +1,7 @@
-"""StVK of one face at a time: the kernels of vertex block descent and XPBD (kernels.element_sweeps)."""
+"""StVK of one face at a time: the kernels of vertex block descent and XPBD.
+
+See kernels.element_sweeps for the layout.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +67,10 @@ def _add_block(data, x, v, g, H, scratch):
 
 @njit(cache=True, inline="always")
 def _add_strain(x, e, corner, membrane, g, H, fa, fb):
-    """Add A F S b and A [(b.S+ b) I + (lambda + mu) (F b)(F b)^T + mu |b|^2 F F^T], S+ without compression."""
+    """Add A F S b to g and A [(b.S+ b) I + (lambda + mu) (F b)(F b)^T + mu |b|^2 F F^T] to H.
+
+    S+ is S without compression.
+    """
     faces, Dm_inverse, areas, lam, mu = membrane
     G00, G11, G01 = strain(x, faces[e], Dm_inverse[e], fa, fb)
     trace = lam * (G00 + G11)

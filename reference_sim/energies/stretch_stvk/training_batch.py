@@ -1,4 +1,7 @@
-"""StVK of many configurations at once, in float32: the kernel of training on a CPU (kernels.training_lanes)."""
+"""StVK of many configurations at once in float32: the kernel of training on a CPU.
+
+See kernels.training_lanes for the layout.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,7 @@ def _strain(
     values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:
-    """E = A (lambda/2 tr(G)^2 + mu tr(G^2)), dE/dx_a = A F S b_a, see definition._gradient."""
+    """Set values [J] and add dE/dx_a = A F S b_a to gradients [N], as in definition."""
     L = TRAINING_LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)
     for block in range(len(values)):

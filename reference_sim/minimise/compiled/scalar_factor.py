@@ -18,7 +18,7 @@ WIDTH = 4  # numbers a row of right sides: x, y, z and one to fill the lane
 
 
 class ScalarPattern:
-    """Where the entries of a symmetric n x n matrix lie, that elements with these stencils add up to.
+    """Pattern of a symmetric n x n matrix that elements with these stencils add up to.
 
     Args:
         stencils: (E, k) each, of numbers below n; -1 where a vertex is pinned.
@@ -55,12 +55,13 @@ class ScalarPattern:
 
     @property
     def entries(self) -> int:
-        """Of the matrix as it is stored: left of the diagonal, then the diagonal."""
+        """Number of entries of the matrix as stored: left of the diagonal, then the diagonal."""
         return len(self.row_columns) + self.count
 
     def places(self, stencils: np.ndarray) -> np.ndarray:
-        """(E, k, k) where the entries of an element's matrix are added; -1 for those above the diagonal, of
-        pinned vertices, and of an element that has a vertex twice.
+        """Return where (E, k, k) the entries of the elements' matrices are added.
+
+        It is -1 for those above the diagonal, of pinned vertices, and of an element that has a vertex twice.
         """
         i = np.append(self._place, -1)[stencils]
         row, column = np.broadcast_arrays(i[:, :, None], i[:, None, :])
@@ -73,7 +74,7 @@ class ScalarPattern:
 
 
 def _pattern_of_rows(starts: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of L, in two passes: first their lengths."""
+    """Return the rows of L, found in two passes: first their lengths."""
     count = len(starts) - 1
     lengths = np.zeros(count + 1, np.int64)
     _row_patterns(starts, columns, lengths, np.empty(0, np.int64))
@@ -124,7 +125,7 @@ def _by_columns(factor_rows, factor_columns):
 
 @njit(cache=True, error_model="numpy")
 def factorise(values, row_starts, row_columns, factor_rows, factor_columns, starts, rows, L, D, y, filled):
-    """L (by columns) and D (n,) of the matrix with these values; False if a pivot is not positive.
+    """Write L (by columns) and D (n,) of the matrix with these values; False if a pivot is not positive.
 
     y (n,) zeros and filled (n,): room to work in.
     """
@@ -154,7 +155,7 @@ def factorise(values, row_starts, row_columns, factor_rows, factor_columns, star
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def solve(starts, rows, L, D, b):
-    """b (n, WIDTH), in the factor's order, becomes the solution."""
+    """Replace b (n, WIDTH), in the factor's order, by the solution."""
     count = len(D)
     for j in range(count):
         b0, b1, b2, b3 = b[j, 0], b[j, 1], b[j, 2], b[j, 3]

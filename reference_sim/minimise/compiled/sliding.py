@@ -1,4 +1,4 @@
-"""The compiled parts of sliding places: see sliding_obstacle."""
+"""Compiled parts of sliding places: see sliding_obstacle."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ def _set(s, points, face, v, w, vertices, faces, barycentric, closest):
 def slide(
     points, turn, vertices, faces, adjacency, centroids, home, reach, anchors, barycentric, closest, distance
 ):
+    """Let every sample slide over the surface to its foot; those that are FAR away take turns."""
     corners = np.empty((1, 3, 3))
     for s in range(len(points)):
         if distance[s] > FAR and (s + turn) % SELDOM != 0:
@@ -81,6 +82,7 @@ def ask_neighbours(
 
 @njit(cache=True)
 def gaps_of(points, closest, normals):
+    """Return the height (S,) [m] of each sample above its plane."""
     gaps = np.empty(len(points))
     for s in range(len(points)):
         gap = 0.0
@@ -91,11 +93,11 @@ def gaps_of(points, closest, normals):
 
 
 @njit(cache=True, error_model="numpy")
-def not_outside(found, points, home, vertices, faces):
-    """Those of the samples that found no face that do not lie outside by the plane of their home face."""
+def not_outside(nearest, points, home, vertices, faces):
+    """Return the samples without a nearest face (-1) that are not outside by the plane of their home face."""
     deep, count = np.empty(len(points), np.int64), 0
     for s in range(len(points)):
-        if found[s] < 0:
+        if nearest[s] < 0:
             i, j, k = faces[home[s], 0], faces[home[s], 1], faces[home[s], 2]
             n = cross_of_face(vertices, i, j, k)
             height = 0.0

@@ -60,7 +60,7 @@ class SlidingObstacle(Obstacle):
             anchors.forget()
 
     def _pose(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices and normals at a frame, with the tree fitted to it."""
+        """Return vertices and normals at a frame, with the tree fitted to it."""
         if self._posed is None or self._posed[0] != frame:
             assert self._patch is not None
             vertices = self._patch.posed(self.at(frame))
@@ -85,7 +85,7 @@ class SlidingObstacle(Obstacle):
         rest_points: np.ndarray | None = None,
         reach: np.ndarray | None = None,
     ) -> Planes:
-        """As the exact ones. Without `reach`, other limbs are found by the rotation alone."""
+        """Return planes as the exact obstacle does; without `reach` the rotation alone finds other limbs."""
         frame = min(frame, self.frames - 1)
         anchors = self._anchors(points, rest_points)
         assert self._patch is not None
@@ -114,8 +114,10 @@ class SlidingObstacle(Obstacle):
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
     ) -> np.ndarray:
-        """As the exact one. Points that are the first of a larger set of samples ride with the places of
-        those, where they were when planes were last asked for.
+        """Carry points along as the exact obstacle does.
+
+        Points that are the first of a larger set of samples ride with the places of those, where they were
+        when planes were last asked for.
         """
         before, after = (min(f, self.frames - 1) for f in (frame - 1, frame))
         anchors = self._anchors(points, rest_points)
@@ -135,7 +137,7 @@ class SlidingObstacle(Obstacle):
 
 
 class _Patch:
-    """The faces that some sample may meet, and a tree of them."""
+    """Faces that some sample may meet, and a tree of them."""
 
     def __init__(self, obstacle: Obstacle, rest_points: np.ndarray | None) -> None:
         centroids = obstacle.rest_centroids
@@ -151,12 +153,12 @@ class _Patch:
         self.tree = FaceTree(self.faces, self.centroids)
 
     def posed(self, positions: np.ndarray) -> np.ndarray:
-        """Its own vertices among those of the body."""
+        """Return its own vertices among those of the body (B, 3)."""
         return positions[self.vertices]
 
 
 class _Anchors:
-    """The place of each of S samples on the patch."""
+    """Place of each of S samples on the patch."""
 
     def __init__(self, home: np.ndarray, rest_points: np.ndarray | None) -> None:
         count = len(home)
@@ -172,14 +174,14 @@ class _Anchors:
         self.forget()
 
     def leads(self, other: _Anchors) -> bool:
-        """Whether the other's samples are the first of these."""
+        """Return whether the other's samples are the first of these."""
         if id(other) not in self._led:
             first = self.home[: len(other.home)]
             self._led[id(other)] = other is not self and np.array_equal(first, other.home)
         return self._led[id(other)]
 
     def _home_faces(self, patch: _Patch) -> np.ndarray:
-        """(S,) the face whose rest centroid is nearest to the sample at rest."""
+        """Return the face (S,) whose rest centroid is nearest to each sample at rest."""
         if self._home is None:
             self._home = cKDTree(patch.centroids).query(self.home)[1]
         return self._home
@@ -232,12 +234,15 @@ class _Anchors:
         region: float,
         reach: np.ndarray | None = None,
     ) -> None:
-        """Exact closest points for some samples; with a reach (S,) [m], for those that have one within it."""
+        """Search the closest points of some samples exactly.
+
+        With a reach (S,) [m], only samples that have one within it get another place.
+        """
         if not len(which):
             return
         rest = None if self.rest_points is None else self.rest_points[which]
         hints: Any = self.faces[which]
-        found = patch.tree.nearest(
+        nearest = patch.tree.nearest(
             points[which],
             hints=None if (hints < 0).any() else hints,
             rest_points=rest,
@@ -245,8 +250,8 @@ class _Anchors:
             reach=None if reach is None else reach[which],
             sequence=np.arange(len(which)),
         )
-        known = found.faces >= 0
+        known = nearest.faces >= 0
         which = which[known]
-        self.faces[which] = found.faces[known]
-        self.barycentric[which], self.closest[which] = found.barycentric[known], found.points[known]
+        self.faces[which] = nearest.faces[known]
+        self.barycentric[which], self.closest[which] = nearest.barycentric[known], nearest.points[known]
         self.distance[which] = np.linalg.norm(points[which] - self.closest[which], axis=1)
