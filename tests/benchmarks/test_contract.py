@@ -186,7 +186,7 @@ def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monke
         name=how, description="", module="tests.benchmarks.runner.misbehaving", options={"how": how}, declared_in="tests.benchmarks.runner.misbehaving",
         needs_no_obstacle=True,
     )  # fmt: skip
-    monkeypatch.setattr(check, "BARE", ("free_fall",))
+    monkeypatch.setattr("benchmarks.contract.check_files.BARE", ("free_fall",))
     found = list(check_files(Declarations([entry]), tmp_path, 4.0))
     assert [fine for _, fine in found] == [False] and words in found[0][0]
 
@@ -202,7 +202,7 @@ def test_the_check_says_what_is_skipped_everywhere(tmp_path):
 @pytest.fixture
 def in_process(monkeypatch):
     monkeypatch.setattr(
-        "benchmarks.runner.local_executor.LocalExecutor", lambda run, assets, workers: InProcess(run, assets)
+        "benchmarks.contract.check_files.LocalExecutor", lambda run, assets, workers: InProcess(run, assets)
     )
 
 
@@ -247,7 +247,7 @@ def test_the_command_asks_metrics_for_their_judgement_and_takes_curves_of_vertic
     assert check.main([str(tmp_path / "none.py"), str(tmp_path / "lost.py")]) == 0
     assert check.main([str(tmp_path / "word.py"), str(tmp_path / "no.py")]) == 1
     out = capsys.readouterr().out
-    assert "judge() gives 'lost': None, or a status" in out
+    assert "judge() gives 'lost': expected None, or a status" in out
     assert "judge() of simulation raises ZeroDivisionError" in out
 
 

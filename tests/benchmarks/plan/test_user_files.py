@@ -234,8 +234,8 @@ def test_what_a_scene_names_and_nobody_knows_is_one_line(said, words, tmp_path, 
 
 def test_a_scene_whose_file_has_changed_is_done_again(files):
     said = SCENE_FILE.replace('sizes=("sheet_frames",)', 'sizes=("sheet_frames",), files=("a.txt",)')
-    (files / "lifted.py").write_text(said)
-    (scene,) = user_files.entries_of(user_files.SCENES, str(files / "lifted.py"))
+    (files / "lifted_sheet.py").write_text(said)
+    (scene,) = user_files.entries_of(user_files.SCENES, str(files / "lifted_sheet.py"))
     before = digest(declared(scene))
     (files / "a.txt").write_text("another cloth")
     assert digest(declared(scene)) != before
