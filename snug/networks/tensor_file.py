@@ -57,6 +57,11 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     return tensors, header
 
 
+def select_tensors(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:
+    """Return the tensors called `name.*`, by the rest of their names."""
+    return {key.removeprefix(f"{name}."): t for key, t in tensors.items() if key.startswith(f"{name}.")}
+
+
 def _packed(tensors: dict[str, Tensor], header: Mapping[str, Any]) -> bytes:
     from safetensors.torch import save
 

@@ -48,7 +48,7 @@ class Checkpoint:
 
     @property
     def resumable(self) -> bool:
-        """Whether there is a file to continue from, and it is asked for."""
+        """True if there is a file to continue from, and that is wanted."""
         return self.resume and self.path.is_file()
 
     def is_due(self, step: int, seconds: float) -> bool:

@@ -1,4 +1,4 @@
-"""Where networks train: a device that is there, or one clear line."""
+"""Devices that networks train on: `cpu`, `cuda`; an absent one is refused in one line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class DeviceError(ValueError):
 
 
 def find_device(name: str) -> torch.device:
-    """`cpu`, `cuda` or `cuda:1`. Raises DeviceError for an unknown or absent one."""
+    """Return the device `cpu`, `cuda` or `cuda:1`. Raises DeviceError for an unknown or absent one."""
     try:
         device = torch.device(name)
     except RuntimeError:

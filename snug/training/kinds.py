@@ -28,7 +28,7 @@ class Kind:
 
     @property
     def physics(self) -> bool:
-        """Whether it learns from the energies."""
+        """True if it learns from the energies."""
         return self.targets is None
 
     @property

@@ -5,7 +5,6 @@ snug.training.training_loop repeats it.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,13 +18,15 @@ from snug.kernels.skinning import FastSkin
 from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
+from snug.networks.tensor_file import select_tensors
 from snug.recipes.recipe import Recipe
-from snug.training.augmentation.mixed_clips import augment, draw_clip_shapes
+from snug.training.augmentation.augmented_set import make_training_set, varies_shape
 from snug.training.contact.planes import Posed, TrainingContact
 from snug.training.device import CPU
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.hidden_state_cache import HiddenStateCache
 from snug.training.kinds import find_kind
+from snug.training.learning_rate import rate_factor
 from snug.training.losses.physics_loss import PhysicsLoss
 from snug.training.losses.simulated_past import SimulatedPast
 from snug.training.losses.vertex_targets import Targets, VertexTargets
@@ -33,7 +34,6 @@ from snug.training.process_group import ALONE, Group, GroupError
 from snug.training.stopwatch import Stopwatch
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 
-DROP, COSINE_END = 0.1, 0.01  # factors on the learning rate, after the drop and at the end of the cosine
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -70,23 +70,8 @@ class Trainer:
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
         self.posed_by = FastSkin.apply if self.kernels else skin
-        mixed = augment(motions, recipe, vertices=dressed.vertices, seed=seed) if how.physics else []
-        drawn = (
-            recipe.shape_range
-            and dressed.body.shape_count
-            and how.network.feature_set == "motion"
-            and how.physics
-        )
-        self.shaped = bool(drawn) and recipe.shape_of == "window"
-        shapes = None
-        if drawn and recipe.shape_of == "clip":
-            mean = np.zeros((len(motions), dressed.body.shape_count))
-            of_mixed = draw_clip_shapes(len(mixed), dressed.body.shape_count, recipe, seed=seed)
-            shapes = np.concatenate([mean, of_mixed])
-        self.data = TrainingSet(
-            dressed, [*motions, *mixed], recipe, features=how.network.feature_set,
-            sequences=how.network.sequential, device=device, shapes=shapes,
-        )  # fmt: skip
+        self.data = make_training_set(how, dressed, motions, recipe, seed=seed, device=device)
+        self.shaped = varies_shape(how, dressed, recipe) and recipe.shape_of == "window"
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         pins = dressed.garment.pins
         network = make_network(
@@ -265,13 +250,9 @@ class Trainer:
             return self.posed_by(offsets + batch.rest, self.weights, batch.transforms), after
 
     def _set_rate(self, number: int) -> None:
-        recipe, factor = self.recipe, 1.0
-        if recipe.schedule == "epochs" and self.epoch > recipe.drop_after_epochs:
-            factor = DROP
-        elif recipe.schedule == "cosine":
-            factor = COSINE_END + (1 - COSINE_END) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
+        factor = rate_factor(self.recipe, step=number, steps=self.steps, epoch=self.epoch)
         for group in self.optimiser.param_groups:
-            group["lr"] = self.guard.rate * recipe.learning_rate * factor
+            group["lr"] = self.guard.rate * self.recipe.learning_rate * factor
 
     def _update(
         self, number: int, windows: np.ndarray, terms: dict[str, Tensor]
@@ -332,8 +313,3 @@ class Trainer:
         self.guard.resume(select_tensors(tensors, "guard"), facts["guard"])
         if self.contact is not None:
             self.contact.resume(select_tensors(tensors, "contact"), facts["contact"])
-
-
-def select_tensors(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:
-    """Return the tensors called `name.*`, by the rest of their names."""
-    return {key.removeprefix(f"{name}."): t for key, t in tensors.items() if key.startswith(f"{name}.")}

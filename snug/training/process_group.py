@@ -30,7 +30,7 @@ class Group:
 
     @property
     def writes(self) -> bool:
-        """Whether this process is the one that writes files and messages."""
+        """True for the process that writes files and messages."""
         return self.rank == 0
 
     def part(self, count: int) -> slice:

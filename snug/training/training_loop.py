@@ -10,10 +10,10 @@ import numpy as np
 from torch import Tensor
 
 from reference_sim.progress import progress_bar
-from snug.networks.tensor_file import TensorFileError
+from snug.networks.tensor_file import TensorFileError, select_tensors
 from snug.networks.trained_model import TrainedModel
 from snug.training.checkpoint import Checkpoint, describe_run
-from snug.training.optimisation_step import Trainer, select_tensors
+from snug.training.optimisation_step import Trainer
 from snug.training.validation import Validation, Validator
 
 Log = Callable[[dict[str, float]], None]
