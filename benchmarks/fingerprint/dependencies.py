@@ -148,7 +148,9 @@ def _source(path: str) -> _Source:
     )
     for node in ast.walk(tree):
         if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            node.body[0].value.value = ""
+            docstring = node.body[0]
+            assert isinstance(docstring, ast.Expr) and isinstance(docstring.value, ast.Constant)
+            docstring.value.value = ""
     others = frozenset(roots - set(LAYERS) - sys.stdlib_module_names)
     return _Source(digest(ast.dump(tree).encode()), tuple(files), others)
 
@@ -186,7 +188,7 @@ def _imported(node: ast.AST, package: list[str]) -> list[tuple[str, str]]:
 def _kernels_of(node: ast.ClassDef) -> Iterator[tuple[str, str, str]]:
     """Yield (module, ":", function) of the kernels that an energy declares: solvers import them by name."""
     for statement in node.body:
-        target = statement.target if isinstance(statement, ast.AnnAssign) else None
+        target: ast.expr | None = statement.target if isinstance(statement, ast.AnnAssign) else None
         target = statement.targets[0] if isinstance(statement, ast.Assign) else target
         if isinstance(target, ast.Name) and target.id == "kernels":
             values = (part.value for part in ast.walk(statement) if isinstance(part, ast.Constant))

@@ -14,7 +14,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def _follow(parent: int) -> None:
     os._exit(1)
 
 
-def _serve(pipe: Any, begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+def _serve(pipe: Connection, begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
     lead_a_group()
     if begin is not None:
         begin(*arguments)

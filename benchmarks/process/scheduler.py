@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
+from typing import TYPE_CHECKING
 
 from benchmarks.process.errors import one_line
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 FIRST = 5.0  # [s] in which a scheduler answers at first
 
@@ -14,7 +17,7 @@ class ClusterError(ValueError):
     """There is no such cluster; the message names it and the remedy."""
 
 
-def connect(address: str, *, seconds: float) -> Any:
+def connect(address: str, *, seconds: float) -> Client:
     """Return a client of the scheduler, which looks for a lost one for so long. Raises ClusterError."""
     try:
         from distributed import Client

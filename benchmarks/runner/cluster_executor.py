@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from benchmarks.assets.assets import Assets
 from benchmarks.fingerprint.digest import damaged
@@ -24,7 +24,7 @@ from benchmarks.process.errors import one_line
 from benchmarks.process.scheduler import connect
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster_worker
-from benchmarks.runner.local_executor import POLL, Done, LocalExecutor, Ready
+from benchmarks.runner.local_executor import POLL, Bar, Done, LocalExecutor, Ready
 from benchmarks.runner.task_process import Needed
 from benchmarks.tasks.task import Outcome, RunStopped, Task
 
@@ -68,7 +68,7 @@ class ClusterExecutor(LocalExecutor):
         self._looked = 0.0
         self._opened = self._said_alone = False
 
-    def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
+    def together(self, ready: Ready, bar: Bar) -> Iterator[Done]:
         """Yield tasks with their outcomes until none is at work and none is ready."""
         self._open()
         try:
@@ -116,7 +116,7 @@ class ClusterExecutor(LocalExecutor):
             with suppress(OSError):  # no scheduler: its workers end by themselves
                 self._client.run(cluster_worker.end_processes, self._path, on_error="ignore")
 
-    def _look(self, bar: Any) -> None:
+    def _look(self, bar: Bar) -> None:
         """Learn which workers there are and what they tell. Raises RunStopped where nothing can go on."""
         if time.monotonic() < self._looked + LOOK:
             return

@@ -14,8 +14,9 @@ import threading
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from multiprocessing.queues import SimpleQueue
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from benchmarks import provenance
 from benchmarks.fingerprint.dependencies import software
@@ -23,9 +24,13 @@ from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.process.errors import one_line
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.task_process import TaskProcess, begin_tasks
+from benchmarks.runner.task_process import Needed, TaskProcess, begin_tasks
 from benchmarks.tasks.cell_task import CellTask
 from benchmarks.tasks.task import Context, Outcome, RunStopped, Task, failure
+
+if TYPE_CHECKING:
+    from dask.typing import Key
+    from distributed import Worker
 
 WATCH = 0.5  # [s] between looks at whether the scheduler still wants a task
 IDLE = 120.0  # [s] after which a process without a task ends
@@ -110,7 +115,7 @@ def end_processes(folder: str) -> None:
 
 
 def software_of(task: Task) -> dict[str, str]:
-    """Return name -> digest or version of all that computes the outcome, files of a user's method included."""
+    """Return name -> digest or version of all that computes an outcome, files of a user's method included."""
     files = task.cell.entry.files if isinstance(task, CellTask) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
     version = {"package Python": platform.python_version()}
@@ -160,7 +165,7 @@ def _give_back(process: _Process) -> None:
     process.timer.start()
 
 
-def _do(process: _Process, task: Task, needed: Any, worker: Any, key: Any) -> Outcome:
+def _do(process: _Process, task: Task, needed: Needed, worker: Worker, key: Key) -> Outcome:
     """Return the outcome; end the process where the scheduler has cancelled the task: the command died."""
     with ThreadPoolExecutor(1) as thread:
         future = thread.submit(process.do, task, needed)
@@ -171,6 +176,6 @@ def _do(process: _Process, task: Task, needed: Any, worker: Any, key: Any) -> Ou
         return future.result()
 
 
-def _begin(folder: str, assets: str, progress: Any) -> None:
+def _begin(folder: str, assets: str, progress: SimpleQueue[float]) -> None:
     """Begin a process that does tasks."""
     begin_tasks(Context(RunFolder(folder), pickle.loads((Path(folder) / assets).read_bytes())), progress)

@@ -24,10 +24,20 @@ Done = tuple[Task, Outcome]
 Ready = Callable[[], Batch | None]
 
 
+class Bar(Protocol):
+    """A progress bar, as tqdm's."""
+
+    total: float
+    n: float
+
+    def update(self, n: float = 1) -> object:
+        """Add progress."""
+
+
 class Executor(Protocol):
     """Executes tasks whose needs are there; gives outcomes, in any order."""
 
-    def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
+    def together(self, ready: Ready, bar: Bar) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
 
         ready: the next batch that can begin, None where there is none before further outcomes are known.
@@ -60,7 +70,7 @@ class LocalExecutor:
         self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
         self._crew: list[TaskProcess] = []
 
-    def together(self, ready: Ready, bar: Any) -> Iterator[Done]:
+    def together(self, ready: Ready, bar: Bar) -> Iterator[Done]:
         """Yield tasks with their outcomes until none is at work and none is ready."""
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
 

@@ -10,12 +10,17 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, nullcontext
 from itertools import groupby
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from benchmarks.cell import TaskId
 from benchmarks.runner.cache import Cache, Cached
 from benchmarks.runner.local_executor import Batch, Executor
 from benchmarks.tasks.task import Outcome, Task, failure
+
+if TYPE_CHECKING:
+    from typing import Never
+
+    from tqdm import tqdm
 
 BLOCKED = "blocked"  # in the result of a task whose needs had failed
 AHEAD = 8  # timed tasks that begin together: each holds its scene in memory until its turn
@@ -250,7 +255,7 @@ def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
     )
 
 
-def _bar(tasks: Sequence[Task], total: float) -> Any:
+def _bar(tasks: Sequence[Task], total: float) -> tqdm[Never]:
     from reference_sim.progress import progress_bar
 
     shown = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"

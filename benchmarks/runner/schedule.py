@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.cell import Cell, flat
 from benchmarks.fingerprint.dependencies import find_module
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 TASKS = "benchmarks.tasks"
-Keyed = TypeVar("Keyed", TrainNetwork, RunMicrobenchmark)
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -144,13 +143,15 @@ class Schedule:
         clips = tuple(task.id for task in truth if isinstance(task, SimulateClips))
         terms = modules_of(chosen.recipe.terms) if chosen else ()
         declared_in = (network.declared_in,) if network.declared_in else ()
-        return _keyed(TrainNetwork(
+        task = TrainNetwork(
             name=network.task_id[1], label=network.label,
             inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *terms, *declared_in),
             reads=(*simulated.values(), *clips), units=max(steps, 1), training=network.name, chosen=chosen,
             home=network.declared_in, seed=network.seed, garment=network.garment, steps=steps,
             motions=motions, held_out=held_out, simulated=simulated, clips=clips, device=self.plan.device,
-        ))  # fmt: skip
+        )  # fmt: skip
+        # What was interrupted resumes where all that it depends on is the same.
+        return dataclasses.replace(task, key=digest(dependencies(task)))
 
     # --- cells ---------------------------------------------------------------------------------------------
 
@@ -276,11 +277,13 @@ class Schedule:
             steps = self.preset.steps_of(method, method)
             settings = dataclasses.replace(settings, device=self.plan.device, steps=steps)
             inputs["steps"] = steps
-        return _keyed(RunMicrobenchmark(
+        task = RunMicrobenchmark(
             name=name, label=benchmark.label, inputs=self.inputs.machine(settings.device) | inputs,
             modules=(benchmark.module, "benchmarks.performance.microbenchmark", f"{TASKS}.microbenchmark"),
             benchmark=benchmark, entry=find_method(method), settings=settings, process=name,
-        ))  # fmt: skip
+        )  # fmt: skip
+        settings = dataclasses.replace(settings, key=digest(dependencies(task)))
+        return dataclasses.replace(task, settings=settings)
 
     # --- facts of the plan ---------------------------------------------------------------------------------
 
@@ -310,11 +313,3 @@ class Schedule:
 def _label(what: str, entry: MethodEntry) -> str:
     """Return a label that names the method unless it is the reference."""
     return what if entry.role == "reference" else f"{what} by {entry.name}"
-
-
-def _keyed(task: Keyed) -> Keyed:
-    """Return the task with a key of all that it depends on: an interrupted one resumes under an equal key."""
-    key = digest(dependencies(task))
-    if isinstance(task, RunMicrobenchmark):
-        return dataclasses.replace(task, settings=dataclasses.replace(task.settings, key=key))
-    return dataclasses.replace(task, key=key)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.fingerprint.digest import digest, digest_of_file
@@ -14,6 +14,10 @@ from benchmarks.method import MethodEntry
 from benchmarks.plan.plan import Plan
 from benchmarks.scene import Scene
 from snug.recipes.recipe import TERMS
+
+if TYPE_CHECKING:
+    from benchmarks.performance.microbenchmark import Microbenchmark
+    from benchmarks.validation.case import Case
 
 ASSETS = "benchmarks.assets.assets"
 
@@ -70,7 +74,7 @@ class TaskInputs:
         }
 
 
-def declared(entry: Any) -> dict[str, Any]:
+def declared(entry: MethodEntry | Scene | Case | Microbenchmark) -> dict[str, Any]:
     """Return what a scene, a method or a case declares, without descriptions; of files their content."""
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
@@ -80,7 +84,7 @@ def declared(entry: Any) -> dict[str, Any]:
     return values
 
 
-def modules_behind(entry: Any) -> tuple[str, ...]:
+def modules_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
     """Of a scene or a method: its module, and what declares it where that is outside."""
     return tuple(dict.fromkeys(filter(None, (entry.module, entry.declared_in))))
 

@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from multiprocessing.queues import SimpleQueue
 from typing import Any
 
 from benchmarks.cell import TaskId
@@ -70,7 +71,9 @@ class TaskProcess:
         return seconds
 
 
-def call(process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: Any) -> Any:
+def call(
+    process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: float | None
+) -> Any:
     """Call function(*arguments) in a process, which is ended at the deadline; a failure is an outcome."""
     clock = time.perf_counter()
     try:
@@ -85,7 +88,7 @@ _context: Context
 _verified: set[tuple[str, str]] = set()  # files that this process has compared with their digests
 
 
-def begin_tasks(context: Context, progress: Any = None) -> None:
+def begin_tasks(context: Context, progress: SimpleQueue[float] | None = None) -> None:
     """Keep what a process knows. progress: a queue of expected seconds, None where nobody follows them."""
     global _context
     tell: Callable[[float], None] = tell_nobody if progress is None else progress.put

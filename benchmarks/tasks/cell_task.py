@@ -10,7 +10,7 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from benchmarks.cell import Cell, TaskId
 from benchmarks.method import Method
@@ -163,7 +163,7 @@ class RunCell(CellTask):
         else:
             trajectory, reading = method.run(), Reading((math.nan,))
         peak = peak_memory()  # what follows, as many bodies at once, is not what others are compared by
-        result: dict[str, Any] = {
+        result: dict[str, float | str] = {
             "seconds": reading.seconds,
             "frames": max(trajectory.frames - (not cell.entry.gives_first_frame), 1),
             "peak": peak,
@@ -297,7 +297,7 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     return status, reason
 
 
-def misshapen(positions: Any, scene: BuiltScene) -> str:
+def misshapen(positions: np.ndarray, scene: BuiltScene) -> str:
     """Why these are no positions (T,V,3) of the scene, or empty. There may be fewer frames, and no more."""
     import numpy as np
 

@@ -25,7 +25,8 @@ FILES = {
     "reference_sim/terms/bend.py": "class Bend:\n    pass\n",
     "reference_sim/terms/twist/__init__.py": "",
     "reference_sim/terms/twist/definition.py": (
-        "class Twist:\n    kernels: ClassVar = {'lanes': 'reference_sim.terms.twist.lanes:make', 'own': 'f'}\n"
+        "class Twist:\n"
+        "    kernels: ClassVar = {'lanes': 'reference_sim.terms.twist.lanes:make', 'own': 'f'}\n"
     ),
     "reference_sim/terms/twist/lanes.py": "def make(term):\n    return 2 * term\n",
     "snug/network.py": "import torch\nfrom reference_sim.terms import Unknown\n",
