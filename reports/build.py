@@ -89,7 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     if options.axes:
-        picture = draw_axes(RunFolder(options.run_dir), *options.axes, options.scenes)
+        x, y = options.axes
+        picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
         print(picture.caption, picture.path, sep="\n")
         return 0
     path, problems = build_report(options.run_dir)

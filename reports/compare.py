@@ -226,7 +226,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--without-times", action="store_true", help="neither run times nor memory")
     options = parser.parse_args(arguments)
     runs = [read_run(RunFolder(path)) for path in (options.one, options.other)]
-    comparison = compare(*runs, options.metrics, options.methods, times=not options.without_times)
+    comparison = compare(runs[0], runs[1], options.metrics, options.methods, times=not options.without_times)
     for change in comparison.changes:
         print(f"{change.verdict:8}{change.place}  {change.method}  {change.metric}  {change.size}")
     print("\n".join(_summary(comparison, runs)))

@@ -15,19 +15,23 @@ from reports.run.finished_run import Run
 METRICS, VERTICES, STEPS = ("curvature/error", "curvature/mean"), "mesh/vertices", "mesh/steps"
 
 
-class AgainstVertices(Figure):
+class AgainstVertices(Figure[tuple[pd.DataFrame, pd.Series]]):
     """Errors of a garment's scenes against the number of vertices that these declare."""
 
     name = "against_vertices"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether scenes of two sizes have one of METRICS."""
-        rows, sizes = _rows(run)
-        return sizes.nunique() > 1 and bool(rows["metric"].isin(METRICS).any())
+    def needs(self, run: Run) -> tuple[pd.DataFrame, pd.Series] | None:
+        """Return rows of scenes that declare their number of vertices, and scene -> that number."""
+        rows = run.frame[run.frame["usable"] & (run.frame["garment"] != "")]
+        several_steps = rows[(rows["metric"] == STEPS) & (rows["value"] > 1.0)]["scene"]
+        rows = rows[~rows["scene"].isin(several_steps)]
+        sizes = rows[rows["metric"] == VERTICES].drop_duplicates("scene").set_index("scene")["value"]
+        rows = rows[rows["scene"].isin(sizes.index) & (rows["method"] != "")]
+        return (rows, sizes) if sizes.nunique() > 1 and rows["metric"].isin(METRICS).any() else None
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: tuple[pd.DataFrame, pd.Series]) -> Iterator[Drawing]:
         """Draw a panel for each metric, a line for each method."""
-        rows, sizes = _rows(run)
+        rows, sizes = data
         metrics = [name for name in METRICS if len(rows[rows["metric"] == name])]
         figure = new_figure(PAGE_WIDTH / 2, 2.5)
         drawn: set[str] = set()
@@ -44,12 +48,3 @@ class AgainstVertices(Figure):
         legend_above(figure, [style(run, method) for method in run.ordered(drawn)], lines=False)
         caption = "The same motion on meshes of several sizes, each against the simulation on its own mesh."
         yield Drawing(figure, self.name, caption)
-
-
-def _rows(run: Run) -> tuple[pd.DataFrame, pd.Series]:
-    """Return the rows of scenes that declare their number of vertices, and scene -> that number."""
-    rows = run.frame[run.frame["usable"] & (run.frame["garment"] != "")]
-    several_steps = rows[(rows["metric"] == STEPS) & (rows["value"] > 1.0)]["scene"]
-    rows = rows[~rows["scene"].isin(several_steps)]
-    sizes = rows[rows["metric"] == VERTICES].drop_duplicates("scene").set_index("scene")["value"]
-    return rows[rows["scene"].isin(sizes.index) & (rows["method"] != "")], sizes

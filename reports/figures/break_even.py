@@ -15,21 +15,26 @@ from reports.run.finished_run import Run
 from reports.statistics.break_even import Cost, compared_costs, compared_scenes, crossing, rivals
 
 MOST_FRAMES = 1e7
+Costs = tuple[list[str], list[Cost], list[Cost]]
 
 
-class BreakEven(Figure):
+class BreakEven(Figure[Costs]):
     """Total time against the number of frames, in the scenes of the first garment with timed solvers."""
 
     name = "break_even"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether a training and something to compare it with were timed."""
-        _, trained, others = _costs(run)
-        return bool(trained) and len(trained) + len(others) > 1
+    def needs(self, run: Run) -> Costs | None:
+        """Return the compared scenes and the costs of trained networks and of solvers there."""
+        frame = run.cells("speed", "garments")
+        scenes = next(iter(compared_scenes(run, frame).values()), [])
+        trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
+        shown = leading(run, (cost.method for cost in trained))
+        trained = [cost for cost in trained if cost.method in shown]
+        return (scenes, trained, others) if trained and len(trained) + len(others) > 1 else None
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: Costs) -> Iterator[Drawing]:
         """Draw a line per method and a dot where a training has paid."""
-        scenes, trained, others = _costs(run)
+        scenes, trained, others = data
         costs = [*others, *trained]
         figure = new_figure(PAGE_WIDTH / 2, 2.7)
         axes = figure.subplots()
@@ -49,12 +54,3 @@ class BreakEven(Figure):
         legend_above(figure, [style(run, m) for m in run.ordered(cost.method for cost in costs)], lines=True)
         caption = f"Total time against the number of frames ({', '.join(scenes)}). "
         yield Drawing(figure, self.name, caption + "Dots: where a training has paid.")
-
-
-def _costs(run: Run) -> tuple[list[str], list[Cost], list[Cost]]:
-    """Return the compared scenes and the costs of trained networks and of solvers there."""
-    frame = run.cells("speed", "garments")
-    scenes = next(iter(compared_scenes(run, frame).values()), [])
-    trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
-    shown = leading(run, (cost.method for cost in trained))
-    return scenes, [cost for cost in trained if cost.method in shown], others

@@ -17,20 +17,21 @@ METRICS = ("energy/total", "curvature/error", "penetration/vertices")
 MOST_METHODS = 24  # methods that have room below each other
 
 
-class Dots(Figure):
+class Dots(Figure[tuple[pd.DataFrame, list[str]]]):
     """Cells behind the means of the first garment."""
 
     name = "dots"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether a garment has one of METRICS."""
-        rows = _rows(run)
-        return bool(run.first_garment and len(rows) and _methods(run, rows))
+    def needs(self, run: Run) -> tuple[pd.DataFrame, list[str]] | None:
+        """Return rows of the first garment with one of METRICS, and their methods."""
+        rows = run.garment_rows
+        rows = rows[(rows["garment"] == run.first_garment) & rows["usable"] & rows["metric"].isin(METRICS)]
+        methods = leading(run, set(rows["method"]))[:MOST_METHODS]
+        return (rows, methods) if run.first_garment and methods else None
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: tuple[pd.DataFrame, list[str]]) -> Iterator[Drawing]:
         """Draw a panel for each metric, a line for each method."""
-        rows = _rows(run)
-        methods = _methods(run, rows)
+        rows, methods = data
         metrics = [name for name in METRICS if name in set(rows["metric"])]
         by_method = means(rows, "method", "metric")
         labels = [wrapped(run.label(method), 28) for method in methods]
@@ -59,13 +60,3 @@ class Dots(Figure):
         panels[0].set_ylim(len(methods) - 0.4, -0.6)
         caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean."
         yield Drawing(figure, self.name, caption)
-
-
-def _rows(run: Run) -> pd.DataFrame:
-    rows = run.garment_rows
-    rows = rows[(rows["garment"] == run.first_garment) & rows["usable"]]
-    return rows[rows["metric"].isin(METRICS)]
-
-
-def _methods(run: Run, rows: pd.DataFrame) -> list[str]:
-    return leading(run, set(rows["method"]))[:MOST_METHODS]

@@ -17,23 +17,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TERMS = ("strain", "bending", "inertia")
+Curves = tuple[SceneRollOuts, dict[str, dict[str, np.ndarray]]]
 
 
-class EnergySeries(Figure):
+class EnergySeries(Figure[Curves]):
     """Energies of each frame of the motion that is shown at length (the paper's figure 4)."""
 
     name, files = "energy_series", ("energy_series_*",)
 
-    def needs(self, run: Run) -> bool:
-        """Return whether a stored roll-out has the energies of its frames."""
+    def needs(self, run: Run) -> Curves | None:
+        """Return the roll-outs of that motion, and term -> method -> energy of each frame (T,) [J]."""
         motion = long_motion(run)
-        return motion is not None and bool(_curves(run, motion.roll_outs))
+        curves = _curves(run, motion.roll_outs) if motion else {}
+        return (motion.roll_outs, curves) if motion and curves else None
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: Curves) -> Iterator[Drawing]:
         """Draw a panel for each term, a curve per method."""
-        motion = long_motion(run)
-        assert motion is not None
-        series, curves = motion.roll_outs.series, _curves(run, motion.roll_outs)
+        roll_outs, curves = data
+        series = roll_outs.series
         methods = leading(run, {method for of_term in curves.values() for method in of_term})
         figure = new_figure(PAGE_WIDTH, 2.35)
         panels = np.atleast_1d(figure.subplots(1, len(curves)))
@@ -47,7 +48,7 @@ class EnergySeries(Figure):
             grid(axes)
         panels[0].set_ylabel("energy [J]")
         legend_above(figure, [style(run, method) for method in methods], lines=True)
-        scene = motion.roll_outs.scene
+        scene = roll_outs.scene
         caption = (
             f"{scene}: energy of each frame by term, logarithmic. A frame with no energy at all is a gap."
         )

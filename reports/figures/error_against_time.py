@@ -25,56 +25,55 @@ from reports.statistics.pareto import (
 from reports.tables.number_texts import number
 
 MOST_PANELS, MOST_SCENES = 4, 9  # in the PDF; the page has all
-Panels = list[tuple[Metric, list[Point]]]
+Scenes = list[tuple[pd.DataFrame, list[tuple[Metric, list[Point]]]]]  # rows and panels of each
 
 
-class ErrorOfPageOne(Figure):
+class ErrorOfPageOne(Figure[Scenes]):
     """First error of the leading scene, for page one."""
 
     name = "error_against_time"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether a scene has two methods with an error and a run time."""
-        return bool(_scenes(run))
+    def needs(self, run: Run) -> Scenes:
+        """Return the scenes in which two methods have an error and a run time."""
+        return _scenes(run)
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: Scenes) -> Iterator[Drawing]:
         """Draw one wide panel."""
-        rows, panels = _scenes(run)[0]
+        rows, panels = data[0]
         yield _draw_errors(run, rows, panels[:1], lead=True)
 
 
-class ErrorsOfScene(Figure):
+class ErrorsOfScene(Figure[Scenes]):
     """All errors of the leading scene."""
 
     name, files = "error_against_time_of_scene", ("error_against_time_*",)
 
-    def needs(self, run: Run) -> bool:
-        """Return whether the leading scene has more than one error."""
-        scenes = _scenes(run)
-        return bool(scenes) and len(scenes[0][1]) > 1
+    def needs(self, run: Run) -> Scenes:
+        """Return the leading scene if it has more than one error."""
+        return [scene for scene in _scenes(run)[:1] if len(scene[1]) > 1]
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: Scenes) -> Iterator[Drawing]:
         """Draw a panel for each error."""
-        rows, panels = _scenes(run)[0]
+        rows, panels = data[0]
         yield _draw_errors(run, rows, panels[:MOST_PANELS])
 
 
-class ErrorsOfScenes(Figure):
+class ErrorsOfScenes(Figure[Scenes]):
     """First error of every other scene."""
 
     name = "error_against_time_scenes"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether more than one scene has two methods with an error and a run time."""
-        return len(_scenes(run)) > 1
+    def needs(self, run: Run) -> Scenes:
+        """Return the scenes behind the leading one."""
+        return _scenes(run)[1:MOST_SCENES]
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: Scenes) -> Iterator[Drawing]:
         """Draw a small panel for each scene."""
-        yield _draw_scenes(run, [(rows, panels[0]) for rows, panels in _scenes(run)[1:MOST_SCENES]])
+        yield _draw_scenes(run, [(rows, panels[0]) for rows, panels in data])
 
 
 @lru_cache(maxsize=1)
-def _scenes(run: Run) -> list[tuple[pd.DataFrame, Panels]]:
+def _scenes(run: Run) -> Scenes:
     """Return rows and panels of each scene, the leading one first."""
     frame, scenes = compared_cells(run)
     shown = []

@@ -6,13 +6,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from reports.figures.plotting import PAGE_WIDTH, save
 from reports.run.finished_run import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
+
+Data = TypeVar("Data")
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Picture:
     width: float
 
 
-class Figure(ABC):
+class Figure(ABC, Generic[Data]):
     """A figure: a subclass in a file of its own, and one line in FIGURES or PICTURES.
 
     name: for the list of report blocks, and of its file. files: patterns of all its files.
@@ -49,20 +51,23 @@ class Figure(ABC):
         return cls.files or (f"{cls.name}.*",)
 
     @abstractmethod
-    def needs(self, run: Run) -> bool:
-        """Return whether the run holds what the figure needs."""
+    def needs(self, run: Run) -> Data | None:
+        """Return the data that the figure is drawn from, nothing where the run lacks them."""
 
     @abstractmethod
-    def draw(self, run: Run) -> Iterable[Drawing]:
-        """Draw the figure of a run that has what it needs, in one part or several."""
+    def draw(self, run: Run, data: Data) -> Iterable[Drawing]:
+        """Draw the figure from its data, in one part or several."""
+
+    def drawings(self, run: Run) -> list[Drawing]:
+        """Draw the figure where the run holds what it needs."""
+        data = self.needs(run)
+        return list(self.draw(run, data)) if data else []
 
 
 def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, list[Picture]]:
-    """Draw into the folder all that the run has the data for: name of the figure -> its pictures."""
+    """Draw into the folder all that the run has the data for; return name of the figure -> its pictures."""
     return {
-        figure.name: [save_drawing(folder, drawing) for drawing in figure.draw(run)]
-        for figure in figures
-        if figure.needs(run)
+        figure.name: [save_drawing(folder, drawing) for drawing in figure.drawings(run)] for figure in figures
     }
 
 

@@ -21,21 +21,19 @@ BEFORE = 4  # frames before the stop that are shown with what follows it
 STOPPED = "#F3F3F3"
 
 
-class Hem(Figure):
+class Hem(Figure[SceneRollOuts]):
     """Yaw of the hem in the root's axes and its distance from where it ends, a curve per method."""
 
     name, files = "hem", ("hem_*",)
 
-    def needs(self, run: Run) -> bool:
-        """Return whether the hem turns in the motion that is shown at length."""
+    def needs(self, run: Run) -> SceneRollOuts | None:
+        """Return the motion that is shown at length, if the hem turns in it."""
         motion = long_motion(run)
-        return motion is not None and hem_turns(run, motion.roll_outs)
+        return motion.roll_outs if motion and hem_turns(run, motion.roll_outs) else None
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: SceneRollOuts) -> Iterator[Drawing]:
         """Draw that motion."""
-        motion = long_motion(run)
-        assert motion is not None
-        yield draw_hem(run, motion.roll_outs)
+        yield draw_hem(run, data)
 
 
 def _methods_with_hem(run: Run, roll_outs: SceneRollOuts) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.figures.chosen_roll_outs import long_motion
+from reports.figures.chosen_roll_outs import Motion, long_motion
 from reports.figures.figure import Drawing, Figure
 from reports.figures.method_styles import leading, style
 from reports.figures.plotting import PAGE_WIDTH, grid, legend_above, log_axis, new_figure
@@ -23,23 +23,21 @@ EVERY = 3  # of a roll-out's frames
 RARE = 0.01  # [%] the lowest share that is shown
 
 
-class Histograms(Figure):
+class Histograms(Figure[Motion]):
     """How often vertices have which mean curvature and change of area, in the motion shown at length."""
 
     name = "histograms"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether the run kept roll-outs of a whole motion."""
-        return long_motion(run) is not None
+    def needs(self, run: Run) -> Motion | None:
+        """Return that motion."""
+        return long_motion(run)
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: Motion) -> Iterator[Drawing]:
         """Draw the methods whose roll-outs came to their end."""
-        motion = long_motion(run)
-        assert motion is not None
-        series = {method: motion.roll_outs.series[method] for method in motion.whole}
-        scene = motion.roll_outs.scene
-        caption = f"{scene}: of all vertices, in one frame of {EVERY}."
-        yield Drawing(draw_histograms(run, series, motion.roll_outs.rest), self.name, caption)
+        roll_outs = data.roll_outs
+        series = {method: roll_outs.series[method] for method in data.whole}
+        caption = f"{roll_outs.scene}: of all vertices, in one frame of {EVERY}."
+        yield Drawing(draw_histograms(run, series, roll_outs.rest), self.name, caption)
 
 
 def draw_histograms(run: Run, series: Mapping[str, Trajectory], rest: np.ndarray | None) -> Canvas:

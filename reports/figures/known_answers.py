@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,35 +16,29 @@ from reports.tables.number_texts import number
 LOWEST = 1e-6  # tolerances away: what is nearer is drawn here
 
 
-class KnownAnswers(Figure):
+class KnownAnswers(Figure[list[float]]):
     """Every check as a mark, in order."""
 
     name = "known_answers"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether two checks or more have a tolerance."""
-        return len(_distances(run)) > 1
+    def needs(self, run: Run) -> list[float] | None:
+        """Return in order how many tolerances two checks or more lie from their answers."""
+        away = [tolerances_away(row) for row in checks(run).itertuples()]
+        known = sorted(float(x) for x in away if x is not None and math.isfinite(x))
+        return known if len(known) > 1 else None
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: list[float]) -> Iterator[Drawing]:
         """Draw the distances in order."""
-        distances = _distances(run)
         figure = new_figure(PAGE_WIDTH, 1.75)
         axes = figure.subplots()
-        heights = np.maximum(distances, LOWEST)
-        axes.plot(range(1, len(distances) + 1), heights, "o", color="#0072B2", markersize=3)
+        heights = np.maximum(data, LOWEST)
+        axes.plot(range(1, len(data) + 1), heights, "o", color="#0072B2", markersize=3)
         axes.axhline(1.0, color="#D55E00", linewidth=1.2)
         axes.annotate("tolerance", (1, 1.0), (0, 3), textcoords="offset points", fontsize=8, color="#B04A00")
         axes.set_ylim(LOWEST / 2.0, max(3.0, 2.0 * heights[-1]))
         axes.set(xlabel="checks, in order", ylabel="tolerances away")
         log_axis(axes, "y")
         grid(axes)
-        caption = f"{len(distances)} checks with a known answer: distance from it over the tolerance"
+        caption = f"{len(data)} checks with a known answer: distance from it over the tolerance"
         caption += f"; {number(LOWEST, 1)} stands for all that is less."
         yield Drawing(figure, self.name, caption)
-
-
-def _distances(run: Run) -> np.ndarray:
-    """Return in order how many tolerances the checks lie from their known answers, where that is finite."""
-    distances = [tolerances_away(row) for row in checks(run).itertuples()]
-    known = np.array([distance for distance in distances if distance is not None], dtype=float)
-    return np.sort(known[np.isfinite(known)])

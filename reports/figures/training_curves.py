@@ -13,20 +13,20 @@ from reports.run.finished_run import Run
 from reports.run.training_histories import PANELS, History
 
 
-class TrainingCurves(Figure):
+class TrainingCurves(Figure[Sequence[History]]):
     """Loss of every training, a figure for each garment."""
 
     name, files = "training", ("training.*", "training_*")
 
-    def needs(self, run: Run) -> bool:
-        """Return whether a model of the run carries its history."""
-        return bool(run.histories)
+    def needs(self, run: Run) -> Sequence[History]:
+        """Return the histories that models of the run carry."""
+        return run.histories
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: Sequence[History]) -> Iterator[Drawing]:
         """Draw the garments, the first under the plain name."""
-        for place, garment in enumerate(dict.fromkeys(history.garment for history in run.histories)):
+        for place, garment in enumerate(dict.fromkeys(history.garment for history in data)):
             name = f"{self.name}_{file_name(garment)}" if place else self.name
-            histories = [history for history in run.histories if history.garment == garment]
+            histories = [history for history in data if history.garment == garment]
             shown = leading(run, {history.method for history in histories})
             histories = [history for history in histories if history.method in shown]
             if histories:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from reports.figures.chosen_roll_outs import page_one_roll_outs
+from reports.figures.chosen_roll_outs import PageOne, page_one_roll_outs
 from reports.figures.figure import Drawing, Figure
 from reports.figures.plotting import PAGE_WIDTH
 from reports.pictures.colour_scales import scales
@@ -12,20 +12,18 @@ from reports.pictures.sheets import BACK, BAR, FRONT, heads_of, sheet, shots
 from reports.run.finished_run import Run
 
 
-class ColourMaps(Figure):
+class ColourMaps(Figure[PageOne]):
     """A row of pictures for each scale of colours, but that of page one."""
 
     name, files = "map", ("map_*",)
 
-    def needs(self, run: Run) -> bool:
-        """Return whether a compared scene kept its roll-outs and its body."""
-        return page_one_roll_outs(run) is not None
+    def needs(self, run: Run) -> PageOne | None:
+        """Return roll-outs of a compared scene that kept them and its body."""
+        return page_one_roll_outs(run)
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: PageOne) -> Iterator[Drawing]:
         """Draw the rows, from the front and from behind in turn."""
-        chosen = page_one_roll_outs(run)
-        assert chosen is not None
-        roll_outs, methods = chosen
+        roll_outs, methods = data
         frame, _ = roll_outs.chosen_frame(methods, run.reference)
         further = list(scales(roll_outs, methods, frame, run.reference).items())[1:]
         wide = min((PAGE_WIDTH - BAR) / len(methods), 1.52)

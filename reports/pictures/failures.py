@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -31,30 +30,28 @@ class Failure:
     text: str
 
 
-class Failures(Figure):
+class Failures(Figure[list[Failure]]):
     """Trained networks with most strain over the simulation's, where their roll-outs are on disk."""
 
     name = "failures"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether there is such a roll-out."""
-        return bool(worst_failures(run))
+    def needs(self, run: Run) -> list[Failure]:
+        """Return these roll-outs."""
+        return worst_failures(run)
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: list[Failure]) -> Iterator[Drawing]:
         """Draw them side by side."""
-        failures = worst_failures(run)
-        wide = PAGE_WIDTH / max(len(failures), 4)
+        wide = PAGE_WIDTH / max(len(data), 4)
         tile = (wide, 1.1 * wide)
-        images = [shots(f.roll_outs, [f.method], f.frame, FRONT, tile)[0] for f in failures]
-        names = [f"{run.label(f.method)}: {f.roll_outs.scene.rpartition('/')[2]}" for f in failures]
+        images = [shots(f.roll_outs, [f.method], f.frame, FRONT, tile)[0] for f in data]
+        names = [f"{run.label(f.method)}: {f.roll_outs.scene.rpartition('/')[2]}" for f in data]
         heads = [wrapped(name, round(14 * wide)) for name in names]
-        figure = sheet([images], tile, heads, below=[[f.text for f in failures]])
+        figure = sheet([images], tile, heads, below=[[f.text for f in data]])
         caption = "The worst of trained networks by strain over the simulation's: each at its worst frame."
         yield Drawing(figure, self.name, caption, vector=False)
 
 
-@lru_cache(maxsize=1)
-def worst_failures(run: Run) -> tuple[Failure, ...]:
+def worst_failures(run: Run) -> list[Failure]:
     """Return the failures that are shown."""
     failures: list[Failure] = []
     shown: Counter[str] = Counter()
@@ -70,4 +67,4 @@ def worst_failures(run: Run) -> tuple[Failure, ...]:
             text = f"{number(strain)} J of strain,\n{number(ratio)} × the simulation's"
             failures.append(Failure(roll_outs, method, frame, text))
             shown[method] += 1
-    return tuple(failures)
+    return failures

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from reports.figures.chosen_roll_outs import page_one_roll_outs
+from reports.figures.chosen_roll_outs import PageOne, page_one_roll_outs
 from reports.figures.figure import Drawing, Figure
 from reports.figures.plotting import PAGE_WIDTH
 from reports.pictures.colour_scales import scales
@@ -19,20 +19,18 @@ from reports.tables.number_texts import number, with_spread
 BELOW = ("step/distance", "distance/rms")  # the number below a picture: the first that is known
 
 
-class LeadRow(Figure):
+class LeadRow(Figure[PageOne]):
     """Methods of page one, coloured by one-step error where it is known; their error below each."""
 
     name = "lead"
 
-    def needs(self, run: Run) -> bool:
-        """Return whether a compared scene kept its roll-outs and its body."""
-        return page_one_roll_outs(run) is not None
+    def needs(self, run: Run) -> PageOne | None:
+        """Return roll-outs of a compared scene that kept them and its body."""
+        return page_one_roll_outs(run)
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: PageOne) -> Iterator[Drawing]:
         """Draw the row."""
-        chosen = page_one_roll_outs(run)
-        assert chosen is not None
-        roll_outs, methods = chosen
+        roll_outs, methods = data
         frame, _ = roll_outs.chosen_frame(methods, run.reference)
         name, scale = next(iter(scales(roll_outs, methods, frame, run.reference).items()), ("", None))
         wide = (PAGE_WIDTH - BAR) / max(len(methods), 3)

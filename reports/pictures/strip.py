@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from reports.figures.chosen_roll_outs import FEW, SceneRollOuts, long_motion, whole_motions
+from reports.figures.chosen_roll_outs import FEW, Motion, SceneRollOuts, long_motion, whole_motions
 from reports.figures.figure import Drawing, Figure
 from reports.figures.plotting import PAGE_WIDTH, file_name, wrapped
 from reports.pictures.sheets import FRONT, SIDE, count_lines, sheet, shots
@@ -16,41 +17,35 @@ from reports.tables.number_texts import number
 FRAMES = 6  # side by side
 
 
-class Strip(Figure):
+class Strip(Figure[Motion]):
     """The motion that is shown at length."""
 
     name, files = "strip", ("strip_*",)
 
-    def needs(self, run: Run) -> bool:
-        """Return whether one of the few methods came to the end of that motion."""
-        return bool(_methods(run))
-
-    def draw(self, run: Run) -> Iterator[Drawing]:
-        """Draw that motion."""
+    def needs(self, run: Run) -> Motion | None:
+        """Return that motion, with those of its few methods that came to its end."""
         motion = long_motion(run)
-        assert motion is not None
-        yield draw_strip(run, motion.roll_outs, _methods(run))
+        few = [method for method in motion.few if method in motion.whole][:FEW] if motion else []
+        return replace(motion, few=tuple(few)) if motion and few else None
+
+    def draw(self, run: Run, data: Motion) -> Iterator[Drawing]:
+        """Draw that motion."""
+        yield draw_strip(run, data.roll_outs, data.few)
 
 
-class SpareStrips(Figure):
+class SpareStrips(Figure[list[Motion]]):
     """Further motions, which may fill the last page."""
 
     name, files = "spare_strip", ("strip_*",)
 
-    def needs(self, run: Run) -> bool:
-        """Return whether the run kept roll-outs of more than one whole motion."""
-        return any(motion.few for motion in whole_motions(run)[1:])
+    def needs(self, run: Run) -> list[Motion]:
+        """Return the motions behind the first."""
+        return [motion for motion in whole_motions(run)[1:] if motion.few]
 
-    def draw(self, run: Run) -> Iterator[Drawing]:
+    def draw(self, run: Run, data: list[Motion]) -> Iterator[Drawing]:
         """Draw each of them."""
-        for motion in whole_motions(run)[1:]:
-            if motion.few:
-                yield draw_strip(run, motion.roll_outs, motion.few[:FEW])
-
-
-def _methods(run: Run) -> list[str]:
-    motion = long_motion(run)
-    return [] if motion is None else [method for method in motion.few if method in motion.whole][:FEW]
+        for motion in data:
+            yield draw_strip(run, motion.roll_outs, motion.few[:FEW])
 
 
 def draw_strip(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]) -> Drawing:

@@ -14,7 +14,6 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_config import FORMAT
 from reference_sim import Trajectory
 from reports.blocks.block import Report
-from reports.figures.figure import Drawing, Figure
 from reports.run.finished_run import NoRollOuts, Run, make_run
 from reports.tables import make_tables
 from snug.training.kinds import find_kind
@@ -130,11 +129,6 @@ def report_of(rows: Sequence[Row], **more) -> Report:
     """The report of these rows, without pictures."""
     run = run_of(rows, **more)
     return Report(run, make_tables(run), {})
-
-
-def drawn(figure: Figure, run: Run) -> list[Drawing]:
-    """The parts of a figure, none where the run has nothing for it."""
-    return list(figure.draw(run)) if figure.needs(run) else []
 
 
 class Stored(NoRollOuts):

@@ -16,7 +16,7 @@ from reports.run.finished_run import shown_seeds
 from reports.run.reading import read_run_with_trainings
 from reports.statistics.outcomes import map_points, stress_tests
 from reports.statistics.pareto import Point
-from tests.reports.report_folder import FRAMES, declaration, drawn, mesh, row, run_of, sheet, write_model
+from tests.reports.report_folder import FRAMES, declaration, mesh, row, run_of, sheet, write_model
 
 
 def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
@@ -119,10 +119,10 @@ def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
 
 def test_every_garment_has_its_training_curves(tmp_path):
     folder = written(tmp_path, [row(), row("tunic/stop")])
-    assert drawn(TrainingCurves(), read_run_with_trainings(folder)) == []
+    assert TrainingCurves().drawings(read_run_with_trainings(folder)) == []
     for garment in ("tshirt", "tunic"):
         write_model(folder.models_of(garment) / "snug-seed0.safetensors", "snug", strain=0.1)
-    drawings = drawn(TrainingCurves(), read_run_with_trainings(folder))
+    drawings = TrainingCurves().drawings(read_run_with_trainings(folder))
     assert [drawing.name for drawing in drawings] == ["training", "training_tunic"]
     assert [drawing.caption.partition(":")[0] for drawing in drawings] == ["tshirt", "tunic"]
 
@@ -148,10 +148,10 @@ def test_a_map_of_every_outcome_is_drawn_from_what_its_cases_declare():
     run = run_of([*rows, other], cases=cases)
     assert set(map_points(run).values()) >= {(1.0, 1e-4), (1e4, 1 / 30)} and len(map_points(run)) == 10
     assert list(stress_tests(run)["scene"]) == ["another"]
-    (drawing,) = drawn(stability_maps.StabilityMaps(), run)
+    (drawing,) = stability_maps.StabilityMaps().drawings(run)
     (axes,) = drawing.canvas.axes
     assert len(axes.patches) == len(rows) and axes.get_title() == "map sheet"
-    assert drawn(stability_maps.StabilityMaps(), run_of([other], cases=cases)) == []
+    assert stability_maps.StabilityMaps().drawings(run_of([other], cases=cases)) == []
     blues = [stability_maps.shade(n)[0] for n in (1.0, 2.0, 20.0, 300.0, 1e6)]
     assert blues == sorted(blues, reverse=True) and blues[0] == blues[1] and blues[3] == blues[4]
 
@@ -162,20 +162,20 @@ def test_a_dot_stands_for_each_motion_and_seed():
         for s in ("tshirt/a", "tshirt/b")
         for k, v in enumerate((1, 3))
     ]
-    (drawing,) = drawn(Dots(), run_of(rows))
+    (drawing,) = Dots().drawings(run_of(rows))
     dots, bar = drawing.canvas.axes[0].get_lines()
     assert sorted(dots.get_xdata()) == [1.0, 1.0, 3.0, 3.0] and list(bar.get_xdata()) == [2.0, 2.0]
-    assert drawn(Dots(), run_of([row("flag", garment="")])) == []
+    assert Dots().drawings(run_of([row("flag", garment="")])) == []
 
 
 def test_errors_are_drawn_against_the_vertices_that_scenes_declare():
     sizes = {"mesh/a": 500.0, "mesh/b": 2000.0}
     rows = [row(s, "simulation", "mesh/vertices", n, suite="validation", unit="1") for s, n in sizes.items()]
     rows += [row(s, "snug", "curvature/error", n / 100.0, unit="1/m") for s, n in sizes.items()]
-    (drawing,) = drawn(AgainstVertices(), run_of(rows))
+    (drawing,) = AgainstVertices().drawings(run_of(rows))
     (line,) = drawing.canvas.axes[0].get_lines()
     assert list(line.get_xdata()) == [500.0, 2000.0] and list(line.get_ydata()) == [5.0, 20.0]
-    assert drawn(AgainstVertices(), run_of(rows[2:])) == []
+    assert AgainstVertices().drawings(run_of(rows[2:])) == []
     # The same mesh with more steps, and a sheet, are other scenes.
     rows += [
         row("dt/b", "simulation", "mesh/vertices", 2000.0, unit="1"),
@@ -184,7 +184,7 @@ def test_errors_are_drawn_against_the_vertices_that_scenes_declare():
     rows += [row("dt/b", "simulation", "mesh/steps", 4.0, unit="1")]
     rows += [row("drape", "simulation", "mesh/vertices", 900.0, unit="1")]
     rows += [row("drape", metric="curvature/error")]
-    (drawing,) = drawn(AgainstVertices(), run_of(rows))
+    (drawing,) = AgainstVertices().drawings(run_of(rows))
     assert list(drawing.canvas.axes[0].get_lines()[0].get_ydata()) == [5.0, 20.0]
 
 
@@ -214,7 +214,7 @@ def test_checks_are_drawn_by_their_tolerances_in_order():
         "tolerance": 2.0,
     }
     rows = [row(f"case {k}", value=v, **more) for k, v in enumerate((1.0, 0.5, 0.0))]
-    (drawing,) = drawn(known_answers.KnownAnswers(), run_of(rows))
+    (drawing,) = known_answers.KnownAnswers().drawings(run_of(rows))
     heights = drawing.canvas.axes[0].get_lines()[0].get_ydata()
     assert list(heights) == [known_answers.LOWEST, 0.25, 0.5]
 

@@ -31,7 +31,7 @@ from reports.statistics.pareto import (
 )
 from reports.tables import make_tables
 from reports.tables.speed import crossings, error_rivals, reference_uncertainty
-from tests.reports.report_folder import declaration, drawn, run_of
+from tests.reports.report_folder import declaration, run_of
 from tests.reports.report_folder import row as any_row
 
 # method: ms a frame, relative gap, curvature error
@@ -123,7 +123,7 @@ def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_p
         )
         assert point.time == pytest.approx(0.1 + shift) and point.time_spread == pytest.approx(0.05)
         assert run_time(scene) == ("cost/whole" if shift else "cost/frame")
-        assert drawn(ErrorOfPageOne(), run)
+        assert ErrorOfPageOne().drawings(run)
 
 
 def test_break_even_is_where_the_total_costs_cross():
@@ -255,11 +255,11 @@ def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_ro
 def test_ablations_are_drawn_where_the_full_recipe_is_not():
     costs = (("cost/frame", 1.0), ("gap/energy", 0.1))
     rows = [row("tshirt/walk", m, k, v) for m in ("snug-springs", "newton-1") for k, v in costs]
-    (drawing,) = (part for figure in FIGURES for part in drawn(figure, run_of(rows)))
+    (drawing,) = (part for figure in FIGURES for part in figure.drawings(run_of(rows)))
     assert drawing.name == "error_against_time"
     rows += [row("tshirt/walk", "snug", *cost) for cost in costs]
     kept = [r for r in rows if r.method != "newton-1"]
-    assert [drawn(figure, run_of(kept)) for figure in FIGURES] == [[]] * 4  # one point is no plot
+    assert [figure.drawings(run_of(kept)) for figure in FIGURES] == [[]] * 4  # one point is no plot
 
 
 def test_every_network_has_its_crossings_in_a_table():
@@ -334,7 +334,7 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
 
 def test_every_figure_of_the_suite_is_drawn(tmp_path):
     run = run_of(all_rows())
-    drawings = [drawing for figure in FIGURES for drawing in drawn(figure, run)]
+    drawings = [drawing for figure in FIGURES for drawing in figure.drawings(run)]
     names = [
         "error_against_time",
         "error_against_time_tshirt-walk",
@@ -351,7 +351,7 @@ def test_every_figure_of_the_suite_is_drawn(tmp_path):
 
 def test_no_axis_is_labelled_in_markup():
     """Names may hold dollars, so that no text is taken for a formula: neither are an axis's numbers."""
-    drawings = [drawing for figure in FIGURES for drawing in drawn(figure, run_of(all_rows()))]
+    drawings = [drawing for figure in FIGURES for drawing in figure.drawings(run_of(all_rows()))]
     assert len(drawings) == 4
     for canvas in (drawing.canvas for drawing in drawings):
         FigureCanvasAgg(canvas).draw()

@@ -14,7 +14,7 @@ from reports.pictures.colour_scales import scales
 from reports.pictures.failures import Failures, worst_failures
 from reports.pictures.side_by_side import draw_side_by_side
 from reports.run.reading import read_run
-from tests.reports.report_folder import FRAMES, Stored, declaration, drawn, mesh, row, run_of, sheet
+from tests.reports.report_folder import FRAMES, Stored, declaration, mesh, row, run_of, sheet
 
 
 def scene_of(methods, height=0.1):
@@ -91,9 +91,9 @@ def test_a_failure_is_shown_at_its_worst_frame():
     run = run_of(rows)
     cloth, faces = sheet(0.1)
     strain = {"energy/strain": np.array([0.0, 9.0, 1.0, 1.0, 1.0])}
-    assert drawn(Failures(), run) == []
+    assert Failures().drawings(run) == []
     stored = replace(run, roll_outs=Stored(mesh(cloth, faces, strain)))
-    (drawing,) = drawn(Failures(), stored)
+    (drawing,) = Failures().drawings(stored)
     assert drawing.name == "failures" and worst_failures(stored)[0].frame == 1
 
 
@@ -106,7 +106,7 @@ def test_only_what_was_drawn_is_read(tmp_path):
     path.parent.mkdir(parents=True)
     path.write_bytes(b"no mesh")
     run = read_run(folder)
-    assert [drawn(figure, run) for figure in PICTURES] == [[]] * len(PICTURES) and run.problems == []
+    assert [figure.drawings(run) for figure in PICTURES] == [[]] * len(PICTURES) and run.problems == []
 
 
 def test_words_beside_a_row_have_room_for_all_their_lines():
