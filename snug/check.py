@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 PROGRAM = "snug.check"
 USABLE, UNUSABLE, UNREADABLE = 0, 1, 2
-MARKS = {"ok": "", "note": "note", "unusable": "NO"}
+LEVEL_MARKS = {"ok": "", "note": "note", "unusable": "NO"}
 EXAMPLES = """examples:
   python -m snug.check shirt.obj                              on the body of the package
   python -m snug.check shirt.obj dress.ply --body mine.npz    on your own
@@ -75,7 +75,7 @@ def _check(file: GarmentFile, form: DressForm, picture: Path | None) -> int:
     print(f"{file.path}: {'cannot be used' if examination.unusable else 'can be used'}")
     for finding in examination.findings:
         remedy = f"; {finding.remedy}" if finding.remedy else ""
-        print(f"  {MARKS[finding.level]:<5}{finding.matter:<18}{finding.text}{remedy}")
+        print(f"  {LEVEL_MARKS[finding.level]:<5}{finding.matter:<18}{finding.text}{remedy}")
     if picture and examination.surface is not None and examination.distances is not None:
         from snug.garments.picture import draw
 

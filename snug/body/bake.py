@@ -51,8 +51,8 @@ JOINTS: dict[str, tuple[str, str | None]] = {
     "left_hand": ("LeftFingerBase", "left_wrist"),
     "right_hand": ("RightFingerBase", "right_wrist"),
 }
-NAMES = list(JOINTS)
-PARENTS = np.array([-1 if parent is None else NAMES.index(parent) for _, parent in JOINTS.values()])
+JOINT_ORDER = list(JOINTS)
+RIG_PARENTS = np.array([-1 if parent is None else JOINT_ORDER.index(parent) for _, parent in JOINTS.values()])
 
 LEG_SPREAD = np.radians(3.0)  # hip to ankle, away from the vertical: feet under the hips, thighs apart
 AGES = (20.0, 65.0)  # years
@@ -124,7 +124,7 @@ def t_pose_rotations(joints: np.ndarray) -> np.ndarray:
     Arms become straight along x, each leg turns as one piece, feet keep their soles level.
     """
     rotations = np.broadcast_to(np.eye(3), (len(JOINTS), 3, 3)).copy()
-    at = {name: joints[index] for index, name in enumerate(NAMES)}
+    at = {name: joints[index] for index, name in enumerate(JOINT_ORDER)}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         outward = np.array([sign, 0.0, 0.0])
         down = np.array([sign * np.sin(LEG_SPREAD), -np.cos(LEG_SPREAD), 0.0])
@@ -136,7 +136,7 @@ def t_pose_rotations(joints: np.ndarray) -> np.ndarray:
             ("shoulder", upper_arm), ("elbow", forearm), ("wrist", forearm), ("hand", forearm),
             ("hip", leg), ("knee", leg),
         ):  # fmt: skip
-            rotations[NAMES.index(f"{side}_{name}")] = rotation
+            rotations[JOINT_ORDER.index(f"{side}_{name}")] = rotation
     return rotations
 
 
@@ -184,7 +184,7 @@ def bake(count: int, seed: int) -> dict[str, np.ndarray]:
         **principal_shapes(vertices, joints, adults.faces),
         "skinning_weights": adults.weights,
         "faces": adults.faces,
-        "parents": PARENTS,
+        "parents": RIG_PARENTS,
     }
 
 

@@ -19,6 +19,7 @@ JOINT_NAMES = (
 )  # fmt: skip
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)
 JOINT = {name: index for index, name in enumerate(JOINT_NAMES)}
+BODY_JOINTS = JOINT["left_hand"]  # these come first in SMPL, SMPL-H and SMPL-X alike
 
 # (x, y, z) [m] of the middle and left joints; the right side is the mirror image.
 _REST = {

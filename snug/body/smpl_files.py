@@ -28,11 +28,10 @@ from reference_sim.files.array_file import ArrayFileError, read_arrays
 from reference_sim.geometry.topology import boundary_loops, half_edges
 from snug.body.parametric_body import SHAPES, Body
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
-from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, BodyError
+from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, PARENTS, BodyError
 from snug.body.t_pose import arm_angles, arm_rotations, turn_rest_pose
 
 JOINTS = len(JOINT_NAMES)
-BODY_JOINTS = JOINT["left_hand"]  # these come first in SMPL, SMPL-H and SMPL-X alike
 FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
 MAX_VERTICES = 100_000
 MAX_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not

@@ -7,22 +7,24 @@ from snug.body.skeleton import JOINT, PARENTS
 
 Array = NDArray[np.float64]
 
-ARM = ("shoulder", "elbow", "wrist", "hand")
-SIDES = (("left", 1.0), ("right", -1.0))
+ARM_JOINTS = ("shoulder", "elbow", "wrist", "hand")
+SIDE_SIGNS = (("left", 1.0), ("right", -1.0))
 
 
 def arm_angles(joints: Array) -> Array:
     """Return the angles (2,) [rad] by which the left and right arm of joints (24, 3) [m] hang down."""
-    arms = [joints[JOINT[f"{side}_wrist"]] - joints[JOINT[f"{side}_shoulder"]] for side, _ in SIDES]
-    return np.array([np.arctan2(-arm[1], sign * arm[0]) for arm, (_, sign) in zip(arms, SIDES, strict=True)])
+    arms = [joints[JOINT[f"{side}_wrist"]] - joints[JOINT[f"{side}_shoulder"]] for side, _ in SIDE_SIGNS]
+    return np.array(
+        [np.arctan2(-arm[1], sign * arm[0]) for arm, (_, sign) in zip(arms, SIDE_SIGNS, strict=True)]
+    )
 
 
 def arm_rotations(angles: Array) -> Array:
     """Return the world rotations (24, 3, 3) that lift each arm, as one piece, by angles (2,) [rad]."""
     turns = np.broadcast_to(np.eye(3), (len(JOINT), 3, 3)).copy()
-    for (side, sign), angle in zip(SIDES, angles, strict=True):
+    for (side, sign), angle in zip(SIDE_SIGNS, angles, strict=True):
         c, s = np.cos(angle), sign * np.sin(angle)
-        turns[[JOINT[f"{side}_{part}"] for part in ARM]] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        turns[[JOINT[f"{side}_{part}"] for part in ARM_JOINTS]] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
     return turns
 
 

@@ -12,7 +12,7 @@ from snug.body.parametric_body import Body
 from snug.garments.cuts import SEAM, CutPlane
 from snug.garments.garment import Garment, GarmentError, smooth_weights
 from snug.garments.implicit_surface import build_surface
-from snug.garments.landmarks import SHIRT_BONES, joint_position, skin_of
+from snug.garments.landmarks import SHIRT_BONES, joint_position, skin_following
 from snug.garments.meshing import mesh_garment
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ SMOOTHED_OVER = 0.1  # [m] about the hip joints: from borrowed weights to smooth
 
 def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
     """Return the nearest template vertex (V,) that follows one of `bones` to each position (V,3) [m]."""
-    allowed = np.flatnonzero(skin_of(body, bones))
+    allowed = np.flatnonzero(skin_following(body, bones))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
 
 

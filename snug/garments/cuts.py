@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reference_sim.geometry.topology import boundary_loops
 from snug.body.parametric_body import Body
 from snug.garments.implicit_surface import ImplicitSurface
-from snug.garments.landmarks import SHIRT_BONES, TORSO_BONES, joint_position, skin_of
+from snug.garments.landmarks import SHIRT_BONES, TORSO_BONES, joint_position, skin_following
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -89,7 +89,7 @@ def neck_cut(body: Body, clearance: float) -> CutPlane:
     """
     neck, shoulder = joint_position(body, "neck"), joint_position(body, "left_shoulder")[0]
     cut = CutPlane("neck", (0.0, 1.0, 0.3), (0.0, neck[1], neck[2]), reach=0.85 * shoulder, bend=3.0)
-    skin = body.template[skin_of(body, SHIRT_BONES)]
+    skin = body.template[skin_following(body, SHIRT_BONES)]
     over = skin[np.abs(np.abs(skin[:, 0]) - cut.reach) < 0.1 * shoulder]
     lift = max(0.0, cut.height(over).max(initial=-np.inf) + clearance + NECK_ROOM)
     return replace(cut, point=(0.0, neck[1] + lift, neck[2]))
@@ -103,14 +103,14 @@ def armhole_cut(
     It leans outwards so far that the flanks stay, with the ease and flare that build_surface adds to them.
     """
     shoulder, skin = joint_position(body, "left_shoulder"), body.template
-    arm = skin[skin_of(body, ("left_shoulder",))]
+    arm = skin[skin_following(body, ("left_shoulder",))]
     under = arm[arm[:, 0] < shoulder[0] + ARMPIT_ROOM, 1].min(initial=shoulder[1]) - ARMPIT_ROOM
-    shirt = skin[skin_of(body, SHIRT_BONES)]
-    collar = skin[skin_of(body, (*SHIRT_BONES, "neck"))]
+    shirt = skin[skin_following(body, SHIRT_BONES)]
+    collar = skin[skin_following(body, (*SHIRT_BONES, "neck"))]
     edge = strap + clearance + collar[neck.beyond(collar) > -clearance, 0].max(initial=0.0)
     over = shirt[np.abs(shirt[:, 0] - edge) < ARMPIT_ROOM]
     top = over[:, 1].max(initial=shoulder[1]) + clearance
-    flank = skin[skin_of(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
+    flank = skin[skin_following(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
     flank = flank[np.argsort(-flank[:, 1])]
     wide = np.append(np.maximum.accumulate(np.abs(flank[:, 0])), np.abs(flank[:, 0]).max(initial=edge))
     down = top - np.append(flank[:, 1], hem)

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
-from snug.garments.landmarks import skin_of
+from snug.garments.landmarks import skin_following
 
 Array = NDArray[np.float64]
 
-DEEP = 0.02  # [m] below the skin, from which contact may not find the way out
-DEEP_SHARE = 0.05  # of the vertices that may be so deep
-DEEPEST = 0.04  # [m], half the thickness of an arm
-NEAR = 0.05  # [m] from the skin: whatever is worn has a tenth of its vertices there
-NEAR_SHARE = 0.1
+TRAPPED_DEPTH = 0.02  # [m] below the skin, from which contact may not find the way out
+TRAPPED_SHARE = 0.05  # of the vertices that may be so deep
+MAX_DEPTH = 0.04  # [m], half the thickness of an arm
+WORN_DISTANCE = 0.05  # [m] from the skin: whatever is worn has a tenth of its vertices there
+WORN_SHARE = 0.1
 SIZE_RANGE = 0.1, 1.2  # largest extent of a garment [heights of the body]
 ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_ankle", "right_ankle",
         "left_foot", "right_foot")  # fmt: skip
@@ -32,10 +32,10 @@ ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_an
 DOUBTFUL, BETTER = 0.3, 0.4
 SHIFT_SAMPLES = 250  # vertices that a shift is sought with
 SHIFT_STEPS = 20
-CLOSE = 0.2  # share of the vertices that are closer than the thickness m: what a garment hangs by
-HUBER, FAR = 0.01, 0.2  # [m] differences from it that count fully, and at most
+CLOSEST_SHARE = 0.2  # share of the vertices that are closer than the thickness m: what a garment hangs by
+HUBER, MAX_UNEVENNESS = 0.01, 0.2  # [m] differences from it that count fully, and at most
 MAX_STEP = 0.1  # [m] of a shift, in one of the SHIFT_STEPS
-AIR = 0.003  # [m] between skin and garment after a shift
+AIR_GAP = 0.003  # [m] between skin and garment after a shift
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ class Fit:
         """Reason why nothing can be simulated from here, or empty."""
         if not SIZE_RANGE[0] < self.size < SIZE_RANGE[1]:
             return f"its largest extent is {self.size:.3g} times the body's height"
-        if np.mean(np.abs(self.distances) < NEAR) < NEAR_SHARE:
+        if np.mean(np.abs(self.distances) < WORN_DISTANCE) < WORN_SHARE:
             return f"it lies {1e3 * np.median(np.abs(self.distances)):.0f} mm from the body"
-        if self.depth > DEEPEST or np.mean(self.distances < -DEEP) > DEEP_SHARE:
+        if self.depth > MAX_DEPTH or np.mean(self.distances < -TRAPPED_DEPTH) > TRAPPED_SHARE:
             return f"it lies up to {1e3 * self.depth:.0f} mm deep in the body, with {self.below:.0%} of it"
         if self.at_ends > 0.5:
             return f"{self.at_ends:.0%} of it lies around head, hands or feet"
@@ -78,8 +78,8 @@ class Fit:
     @property
     def cost(self) -> float:
         """Unevenness of the air below it, and depth, over its size; less is more likely its place."""
-        off = np.abs(self.distances - np.quantile(self.distances, CLOSE))
-        uneven = np.minimum(off, FAR).mean() + 5 * np.maximum(-self.distances, 0.0).mean()
+        off = np.abs(self.distances - np.quantile(self.distances, CLOSEST_SHARE))
+        uneven = np.minimum(off, MAX_UNEVENNESS).mean() + 5 * np.maximum(-self.distances, 0.0).mean()
         return float(uneven / self.size + self.at_ends)
 
 
@@ -118,7 +118,7 @@ class DressForm:
         self.height = body.height
         self.low, self.high = body.template.min(axis=0), body.template.max(axis=0)
         self.skin = Obstacle(body.template, body.faces)
-        at_ends = np.isin(body.faces, np.flatnonzero(skin_of(body, ENDS)))
+        at_ends = np.isin(body.faces, np.flatnonzero(skin_following(body, ENDS)))
         self.ends: NDArray[np.bool_] = at_ends.sum(axis=1) == 3  # faces (F,)
 
     def fit(self, positions: Array) -> Fit:
@@ -157,7 +157,7 @@ class DressForm:
         for _ in range(SHIFT_STEPS):
             distance, normals = self._distances(points + shift)
             system = np.column_stack([normals, -np.ones(len(points))])
-            off = distance - np.quantile(distance, CLOSE)
+            off = distance - np.quantile(distance, CLOSEST_SHARE)
             weight = np.sqrt(np.minimum(1.0, HUBER / np.maximum(np.abs(off), 1e-12)))
             step = np.linalg.lstsq(weight[:, None] * system, -weight * distance, rcond=None)[0][:3]
             shift = shift + step * min(1.0, MAX_STEP / max(float(np.linalg.norm(step)), 1e-12))
@@ -167,12 +167,12 @@ class DressForm:
         """Refine `shift` (3,) [m] until no vertex penetrates the body."""
         for _ in range(SHIFT_STEPS):
             distance, normals = self._distances(points + shift)
-            inside = distance < AIR
+            inside = distance < AIR_GAP
             if not inside.any():
                 break
             # Pulled back a little, so that vertices outside of the skin stay near.
             system = normals[inside].T @ normals[inside] + 0.02 * len(points) * np.eye(3)
-            shift = shift + np.linalg.solve(system, normals[inside].T @ (AIR - distance[inside]))
+            shift = shift + np.linalg.solve(system, normals[inside].T @ (AIR_GAP - distance[inside]))
         return shift
 
     def _distances(self, points: Array) -> tuple[Array, Array]:

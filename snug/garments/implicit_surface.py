@@ -25,13 +25,20 @@ from scipy import ndimage
 
 from reference_sim.geometry.topology import unique_edges
 from snug.body.parametric_body import Body
-from snug.garments.landmarks import ARM_BONES, CROTCH_BONES, LEG_BONES, TORSO_BONES, joint_position, skin_of
+from snug.garments.landmarks import (
+    ARM_BONES,
+    CROTCH_BONES,
+    LEG_BONES,
+    TORSO_BONES,
+    joint_position,
+    skin_following,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
-DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
+GRID_SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
+SUPPORT_DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 CROTCH_FILLET = 0.03  # [m] the same between torso and leg
 TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
@@ -116,7 +123,7 @@ class _Sections:
     def __init__(self, body: Body, nodes: Sequence[Array]) -> None:
         self.body, self.nodes = body, nodes
         self.points = np.asarray(body.template, dtype=np.float64)
-        angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        angle = 2 * np.pi * np.arange(SUPPORT_DIRECTIONS) / SUPPORT_DIRECTIONS
         self.normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     def support(self, edges: Index, axis: int) -> Array:
@@ -139,12 +146,12 @@ def _torso(sections: _Sections, edges: Index, hang: float, growth: Array, narrow
     """
     y = sections.nodes[1]
     support = sections.support(edges, 1)
-    mirrored = (DIRECTIONS // 2 - np.arange(DIRECTIONS)) % DIRECTIONS
+    mirrored = (SUPPORT_DIRECTIONS // 2 - np.arange(SUPPORT_DIRECTIONS)) % SUPPORT_DIRECTIONS
     support = np.maximum(support, support[:, mirrored])  # both sides of a body that is not quite symmetric
     below = np.flatnonzero(y <= hang)
     fall = narrowing * y[below, None]
     support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall
-    smooth = ndimage.gaussian_filter1d(support, 0.03 / SPACING, axis=0, mode="nearest")
+    smooth = ndimage.gaussian_filter1d(support, 0.03 / GRID_SPACING, axis=0, mode="nearest")
     support[below] = np.maximum(smooth, support)[below]
     shoulder = joint_position(sections.body, "left_shoulder")[1]
     return np.maximum(sections.field(support, growth, 1), (y - shoulder)[None, :, None])
@@ -154,7 +161,9 @@ def _sleeve(sections: _Sections, edges: Index, cuff: float, ease: float, clearan
     """Return the field (nx,ny,nz) of the left sleeve."""
     x = sections.nodes[0]
     shoulder = joint_position(sections.body, "left_shoulder")[0]
-    support = ndimage.gaussian_filter1d(sections.support(edges, 0), 0.02 / SPACING, axis=0, mode="nearest")
+    support = ndimage.gaussian_filter1d(
+        sections.support(edges, 0), 0.02 / GRID_SPACING, axis=0, mode="nearest"
+    )
     growth = clearance + ease / (2 * np.pi) * _ramp(x, shoulder, cuff)
     return np.maximum(sections.field(support, growth, 0), (shoulder - x)[:, None, None])
 
@@ -163,7 +172,9 @@ def _leg(sections: _Sections, edges: Index, crotch: float, ease: float, clearanc
     """Return the field (nx,ny,nz) of the left leg of trousers."""
     y = sections.nodes[1]
     hip, knee = (joint_position(sections.body, name)[1] for name in ("left_hip", "left_knee"))
-    support = ndimage.gaussian_filter1d(sections.support(edges, 1), 0.03 / SPACING, axis=0, mode="nearest")
+    support = ndimage.gaussian_filter1d(
+        sections.support(edges, 1), 0.03 / GRID_SPACING, axis=0, mode="nearest"
+    )
     # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
     above, inner = np.flatnonzero(y >= knee), sections.normals[:, 0] < 0
     support[np.ix_(above, inner)] = np.maximum.accumulate(support[np.ix_(above, inner)], axis=0)
@@ -176,10 +187,10 @@ def legs_part(body: Body, room: float) -> float:
     points = np.asarray(body.template, dtype=np.float64)
     edges = _edges(body, LEG_BONES)
     knee, hip = (joint_position(body, name)[1] for name in ("left_knee", "left_hip"))
-    levels = np.arange(knee, hip, 0.5 * SPACING)
+    levels = np.arange(knee, hip, 0.5 * GRID_SPACING)
     inner = _fill_levels(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
     near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
-    middle = skin_of(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, SPACING))
+    middle = skin_following(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, GRID_SPACING))
     crotch = points[middle, 1].min(initial=levels[-1]) - room  # of legs that are apart all the way up
     return float(min(levels[near[0]], crotch) if len(near) else crotch)
 
@@ -188,7 +199,7 @@ def _edges(body: Body, bones: Sequence[str]) -> Index:
     """Return the edges (E,2) of the body between vertices that follow `bones`. Raises ValueError."""
     faces = np.asarray(body.faces, dtype=np.int64)
     edges = unique_edges(faces)
-    edges_of_bones = edges[skin_of(body, bones)[edges].all(axis=1)]
+    edges_of_bones = edges[skin_following(body, bones)[edges].all(axis=1)]
     if not len(edges_of_bones):
         raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")
     return edges_of_bones
@@ -220,8 +231,8 @@ def build_surface(
     points = np.asarray(body.template, dtype=np.float64)
     faces = np.asarray(body.faces, dtype=np.int64)
     torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
-    torso, arm, leg = (skin_of(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
-    hang = top if waistband else points[skin_of(body, ARM_BONES[:1]), 1].min()
+    torso, arm, leg = (skin_following(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
+    hang = top if waistband else points[skin_following(body, ARM_BONES[:1]), 1].min()
     waist = joint_position(body, "pelvis" if waistband else "spine1")[1]
     margin = 0.04
     depth = points[torso | (leg if legs else arm), 2]
@@ -229,11 +240,11 @@ def build_surface(
     side = points[torso | leg if legs else torso, 0].max() + reach if cuff is None else cuff + margin
     low = np.array([0.0, hem - margin, depth.min() - reach])
     high = np.array([side, top + margin, depth.max() + reach])
-    counts = np.ceil((high - low) / SPACING).astype(int) + 1
+    counts = np.ceil((high - low) / GRID_SPACING).astype(int) + 1
     if not 0 < np.prod(counts.astype(float)) <= MAX_CELLS:
         size = " x ".join(f"{length:.3g}" for length in high - low)
         raise ValueError(f"half of it would be {size} m: give a body in metres, with its joints inside")
-    nodes = [low[i] + SPACING * np.arange(counts[i]) for i in range(3)]
+    nodes = [low[i] + GRID_SPACING * np.arange(counts[i]) for i in range(3)]
     grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
     # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what is
     # promised about clearance is enforced on the finished mesh.
@@ -258,5 +269,5 @@ def build_surface(
     # sigma^2/(2 r); twice minus twice over cancels that.
     soft = ndimage.gaussian_filter(values, 1.0)
     values = 2 * soft - ndimage.gaussian_filter(soft, 1.0)
-    origin = low - [ghost * SPACING, 0, 0]
-    return ImplicitSurface(origin, SPACING, values, ndimage.spline_filter(values, order=3))
+    origin = low - [ghost * GRID_SPACING, 0, 0]
+    return ImplicitSurface(origin, GRID_SPACING, values, ndimage.spline_filter(values, order=3))

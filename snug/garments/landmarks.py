@@ -15,7 +15,7 @@ LEG_BONES = ("left_hip", "left_knee")
 CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
 
 
-def skin_of(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
+def skin_following(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
     """Return which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
     wanted = [body.joint_names.index(name) for name in names]
     return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)

@@ -10,7 +10,7 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass
 from pathlib import Path
 
-SUFFIXES = (".obj", ".ply", ".vtk", ".vtp", ".vtu", ".stl", ".off")
+MESH_SUFFIXES = (".obj", ".ply", ".vtk", ".vtp", ".vtu", ".stl", ".off")
 OPTION = "--garment-"
 REST_SHAPES = ("mesh", "uv")
 
@@ -56,7 +56,7 @@ class GarmentFile:
 
 def is_garment_file(word: str) -> bool:
     """Return whether an option names a mesh file instead of a template."""
-    return Path(word).suffix.lower() in SUFFIXES
+    return Path(word).suffix.lower() in MESH_SUFFIXES
 
 
 def add_garment_options(parser: ArgumentParser) -> None:

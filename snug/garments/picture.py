@@ -17,8 +17,8 @@ from snug.body.parametric_body import Body
 Array = NDArray[np.float64]
 
 BODY, CLOTH, BELOW = (0.85, 0.81, 0.78), (0.50, 0.66, 0.79), (0.85, 0.20, 0.15)
-LIFT = 0.03  # [m] that cloth is nearer in the order of painting: it lies on the body
-MARGIN = 0.1  # [m]
+CLOTH_LIFT = 0.03  # [m] that cloth is nearer in the order of painting: it lies on the body
+VIEW_MARGIN = 0.1  # [m]
 VIEWS = {"front": (0, 1, 2), "left side": (2, 1, 0)}  # axes to the right, up and towards the eye
 TURNED = {"left side": -1.0}  # z runs to the left as seen from +x
 
@@ -33,13 +33,13 @@ def draw(path: Path, body: Body, surface: Surface, distances: Array) -> None:
     below = (distances < 0)[surface.faces].any(axis=1)
     cloth = np.where(below[:, None], BELOW, CLOTH)
     points = np.concatenate([body.template, surface.positions])
-    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    low, high = points.min(axis=0) - VIEW_MARGIN, points.max(axis=0) + VIEW_MARGIN
     figure = Figure(figsize=(9, 6), layout="constrained")
     for axes, (name, view) in zip(figure.subplots(1, len(VIEWS)), VIEWS.items()):
         turn = np.array([TURNED.get(name, 1.0), 1.0, 1.0])
         parts = [
             _shaded(body.template[body.faces][:, :, view] * turn, np.tile(BODY, (len(body.faces), 1)), 0.0),
-            _shaded(surface.positions[surface.faces][:, :, view] * turn, cloth, LIFT),
+            _shaded(surface.positions[surface.faces][:, :, view] * turn, cloth, CLOTH_LIFT),
         ]
         _paint(axes, parts)
         axes.set(xlim=sorted(turn[0] * np.array([low, high])[:, view[0]]), ylim=(low[1], high[1]))

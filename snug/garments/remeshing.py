@@ -25,7 +25,7 @@ RELAXATION_STEP = 0.2
 RELAXATIONS = 40  # rounds of relax
 
 
-def vertex_normals(points: Array, faces: Index) -> Array:
+def _vertex_normals(points: Array, faces: Index) -> Array:
     """Return unit normals (V,3), area-weighted."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     normals = np.zeros_like(points)
@@ -130,7 +130,7 @@ def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
     # pyacvd winds each triangle by a guess at its normal, wrong near creases: make it the sheet's.
     coarse_faces = igl.bfs_orient(coarse_faces)[0].astype(np.int64)
     nearest = cKDTree(np.asarray(sheet.points)).query(coarse_points[coarse_faces].mean(axis=1))[1]
-    outward = vertex_normals(np.asarray(sheet.points, dtype=np.float64), np.asarray(sheet.regular_faces))[
+    outward = _vertex_normals(np.asarray(sheet.points, dtype=np.float64), np.asarray(sheet.regular_faces))[
         nearest
     ]
     a, b, c = (coarse_points[coarse_faces[:, k]] for k in range(3))

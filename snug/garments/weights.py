@@ -15,7 +15,7 @@ from reference_sim.files.array_file import ArrayFileError, read_arrays
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
 from snug.garments.garment import SKIRT_SMOOTHING, GarmentError, smooth_weights
-from snug.garments.landmarks import joint_position, skin_of
+from snug.garments.landmarks import joint_position, skin_following
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -60,7 +60,7 @@ def find_weights(
         authored: (V,24), or None.
     """
     followed = enclosed_limbs(body, positions, faces)
-    skin = np.asarray(body.faces)[skin_of(body, followed)[body.faces].all(axis=1)]
+    skin = np.asarray(body.faces)[skin_following(body, followed)[body.faces].all(axis=1)]
     tree = FaceTree(skin, body.template[skin].mean(axis=1))
     tree.refit(body.template)
     closest = tree.nearest(positions)

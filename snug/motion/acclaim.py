@@ -62,21 +62,21 @@ class Skeleton:
 
 @dataclass(slots=True)
 class _Line:
-    """One line of a file, split into words, and its place for messages."""
+    """One line of a file, split into tokens, and its place for messages."""
 
     path: Path
     number: int
-    words: list[str]
+    tokens: list[str]
 
     def error(self, problem: str) -> MotionError:
         """Return the error that names file and line."""
         return MotionError(f"{self.path}, line {self.number}: {problem}")
 
     def numbers(self, first: int, last: int | None = None) -> list[float]:
-        """Return words first to last - 1 as numbers. Raises MotionError."""
-        text = " ".join(self.words)[:60]
+        """Return tokens first to last - 1 as numbers. Raises MotionError."""
+        text = " ".join(self.tokens)[:60]
         try:
-            values = [float(word) for word in self.words[first:last]]
+            values = [float(word) for word in self.tokens[first:last]]
         except ValueError:
             raise self.error(f"'{text}' should be numbers; repair or fetch the file again") from None
         if not all(map(math.isfinite, values)) or (last is not None and len(values) != last - first):
@@ -88,10 +88,10 @@ def read_asf(path: Path) -> Skeleton:
     """Parse a skeleton. Raises MotionError with file and line."""
     sections: dict[str, list[_Line]] = {}
     for line in _lines(path):
-        if line.words[0].startswith(":"):
-            current = sections.setdefault(line.words[0][1:].lower(), [])
-            line.words = line.words[1:]
-            if not line.words:
+        if line.tokens[0].startswith(":"):
+            current = sections.setdefault(line.tokens[0][1:].lower(), [])
+            line.tokens = line.tokens[1:]
+            if not line.tokens:
                 continue
         elif not sections:
             raise line.error("no section such as :root before this; is it an .asf file?")
@@ -99,11 +99,11 @@ def read_asf(path: Path) -> Skeleton:
     for name in ("root", "bonedata", "hierarchy"):
         if not sections.get(name):
             raise MotionError(f"{path}: section :{name} is missing or empty; fetch the skeleton again")
-    units = {line.words[0]: line for line in sections.get("units", [])}
+    units = {line.tokens[0]: line for line in sections.get("units", [])}
     unit = units["length"].numbers(1, 2)[0] if "length" in units else 1.0
     if unit <= 0:
         raise units["length"].error("the unit of length must be positive")
-    degrees = "angle" not in units or units["angle"].words[1:] != ["rad"]
+    degrees = "angle" not in units or units["angle"].tokens[1:] != ["rad"]
     # CMU's lengths times 1 / unit are inches.
     skeleton = Skeleton({}, INCH / unit, np.zeros(3), degrees)
     skeleton.bones["root"] = _root(sections["root"], skeleton)
@@ -119,10 +119,10 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
     degrees = skeleton.degrees
     lines = _lines(path)
     for line in lines:
-        word = line.words[0]
+        word = line.tokens[0]
         if word.startswith(":"):
             degrees = {":degrees": True, ":radians": False}.get(word.lower(), degrees)
-        elif len(line.words) == 1 and word.isdigit():
+        elif len(line.tokens) == 1 and word.isdigit():
             _check_whole(line, frames, moving)
             frames.append({})
         elif not frames:
@@ -163,7 +163,7 @@ def turns(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
 
 def _lines(path: Path) -> list[_Line]:
     numbered = ((number, line.split("#")[0].split()) for number, line in enumerate(read_lines(path), 1))
-    lines = [_Line(path, number, words) for number, words in numbered if words]
+    lines = [_Line(path, number, tokens) for number, tokens in numbered if tokens]
     if not lines:
         raise MotionError(f"{path}: the file is empty; fetch it again")
     return lines
@@ -185,21 +185,21 @@ def _axes(line: _Line, angles: list[float], order: str, degrees: bool) -> np.nda
 
 
 def _root(lines: list[_Line], skeleton: Skeleton) -> Bone:
-    entries = {line.words[0].lower(): line for line in lines}
+    entries = {line.tokens[0].lower(): line for line in lines}
     if "order" not in entries:
         raise lines[0].error("the root has no 'order' of its channels")
     bone = Bone("root", channels=_channels(entries["order"], _TRANSLATIONS + _ROTATIONS))
     if "position" in entries:
         skeleton.position = np.array(entries["position"].numbers(1, 4)) * skeleton.metres
     if "orientation" in entries:
-        order = entries["axis"].words[1] if "axis" in entries and len(entries["axis"].words) > 1 else "XYZ"
+        order = entries["axis"].tokens[1] if "axis" in entries and len(entries["axis"].tokens) > 1 else "XYZ"
         line = entries["orientation"]
         bone.axes = _axes(line, line.numbers(1, 4), order, skeleton.degrees)
     return bone
 
 
 def _channels(line: _Line, allowed: tuple[str, ...]) -> tuple[str, ...]:
-    channels = tuple(word.lower() for word in line.words[1:])
+    channels = tuple(word.lower() for word in line.tokens[1:])
     for channel in channels:
         if channel not in allowed:
             raise line.error(f"channel '{channel}' is not supported here; known are {' '.join(allowed)}")
@@ -210,13 +210,13 @@ def _bones(lines: list[_Line], skeleton: Skeleton) -> dict[str, Bone]:
     bones: dict[str, Bone] = {}
     bone = Bone("")
     for line in lines:
-        word = line.words[0].lower()
+        word = line.tokens[0].lower()
         if word == "begin":
             bone = Bone("")
-        elif word == "name" and len(line.words) > 1:
-            if bone.name or line.words[1] in bones:
-                raise line.error(f"second name, or bone: '{line.words[1]}'; is a 'begin' missing?")
-            bone.name = line.words[1]
+        elif word == "name" and len(line.tokens) > 1:
+            if bone.name or line.tokens[1] in bones:
+                raise line.error(f"second name, or bone: '{line.tokens[1]}'; is a 'begin' missing?")
+            bone.name = line.tokens[1]
             bones[bone.name] = bone
         elif word == "direction":
             bone.direction = np.array(line.numbers(1, 4))
@@ -227,7 +227,7 @@ def _bones(lines: list[_Line], skeleton: Skeleton) -> dict[str, Bone]:
         elif word == "length":
             bone.length = line.numbers(1, 2)[0] * skeleton.metres
         elif word == "axis":
-            order = line.words[4] if len(line.words) > 4 else "XYZ"
+            order = line.tokens[4] if len(line.tokens) > 4 else "XYZ"
             bone.axes = _axes(line, line.numbers(1, 4), order, skeleton.degrees)
         elif word == "dof":
             bone.channels = _channels(line, _ROTATIONS)
@@ -236,7 +236,7 @@ def _bones(lines: list[_Line], skeleton: Skeleton) -> dict[str, Bone]:
 
 def _attach(lines: list[_Line], bones: dict[str, Bone], skeleton: Skeleton) -> None:
     for line in lines:
-        parent, *children = line.words
+        parent, *children = line.tokens
         if parent in ("begin", "end"):
             continue
         if parent not in skeleton.bones:

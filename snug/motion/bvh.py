@@ -41,7 +41,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Clip:
+class BvhClip:
     """A parsed file.
 
     Attributes:
@@ -73,7 +73,7 @@ class Clip:
 
 
 class _Lines:
-    """Lines of a file that are not empty, split into words; the last one read stands for messages."""
+    """Lines of a file that are not empty, split into tokens; the last one read stands for messages."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.number = path, 0
@@ -81,42 +81,42 @@ class _Lines:
 
     def next(self) -> list[str]:
         """Return the next line. Raises MotionError at the end of the file."""
-        for words in self.rest():
-            return words
+        for tokens in self.rest():
+            return tokens
         raise MotionError(f"{self.path}: ends in line {self.number}, before it is whole; export it again")
 
     def rest(self) -> Iterator[list[str]]:
         """Yield the lines that are left."""
         for number, line in self._lines:
-            if words := line.split():
+            if tokens := line.split():
                 self.number = number
-                yield words
+                yield tokens
 
     def error(self, problem: str) -> MotionError:
         """Return the error that names file and line."""
         return MotionError(f"{self.path}, line {self.number}: {problem}")
 
-    def expect(self, *words: str) -> list[str]:
-        """Return the rest of a line that begins with these words, in any case. Raises MotionError."""
+    def expect(self, *tokens: str) -> list[str]:
+        """Return the rest of a line that begins with these tokens, in any case. Raises MotionError."""
         line = self.next()
-        if [word.lower() for word in line[: len(words)]] != [word.lower() for word in words]:
+        if [word.lower() for word in line[: len(tokens)]] != [word.lower() for word in tokens]:
             raise self.error(
-                f"'{' '.join(line)[:40]}' where '{' '.join(words)}' should be; is it a .bvh file?"
+                f"'{' '.join(line)[:40]}' where '{' '.join(tokens)}' should be; is it a .bvh file?"
             )
-        return line[len(words) :]
+        return line[len(tokens) :]
 
-    def numbers(self, words: list[str], count: int) -> list[float]:
+    def numbers(self, tokens: list[str], count: int) -> list[float]:
         """Return `count` finite numbers. Raises MotionError for another count, or for other text."""
         try:
-            values = [float(word) for word in words]
+            values = [float(word) for word in tokens]
         except ValueError:
             values = [math.nan]
         if len(values) != count or not all(map(math.isfinite, values)):
-            raise self.error(f"{count} finite numbers should be here, not '{' '.join(words)[:40]}'")
+            raise self.error(f"{count} finite numbers should be here, not '{' '.join(tokens)[:40]}'")
         return values
 
 
-def read_clip(path: Path) -> Clip:
+def read_clip(path: Path) -> BvhClip:
     """Parse a file. Raises MotionError, naming file and line, for what is damaged, cut off or too large."""
     lines = _Lines(path)
     lines.expect("HIERARCHY")
@@ -124,28 +124,28 @@ def read_clip(path: Path) -> Clip:
     columns = joints[-1].first + len(joints[-1].channels)
     frames, frame_time = _header(lines, len(joints))
     rows: list[np.ndarray] = []
-    for words in lines.rest():
+    for tokens in lines.rest():
         if len(rows) == frames:
             raise lines.error(f"more than the {frames} frames that 'Frames:' declares; export it again")
-        rows.append(np.array(lines.numbers(words, columns)))
+        rows.append(np.array(lines.numbers(tokens, columns)))
     if len(rows) < frames:
         raise MotionError(
             f"{path}: declares {frames} frames and holds {len(rows)}; it is cut off, export it again"
         )
-    return Clip(joints, np.stack(rows), 1.0 / frame_time if frame_time else None)
+    return BvhClip(joints, np.stack(rows), 1.0 / frame_time if frame_time else None)
 
 
 def _hierarchy(lines: _Lines) -> list[Joint]:
     joints: list[Joint] = []
     open_joints: list[int] = []
     columns = 0
-    words = lines.next()
+    tokens = lines.next()
     while True:
-        word = words[0].lower()
+        word = tokens[0].lower()
         if word in ("root", "joint", "end"):
             if (word == "root") != (not joints):
                 raise lines.error("there is one ROOT, and JOINTs and End Sites below it")
-            name = "" if word == "end" else " ".join(words[1:])
+            name = "" if word == "end" else " ".join(tokens[1:])
             if word != "end" and (not name or any(joint.name == name for joint in joints)):
                 raise lines.error(f"joint '{name[:40]}' has no name or one that is taken")
             if len(joints) == MAX_JOINTS:
@@ -154,36 +154,36 @@ def _hierarchy(lines: _Lines) -> list[Joint]:
             open_joints.append(len(joints) - 1)
             lines.expect("{")
         elif not open_joints:
-            raise lines.error(f"'{words[0][:40]}' where ROOT should be; is it a .bvh file?")
+            raise lines.error(f"'{tokens[0][:40]}' where ROOT should be; is it a .bvh file?")
         elif word == "offset":
-            joints[open_joints[-1]].offset = np.array(lines.numbers(words[1:], 3))
+            joints[open_joints[-1]].offset = np.array(lines.numbers(tokens[1:], 3))
         elif word == "channels" and open_joints[-1] == len(joints) - 1 and columns == joints[-1].first:
-            joints[-1].channels = _channels(lines, words)
+            joints[-1].channels = _channels(lines, tokens)
             columns += len(joints[-1].channels)
         elif word == "}":
             open_joints.pop()
             if not open_joints:
                 return joints
         else:
-            raise lines.error(f"'{' '.join(words)[:40]}' is not known in a hierarchy, or out of place")
-        words = lines.next()
+            raise lines.error(f"'{' '.join(tokens)[:40]}' is not known in a hierarchy, or out of place")
+        tokens = lines.next()
 
 
-def _channels(lines: _Lines, words: list[str]) -> tuple[str, ...]:
+def _channels(lines: _Lines, tokens: list[str]) -> tuple[str, ...]:
     known = {channel.lower(): channel for channel in CHANNELS}
-    channels = tuple(known.get(word.lower(), "") for word in words[2:])
-    if words[1:2] != [str(len(channels))] or len(set(channels)) != len(channels) or "" in channels:
-        raise lines.error(f"'{' '.join(words)[:60]}' declares other channels than it names, or unknown ones")
+    channels = tuple(known.get(word.lower(), "") for word in tokens[2:])
+    if tokens[1:2] != [str(len(channels))] or len(set(channels)) != len(channels) or "" in channels:
+        raise lines.error(f"'{' '.join(tokens)[:60]}' declares other channels than it names, or unknown ones")
     return channels
 
 
 def _header(lines: _Lines, joints: int) -> tuple[int, float | None]:
     """Return the number of frames, and seconds a frame where it is stated."""
     lines.expect("MOTION")
-    words = lines.expect("Frames:")
-    if len(words) != 1 or not (words[0].isascii() and words[0].isdigit() and len(words[0]) < 10):
-        raise lines.error(f"'{' '.join(words)[:40]}' is no number of frames")
-    frames = int(words[0])
+    tokens = lines.expect("Frames:")
+    if len(tokens) != 1 or not (tokens[0].isascii() and tokens[0].isdigit() and len(tokens[0]) < 10):
+        raise lines.error(f"'{' '.join(tokens)[:40]}' is no number of frames")
+    frames = int(tokens[0])
     check_frame_count(lines.path, frames)
     if frames * joints > MAX_ROTATIONS:
         raise lines.error(f"{frames} frames of {joints} joints are too many; cut the clip")

@@ -14,7 +14,7 @@ import numpy as np
 
 from snug.body.skeleton import JOINT, JOINT_NAMES, LEG_LENGTH, PARENTS, REST_JOINTS, rotation_matrices
 from snug.motion.acclaim_to_smpl import LIMBS, foot_alignment, relative_poses
-from snug.motion.bvh import Clip, read_clip
+from snug.motion.bvh import BvhClip, read_clip
 from snug.motion.joint_names import match_joints
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
@@ -79,7 +79,7 @@ def _standing(path: Path, places: np.ndarray, matches: Mapping[str, int]) -> tup
     return axes, leg
 
 
-def _moved(clip: Clip, matches: Mapping[str, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
+def _moved(clip: BvhClip, matches: Mapping[str, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
     """Return world rotations (T, 3, 3) of the matched joints, and the path (T, 3) of the pelvis as filed."""
     wanted: set[int] = set()
     for index in matches.values():

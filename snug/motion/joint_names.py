@@ -17,12 +17,12 @@ from snug.body.skeleton import JOINT_NAMES
 from snug.motion.motion import MotionError
 
 # Joints of a side, from the trunk outwards; those of NEEDED a skeleton must have.
-LIMBS = (("hip", "knee", "ankle", "foot"), ("collar", "shoulder", "elbow", "wrist", "hand"))
+LIMB_CHAINS = (("hip", "knee", "ankle", "foot"), ("collar", "shoulder", "elbow", "wrist", "hand"))
 NEEDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 # What common skeletons call them: after joints (ours, Biovision), or after bones (Mixamo, CMU's clips as BVH,
 # Unity, Unreal, 3ds Max, Daz). Arms and legs are each named in the style that fits best.
 STYLES: tuple[dict[str, tuple[str, ...]], ...] = (
-    {joint: (joint,) for limb in LIMBS for joint in limb}
+    {joint: (joint,) for limb in LIMB_CHAINS for joint in limb}
     | {"ankle": ("ankle", "foot"), "foot": ("toe", "toes", "foot"), "wrist": ("wrist", "hand")},
     {
         "hip": ("upleg", "upperleg", "thigh"), "knee": ("leg", "lowleg", "lowerleg", "shin", "calf"),
@@ -31,7 +31,7 @@ STYLES: tuple[dict[str, tuple[str, ...]], ...] = (
         "elbow": ("forearm", "lowarm", "lowerarm"), "wrist": ("hand",), "hand": (),
     },
 )  # fmt: skip
-SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
+SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
@@ -62,7 +62,7 @@ def match_joints(
     above = {
         f"{side}_{joint}": f"{side}_{before}"
         for side in ("left", "right")
-        for limb in LIMBS
+        for limb in LIMB_CHAINS
         for before, joint in pairwise(limb)
     }
     for ours, theirs in matches.items():
@@ -103,7 +103,7 @@ def _limbs(names: Sequence[str]) -> dict[str, int]:
         if side:
             sided.setdefault((side, base), index)
     matches: dict[str, int] = {}
-    for limb in LIMBS:
+    for limb in LIMB_CHAINS:
         guesses = [_limb(limb, style, sided) for style in STYLES]
         best = max(guesses, key=_needed)
         matches.update(best)
@@ -135,8 +135,8 @@ def _side(name: str) -> tuple[str, str]:
     """
     parts = [word.lower() for word in _BREAKS.split(name.rpartition(":")[2]) if word]
     for place, rest in ((0, parts[1:]), (-1, parts[:-1]), (1, parts[2:])):
-        if rest and parts[place] in SIDES:
-            return SIDES[parts[place]], "".join(rest)
+        if rest and parts[place] in SIDE_WORDS:
+            return SIDE_WORDS[parts[place]], "".join(rest)
     return "", "".join(parts)
 
 

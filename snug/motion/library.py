@@ -42,7 +42,8 @@ def make_motion(name: str) -> Motion:
     if name not in LIBRARY:
         raise MotionError(f"unknown motion '{name}'; the library has: {', '.join(LIBRARY)}")
     # Its curves need SciPy; names are listed without.
-    from snug.motion.clips.make_clip import FPS, make_clip
+    from snug.motion.clips.make_clip import make_clip
+    from snug.motion.clips.posture import LIBRARY_FPS
 
     clip = make_clip(name)
-    return spread_arms(Motion(name, clip.poses, clip.translations, FPS, clip.kind, clip.source))
+    return spread_arms(Motion(name, clip.poses, clip.translations, LIBRARY_FPS, clip.kind, clip.source))

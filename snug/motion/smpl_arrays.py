@@ -15,23 +15,22 @@ from scipy.spatial.transform import Rotation
 
 from reference_sim.files.array_file import ArrayFileError, array_names, read_array, read_arrays
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
-from snug.body.skeleton import JOINT_NAMES, axis_angles
+from snug.body.skeleton import BODY_JOINTS, JOINT_NAMES, axis_angles
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
 from snug.motion.raw_motion import RawMotion, check_frame_count, frame_rate
 
 LAYOUTS = {22: "body", 24: "SMPL", 52: "SMPL+H", 55: "SMPL-X"}  # joints, the root among them
-BODY_JOINTS = 22
 # Of several names the first that a file has is read.
 QUATERNIONS = {  # name: where w stands
     "quaternions": 0, "rotations_quat": 0, "quaternions_wxyz": 0, "quaternions_xyzw": 3,
 }  # fmt: skip
 ROTATIONS = ("poses", "pose", "rotations", "rotation_matrices", *QUATERNIONS)
-BODIES = ("pose_body", "body_pose")
-ROOTS = ("root_orient", "global_orient")
+BODY_ROTATIONS = ("pose_body", "body_pose")
+ROOT_ROTATIONS = ("root_orient", "global_orient")
 PATHS = ("trans", "transl", "translations")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
-NAMES = (*ROTATIONS, *BODIES, *ROOTS, *PATHS, *RATES)
+ARRAY_NAMES = (*ROTATIONS, *BODY_ROTATIONS, *ROOT_ROTATIONS, *PATHS, *RATES)
 PLAIN = (np.ndarray, int, float)
 UNIT = 0.02  # a quaternion's length, and a matrix's entries, may be off by as much
 
@@ -39,7 +38,7 @@ UNIT = 0.02  # a quaternion's length, and a matrix's entries, may be off by as m
 def read_npz(path: Path, options: MotionFileOptions) -> RawMotion:
     """Read an .npz with rotations, a path of the root [m] and a frame rate [1/s]. Raises MotionError."""
     try:
-        arrays = read_arrays(path, NAMES)
+        arrays = read_arrays(path, ARRAY_NAMES)
         if not arrays:
             names = ", ".join(array_names(path)[:12]) or "nothing"
             raise MotionError(f"{path}: no array of a motion (found {names}); give 'poses', 'trans', 'fps'")
@@ -66,7 +65,7 @@ def read_pkl(path: Path, options: MotionFileOptions) -> RawMotion:
         raise MotionError(str(error)) from None
     if not isinstance(content, dict):
         raise MotionError(f"{path}: holds no dict of arrays; write an .npz motion file")
-    arrays = {name: np.asarray(content[name]) for name in NAMES if isinstance(content.get(name), PLAIN)}
+    arrays = {name: np.asarray(content[name]) for name in ARRAY_NAMES if isinstance(content.get(name), PLAIN)}
     if not arrays:
         names = ", ".join(map(str, list(content)[:12]))[:200] or "nothing"
         raise MotionError(f"{path}: no array of a motion (found {names}); give 'poses', 'trans', 'fps'")
@@ -121,15 +120,15 @@ def _rotations(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, s
 
     Raises MotionError.
     """
-    name = _first(arrays, (*ROTATIONS, *BODIES))
+    name = _first(arrays, (*ROTATIONS, *BODY_ROTATIONS))
     if name is None:
         names = ", ".join(sorted(arrays))
         raise MotionError(f"{path}: no array of rotations (found {names}); give 'poses' (frames, 72)")
     turns = _axis_angles(path, name, arrays[name])
     if turns.shape[1] + 1 in LAYOUTS:
-        root = _first(arrays, ROOTS)
+        root = _first(arrays, ROOT_ROTATIONS)
         if root is None:
-            raise MotionError(f"{path}: no array '{ROOTS[0]}', the root's rotation, beside '{name}'")
+            raise MotionError(f"{path}: no array '{ROOT_ROTATIONS[0]}', the root's rotation, beside '{name}'")
         matrices = arrays[root].shape[1:] == (3, 3)
         first = _axis_angles(path, root, arrays[root][:, None] if matrices else arrays[root])
         if first.shape != (len(turns), 1, 3):

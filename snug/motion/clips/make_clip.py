@@ -20,9 +20,9 @@ from snug.motion.clips.actions import (
     Action,
 )
 from snug.motion.clips.gait import RUN, WALK, Stride, gait_angles, gait_flights, gait_support, stride_phase
-from snug.motion.clips.posture import RATE, poses_from_angles, root_path, smoothstep
+from snug.motion.clips.posture import LIBRARY_FPS, RATE, poses_from_angles, root_path, smoothstep
 from snug.motion.clips.strikes import KICK, PUNCH, SIDESTEP, TURN
-from snug.motion.clips.turns import FPS, STOPS
+from snug.motion.clips.turns import STOPS
 from snug.motion.clips.unseen import CARTWHEEL_LEAN, CLIMB, DANCE_TURN, PUSH_RECOVERY, SIT_AND_STAND
 
 # name: (kind, action)
@@ -58,7 +58,7 @@ START_SECONDS = 0.7  # from standing to the full stride
 STOP_SECONDS = 0.35  # from the full stride to standing
 
 
-class Clip(NamedTuple):
+class LibraryClip(NamedTuple):
     """A motion of the library, arms as in its tables: poses (T, 24, 3) [rad], translations (T, 3) [m]."""
 
     poses: np.ndarray
@@ -67,10 +67,10 @@ class Clip(NamedTuple):
     source: str
 
 
-def make_clip(name: str) -> Clip:
-    """Make the library's motion of that name at FPS. Raises KeyError for an unknown name."""
+def make_clip(name: str) -> LibraryClip:
+    """Make the library's motion of that name at LIBRARY_FPS. Raises KeyError for an unknown name."""
     if name in STOPS:
-        return Clip(*STOPS[name].motion(), "stop", "embedded library: stops within a frame")
+        return LibraryClip(*STOPS[name].motion(), "stop", "embedded library: stops within a frame")
     if name in ACTIONS:
         kind, action = ACTIONS[name]
         angles, flights = action.angles()
@@ -82,8 +82,8 @@ def make_clip(name: str) -> Clip:
         poses, path = _gait(stride, seconds, pace, stop)
         source = "embedded library: normative gait curves"
     path[:, [0, 2]] -= path[0, [0, 2]]
-    every = round(RATE / FPS)
-    return Clip(poses[::every], path[::every], kind, source)
+    every = round(RATE / LIBRARY_FPS)
+    return LibraryClip(poses[::every], path[::every], kind, source)
 
 
 def _gait(stride: Stride, seconds: float, pace: float, stop: float | None) -> tuple[np.ndarray, np.ndarray]:

@@ -29,9 +29,10 @@ STANDING = CENTRAL | {f"{side}_{name}": value for side in ("left", "right") for 
 SPINE_SHARES = (("spine1", 0.3), ("spine2", 0.3), ("spine3", 0.4))
 # Foot to shank, passive range; beyond it the heel comes off the floor instead.
 ANKLE_RANGE = (-55.0, 30.0)
-RATE = 120.0  # [1/s] motions are built at this rate and handed out at a quarter of it
+RATE = 120.0  # [1/s] at which motions are built
+LIBRARY_FPS = 30.0  # [1/s] at which they are handed out
 SMOOTHING = 0.03  # [s] muscles do not start at once: standard deviation of the Gaussian over all angles
-GRAVITY = 9.81  # [m/s^2]
+FREE_FALL = 9.81  # [m/s^2]
 CONTACT_DEPTH = 0.01  # [m] a sole point this much higher than the lowest carries 1/e of its weight
 
 
@@ -113,7 +114,7 @@ def root_path(
     time = np.arange(len(poses)) / RATE
     for start, end in flights:
         inside = (time > start) & (time < end)
-        fall = 0.5 * GRAVITY * (time - start) * (end - time)
+        fall = 0.5 * FREE_FALL * (time - start) * (end - time)
         height[inside] = (np.interp(time, (start, end), np.interp((start, end), time, height)) + fall)[inside]
         for axis in (0, 1):
             ends = np.interp((start, end), time, velocity[:, axis])

@@ -13,10 +13,16 @@ from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.motion.clips.gait import WALK, gait_angles, gait_flights, gait_support, stride_phase
-from snug.motion.clips.posture import RATE, SPINE_SHARES, poses_from_angles, root_path, smoothstep
+from snug.motion.clips.posture import (
+    LIBRARY_FPS,
+    RATE,
+    SPINE_SHARES,
+    poses_from_angles,
+    root_path,
+    smoothstep,
+)
 
-FPS = 30.0
-HELD = 36  # frames after the stop: over a second, in which a hem comes to rest
+FROZEN_FRAMES = 36  # frames after the stop: over a second, in which a hem comes to rest
 STANCE = {
     "hip_abduction": 9.0, "knee_flexion": 10.0, "hip_flexion": 6.0, "arm_lowering": 34.0,
     "arm_flexion": 12.0, "elbow_flexion": 60.0,
@@ -37,9 +43,9 @@ class Twist:
     stop: float
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS, feet on the floor."""
-        time = np.arange(round(self.stop * FPS) + 1 + HELD) / FPS
-        time = np.minimum(time, round(self.stop * FPS) / FPS)
+        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at LIBRARY_FPS, feet on the floor."""
+        time = np.arange(round(self.stop * LIBRARY_FPS) + 1 + FROZEN_FRAMES) / LIBRARY_FPS
+        time = np.minimum(time, round(self.stop * LIBRARY_FPS) / LIBRARY_FPS)
         yaw = self.degrees * np.sin(2 * np.pi * self.hertz * time) * smoothstep(time / ONSET)
         sided = {
             f"{side}_{name}": np.array(value) for side in ("left", "right") for name, value in STANCE.items()
@@ -63,7 +69,7 @@ class TurningWalk:
     stop: float
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at FPS."""
+        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at LIBRARY_FPS."""
         time = np.arange(round(self.stop * RATE) + 1) / RATE
         size = smoothstep(time / 0.7)
         phase = stride_phase(WALK, self.pace * size)
@@ -76,9 +82,9 @@ class TurningWalk:
             poses, gait_flights(WALK, phase, size), support=gait_support(phase, size),
             height_smoothing=0.045, speed_smoothing=0.08,
         )  # fmt: skip
-        every = round(RATE / FPS)
+        every = round(RATE / LIBRARY_FPS)
         poses, path = poses[::every], path[::every]
-        frozen = np.minimum(np.arange(len(poses) + HELD), len(poses) - 1)
+        frozen = np.minimum(np.arange(len(poses) + FROZEN_FRAMES), len(poses) - 1)
         return poses[frozen], path[frozen] - path[0] * [1.0, 0.0, 1.0]
 
 
