@@ -101,7 +101,7 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "words"),
+    ("name", "text", "message"),
     [
         ("a.toml", None, "no such file"),
         ("a.yaml", "x: 1", "a material is a .toml or a .json"),
@@ -115,10 +115,10 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
         ("a.toml", "#" * (2 << 20), "too large for a material"),
     ],
 )
-def test_a_bad_file_is_named_with_its_field(tmp_path, name, text, words):
+def test_a_bad_file_is_named_with_its_field(tmp_path, name, text, message):
     path = tmp_path / name
     if text is not None:
         path.write_text(text)
-    with pytest.raises(MaterialError, match=words) as caught:
+    with pytest.raises(MaterialError, match=message) as caught:
         Material.from_file(path)
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)

@@ -114,24 +114,24 @@ def test_planes_at_edges_and_corners_of_a_box():
 def test_signed_distance_of_a_sphere_and_of_a_box():
     obstacle = Obstacle(SPHERE, FACES)
     points, distance = around(400, 3, -0.14, 0.5)
-    found = obstacle.signed_distance(points, 0)
-    gap = found - distance
+    signed = obstacle.signed_distance(points, 0)
+    gap = signed - distance
     assert (gap > -1e-14).all() and (gap < sagitta(SPHERE, FACES)).all()
-    assert (found < 0).sum() > 50 and (found > 0).sum() > 50
+    assert (signed < 0).sum() > 50 and (signed > 0).sum() > 50
 
     points = np.random.default_rng(4).uniform(-0.3, 0.5, (400, 3))
     outside = np.maximum(np.maximum(-points, points - [0.2, 0.25, 0.28]), 0)
     inside = np.minimum(points, np.array([0.2, 0.25, 0.28]) - points).min(axis=1)
     exact = np.where(inside > 0, -inside, np.linalg.norm(outside, axis=1))
     assert (inside > 0).sum() > 5
-    found = Obstacle(*box((0, 0, 0), (0.2, 0.25, 0.28))).signed_distance(points, 0)
-    assert found == pytest.approx(exact, abs=1e-14)
+    signed = Obstacle(*box((0, 0, 0), (0.2, 0.25, 0.28))).signed_distance(points, 0)
+    assert signed == pytest.approx(exact, abs=1e-14)
 
 
 def test_signed_distance_deep_inside_a_thick_body():
     points = np.array([(0.0, 0.01, 0.02), (0.1, 0, 0), (0, -0.12, 0)])
-    found = Obstacle(SPHERE, FACES).signed_distance(points, 0)
-    assert found == pytest.approx(np.linalg.norm(points, axis=1) - RADIUS, abs=sagitta(SPHERE, FACES))
+    signed = Obstacle(SPHERE, FACES).signed_distance(points, 0)
+    assert signed == pytest.approx(np.linalg.norm(points, axis=1) - RADIUS, abs=sagitta(SPHERE, FACES))
 
 
 def bent(vertices: np.ndarray) -> np.ndarray:
@@ -242,9 +242,9 @@ def test_no_sample_outside_a_dressed_body_is_in_contact():
     assert (height < 0.004).sum() > 500
     assert (height[distance > 0.015] > 0.004).all()
     # And whoever is inside, nearest to a face that it may meet, is in contact by the exact depth.
-    own = (distance < 0) & (np.linalg.norm(points - planes.points, axis=1) < np.abs(distance) + 1e-9)
-    assert own.sum() > 300
-    assert height[own] == pytest.approx(distance[own], abs=1e-9)
+    within_face = (distance < 0) & (np.linalg.norm(points - planes.points, axis=1) < np.abs(distance) + 1e-9)
+    assert within_face.sum() > 300
+    assert height[within_face] == pytest.approx(distance[within_face], abs=1e-9)
 
 
 def test_what_samples_may_meet_is_found_also_from_a_few_of_them():

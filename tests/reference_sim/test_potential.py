@@ -63,8 +63,8 @@ def test_each_term_alone_has_the_hessian_of_its_own_blocks():
     x = crumpled(cloth)
     for energy in all_terms(cloth):
         expected = dense_sum([energy], x)
-        found = Potential([energy]).hessian(x).toarray()
-        assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
+        assembled = Potential([energy]).hessian(x).toarray()
+        assert np.abs(assembled - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("pins", [(0,), (3, 4, 17, 24), tuple(range(1, 25))])
@@ -106,8 +106,8 @@ def test_the_scalar_pattern_is_the_sum_of_scalar_stiffnesses():
                 np.add.at(expected, np.ix_(stencil, stencil), block)
     expected = expected[np.ix_(free, free)]
     assert np.linalg.eigvalsh(expected)[0] > 0  # what a preconditioner must be
-    found = pattern.symmetric(pattern.assemble(x)).toarray()
-    assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+    assembled = pattern.symmetric(pattern.assemble(x)).toarray()
+    assert np.abs(assembled - expected).max() < 1e-13 * np.abs(expected).max()
 
 
 def test_value_and_gradient_are_sums_and_terms_names_them():

@@ -233,9 +233,9 @@ def test_the_file_grows_frame_by_frame_and_is_readable_at_any_time(tmp_path):
 
     result = simulate(cloth, terms_of(cloth), frames=5, pin_positions=spy, path=path)
     for frame in range(1, 5):
-        found = Trajectory.load(tmp_path / f"at{frame}")
-        assert found.frames == frame and found.status == "unfinished"
-        assert (found.positions == result.positions[:frame]).all()
+        loaded = Trajectory.load(tmp_path / f"at{frame}")
+        assert loaded.frames == frame and loaded.status == "unfinished"
+        assert (loaded.positions == result.positions[:frame]).all()
     whole = Trajectory.load(path)
     assert whole.status == "converged" and whole.reason == result.reason
     assert (whole.positions == result.positions).all()
@@ -268,8 +268,8 @@ def test_divergence_is_recorded_and_not_raised(tmp_path):
     # guess of frame 3, which keeps the velocity of frame 2, is still above: frame 4 has no finite start.
     assert result.reason.startswith(f"frame {result.frames}: ")
     assert 3 <= result.frames <= 4 and np.isfinite(result.positions).all()
-    found = Trajectory.load(path)
-    assert found.status == "diverged" and found.frames == result.frames and found.reason == result.reason
+    loaded = Trajectory.load(path)
+    assert loaded.status == "diverged" and loaded.frames == result.frames and loaded.reason == result.reason
 
 
 def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
@@ -290,9 +290,9 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
     assert result.status == "converged" and result.frame_fields["converged"].all()
     np.testing.assert_array_equal(relaxed[1:], residual[1:] > 1e-6)
     first = int(np.flatnonzero(relaxed)[0])
-    said = f"frame {first}: round-off: residual {residual[first]:.1e} above tolerance 1.0e-06"
-    assert result.reason.startswith(said) and Trajectory.load(path).reason == result.reason
-    assert f"round-off  {relaxed.sum():.0f} frames above the tolerance, first {said}" in summarise(
+    reason = f"frame {first}: round-off: residual {residual[first]:.1e} above tolerance 1.0e-06"
+    assert result.reason.startswith(reason) and Trajectory.load(path).reason == result.reason
+    assert f"round-off  {relaxed.sum():.0f} frames above the tolerance, first {reason}" in summarise(
         result, None, frames=4
     )
     with h5py.File(path, "r+") as file:  # a run that was killed

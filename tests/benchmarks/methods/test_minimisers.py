@@ -114,11 +114,11 @@ def test_the_reference_is_where_another_solver_ends_from_another_start(name):
         guess = first_guess(scene, previous, velocity, frame)
         potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, frame))
         noise = np.random.default_rng(frame).normal(0, 1e-3, x.shape) * scene.cloth.free[:, None]
-        found = VertexBlockDescent(potential, max_iterations=1500).minimise(x + noise)
+        reached = VertexBlockDescent(potential, max_iterations=1500).minimise(x + noise)
         here, to_gain = potential.value(x), potential.value(guess) - potential.value(x)
         assert potential.value(x + noise) - here > 0.1 * to_gain > 0
-        assert abs(found.energy - here) < 1e-6 * to_gain
-        assert np.abs(found.positions - x).max() < 1e-5
+        assert abs(reached.energy - here) < 1e-6 * to_gain
+        assert np.abs(reached.positions - x).max() < 1e-5
 
 
 def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_elsewhere(touching):
@@ -130,15 +130,15 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
     guess = positions + DT * velocity
     potential.prepare(Step(positions, velocity, guess, DT))
     best = Newton(potential, tolerance=1e-12).minimise(guess).positions
-    found = XPBD(potential, max_iterations=3000).minimise(guess).positions
+    reached = XPBD(potential, max_iterations=3000).minimise(guess).positions
     assert np.abs(best - guess).max() > 1e-8  # there was something to do
-    assert np.abs(found - best).max() < 1e-4 * np.abs(best - guess).max()
+    assert np.abs(reached - best).max() < 1e-4 * np.abs(best - guess).max()
 
     potential, guess = touching
     best = Newton(potential).minimise(guess).energy
     to_gain = potential.value(guess) - best
-    found = [XPBD(potential, max_iterations=n).minimise(guess).energy for n in (10, 100, 3000)]
-    gaps = [(energy - best) / to_gain for energy in found]
+    reached = [XPBD(potential, max_iterations=n).minimise(guess).energy for n in (10, 100, 3000)]
+    gaps = [(energy - best) / to_gain for energy in reached]
     assert gaps[0] > gaps[1] > gaps[2] and 1e-6 < gaps[2] < 0.2
 
 
@@ -150,9 +150,9 @@ def test_hinges_without_stiffness_are_no_hinges(method):
     for bending in ([], [BendHinge(cloth)]):
         potential = Potential([StretchStVK(cloth), *bending, Gravity(cloth), Inertia(cloth, DT)])
         potential.prepare(Step(positions, np.zeros_like(positions), positions, DT))
-        found = method(potential, max_iterations=20).minimise(positions)
-        assert found.status == "max_iterations"
-        ends.append(found.positions)
+        reached = method(potential, max_iterations=20).minimise(positions)
+        assert reached.status == "max_iterations"
+        ends.append(reached.positions)
     np.testing.assert_array_equal(*ends)
 
 

@@ -21,13 +21,13 @@ COMMANDS = (
 def test_a_wrong_word_is_one_line_with_the_name_of_the_command(name, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert importlib.import_module(name).main(["--no-such-option"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"{name}: ") and said.count("\n") == 1
-    assert "--help" in said and not list(tmp_path.iterdir())
+    message = capsys.readouterr().err
+    assert message.startswith(f"{name}: ") and message.count("\n") == 1
+    assert "--help" in message and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
-    ("met", "goes_on", "status", "said"),
+    ("met", "goes_on", "status", "message"),
     [
         (ValueError("a.obj: face 3\n has no area"), "", 2, "a.obj: face 3 has no area"),
         (FileNotFoundError(errno.ENOENT, "No such file", "a.obj"), "", 2, "a.obj"),
@@ -36,14 +36,14 @@ def test_a_wrong_word_is_one_line_with_the_name_of_the_command(name, capsys, tmp
         (KeyboardInterrupt(), "", 130, "interrupted; nothing was written"),
     ],
 )
-def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, said, capsys):
+def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, message, capsys):
     @command("some.command", goes_on=goes_on)
     def main() -> int:
         raise met
 
     assert main() == status
     error = capsys.readouterr().err
-    assert error.startswith("some.command: ") and said in error and error.count("\n") == 1
+    assert error.startswith("some.command: ") and message in error and error.count("\n") == 1
 
 
 def test_a_fault_of_the_program_is_raised():

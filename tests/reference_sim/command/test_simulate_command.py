@@ -66,9 +66,9 @@ def test_every_example_of_the_help_is_understood():
     lines = EXAMPLES.replace("\\\n", " ").splitlines()
     commands = [line.split("#")[0].split() for line in lines if line.strip().startswith("python -m")]
     assert len(commands) >= 4
-    for words in commands:
-        assert words[:3] == ["python", "-m", "reference_sim.simulate"]
-        make_parser().parse_args([word.strip("'") for word in words[3:]])
+    for arguments in commands:
+        assert arguments[:3] == ["python", "-m", "reference_sim.simulate"]
+        make_parser().parse_args([word.strip("'") for word in arguments[3:]])
 
 
 def test_the_module_is_a_command_and_the_function_stays_what_it_is():
@@ -78,8 +78,8 @@ def test_the_module_is_a_command_and_the_function_stays_what_it_is():
 
 
 def test_as_a_module_of_its_own(folder):
-    words = ["sheet.obj", "--pins", "0,6", "--frames", "3", "-o", "out.vtkhdf"]
-    command = [sys.executable, "-m", "reference_sim.simulate", *words]
+    arguments = ["sheet.obj", "--pins", "0,6", "--frames", "3", "-o", "out.vtkhdf"]
+    command = [sys.executable, "-m", "reference_sim.simulate", *arguments]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stderr
@@ -89,21 +89,21 @@ def test_as_a_module_of_its_own(folder):
 
 
 def test_garment_on_a_moving_obstacle_with_point_cache(folder, capsys):
-    words = ["sheet.obj", "--obstacle", "ball", "--obstacle-rest", "ball/ball_0.obj", "--region", "0.5"]
-    assert main([*words, "--friction", "0.3", "--pc2", "out.pc2", "-o", "out.vtkhdf"]) == 0
+    arguments = ["sheet.obj", "--obstacle", "ball", "--obstacle-rest", "ball/ball_0.obj", "--region", "0.5"]
+    assert main([*arguments, "--friction", "0.3", "--pc2", "out.pc2", "-o", "out.vtkhdf"]) == 0
     trajectory = Trajectory.load("out.vtkhdf")
     assert (trajectory.status, trajectory.frames) == ("converged", 4)  # as many as the ball has
     assert trajectory.frame_fields["energy/collision"][-1] > 0
     assert "energy/friction" in trajectory.frame_fields
     out = capsys.readouterr().out
-    for words_said in (
+    for expected in (
         "frames     4 of 4; 3 of 3 steps converged",
         f"strain {trajectory.frame_fields['energy/strain'][-1]:.3g}",
         "stretch    2.39% predicted at the top of 0.4 m",
         "of vertices inside",
         "wrote      out.vtkhdf, out.pc2, out.obj",
     ):
-        assert words_said in out
+        assert expected in out
     assert read_mesh("out.obj").faces.tolist() == FACES.tolist()
     assert Path("out.pc2").stat().st_size == 32 + 12 * 4 * len(SHEET)
     assert sorted(os.listdir()) == ["ball", "out.obj", "out.pc2", "out.vtkhdf", "sheet.obj"]
@@ -127,19 +127,11 @@ def test_units_and_up_axis_do_not_change_the_physics(folder, capsys):
 
 
 def test_options_reach_the_simulation(folder):
-    words = ["sheet.obj", "--pins", "x<-0.19", "--dt", "1/60", "--frames", "3", "--substeps", "2"]
-    material = [
-        "--young-modulus",
-        "50e3",
-        "--thickness",
-        "0.001",
-        "--density",
-        "300",
-        "--poisson-ratio",
-        "0.3",
-    ]
+    arguments = ["sheet.obj", "--pins", "x<-0.19", "--dt", "1/60", "--frames", "3", "--substeps", "2"]
+    material = ["--young-modulus", "50e3", "--thickness", "0.001", "--density", "300"]
+    material += ["--poisson-ratio", "0.3"]
     bending = ["--bending-stiffness", "1e-5", "--bending-scaling", "none", "--rest-angles", "rest"]
-    assert main([*words, *material, *bending, "--tolerance", "1e-8", "--quiet", "-o", "a.vtkhdf"]) == 0
+    assert main([*arguments, *material, *bending, "--tolerance", "1e-8", "--quiet", "-o", "a.vtkhdf"]) == 0
     made = Trajectory.load("a.vtkhdf").provenance
     assert (made["dt_s"], made["substeps"], made["options"]["tolerance"]) == (1 / 60, 2, 1e-8)
     assert made["terms"]["bending"]["scaling"] == "none"
@@ -152,11 +144,11 @@ def test_a_chart_and_a_material_from_files_are_the_rest_shape_and_the_cloth(fold
     cut = np.flatnonzero(np.abs(SHEET[:, 0]) < 1e-9)
     write_obj(Path("sewn.obj"), *doubled_along(SHEET, FACES, cut), 100 * chart)
     Path("silk.toml").write_text("young_modulus = 5e4\nthickness = 0.001\n")
-    words = ["sewn.obj", "--pins", "0,6", "--frames", "2", "--quiet", "--rest", "uv"]
-    own = ["--material", "silk.toml", "--thickness", "0.002"]
-    assert main([*words, "-o", "a.vtkhdf"]) == 2
+    arguments = ["sewn.obj", "--pins", "0,6", "--frames", "2", "--quiet", "--rest", "uv"]
+    from_files = ["--material", "silk.toml", "--thickness", "0.002"]
+    assert main([*arguments, "-o", "a.vtkhdf"]) == 2
     assert "--uv-scale 0.01111 makes them equal" in capsys.readouterr().err
-    assert main([*words, *own, "--uv-scale", "0.01", "-o", "a.vtkhdf"]) == 0
+    assert main([*arguments, *from_files, "--uv-scale", "0.01", "-o", "a.vtkhdf"]) == 0
     made = Trajectory.load("a.vtkhdf")
     assert made.faces.tolist() == FACES.tolist()
     material = Material(young_modulus=5e4, thickness=0.002)
@@ -169,9 +161,9 @@ def test_a_chart_and_a_material_from_files_are_the_rest_shape_and_the_cloth(fold
 
 
 def test_the_chosen_minimiser_and_barriers_are_the_ones_that_ran(folder):
-    words = ["sheet.obj", "--pins", "0,6", "--frames", "3", "--quiet", "-o"]
-    assert main([*words, "a.vtkhdf", "--method", "newton", "--area-barrier", "50"]) == 0
-    assert main([*words, "b.vtkhdf", "--method", "lbfgs", "--max-iterations", "400"]) == 0
+    arguments = ["sheet.obj", "--pins", "0,6", "--frames", "3", "--quiet", "-o"]
+    assert main([*arguments, "a.vtkhdf", "--method", "newton", "--area-barrier", "50"]) == 0
+    assert main([*arguments, "b.vtkhdf", "--method", "lbfgs", "--max-iterations", "400"]) == 0
     newton, lbfgs = Trajectory.load("a.vtkhdf"), Trajectory.load("b.vtkhdf")
     assert newton.provenance["options"] == {"method": "newton", "tolerance": 1e-6}
     assert newton.provenance["terms"]["area_barrier"]["stiffness_J_per_m2"] == 50
@@ -183,9 +175,9 @@ def test_the_chosen_minimiser_and_barriers_are_the_ones_that_ran(folder):
 
 def test_a_barrier_takes_the_place_of_the_penalty_and_nothing_passes(folder):
     pytest.importorskip("ipctk")
-    words = ["sheet.obj", "--barrier", "--barrier-distance", "0.003", "--barrier-stiffness", "200"]
+    arguments = ["sheet.obj", "--barrier", "--barrier-distance", "0.003", "--barrier-stiffness", "200"]
     more = ["--friction", "0.3", "--quiet", "-o", "a.vtkhdf"]
-    assert main([*words, "--obstacle", "ball", *more]) == 0
+    assert main([*arguments, "--obstacle", "ball", *more]) == 0
     made = Trajectory.load("a.vtkhdf")
     barrier = made.provenance["terms"]["barrier"]
     assert (barrier["distance_m"], barrier["stiffness_Pa"], barrier["self_contact"]) == (3e-3, 200, False)
@@ -216,8 +208,8 @@ def test_not_converged_is_status_1(folder, capsys):
 
 
 def test_resume_goes_on_and_refuses_another_run(folder, capsys):
-    words = ["sheet.obj", "--pins", "z>0.19", "--quiet", "-o"]
-    a, b = [*words, "a.vtkhdf", "--frames"], [*words, "b.vtkhdf", "--frames"]
+    arguments = ["sheet.obj", "--pins", "z>0.19", "--quiet", "-o"]
+    a, b = [*arguments, "a.vtkhdf", "--frames"], [*arguments, "b.vtkhdf", "--frames"]
     assert [main([*a, "3"]), main([*a, "6", "--resume"]), main([*b, "6", "--resume"])] == [0, 0, 0]
     assert "b.vtkhdf does not exist yet: starting at the beginning" in capsys.readouterr().out
     np.testing.assert_array_equal(
@@ -309,7 +301,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, case):
-    words, message = BAD[case]
+    arguments, message = BAD[case]
     write(
         "twice.obj",
         np.concatenate([SHEET[:9], SHEET]),
@@ -317,7 +309,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, case):
     )
     before = sorted(p.as_posix() for p in folder.rglob("*"))
     try:
-        status = main([*words, "-o", "out.vtkhdf"])
+        status = main([*arguments, "-o", "out.vtkhdf"])
     except SystemExit as end:  # what the parser itself refuses
         status = end.code
     error = capsys.readouterr().err
@@ -330,8 +322,8 @@ def test_a_start_that_cannot_be_leaves_what_is_there(folder, capsys):
     assert main(["sheet.obj", "--frames", "2", "-o", "out.vtkhdf"]) == 0
     before = Path("out.vtkhdf").read_bytes()
     write("cut.obj", BALL, BALL_FACES)
-    words = ["sheet.obj", "--obstacle", "cut.obj", "--barrier", "-o", "out.vtkhdf", "--overwrite"]
-    assert main(words) == 2 and "start is not free of intersections" in capsys.readouterr().err
+    arguments = ["sheet.obj", "--obstacle", "cut.obj", "--barrier", "-o", "out.vtkhdf", "--overwrite"]
+    assert main(arguments) == 2 and "start is not free of intersections" in capsys.readouterr().err
     assert Path("out.vtkhdf").read_bytes() == before
 
 
@@ -351,11 +343,11 @@ def test_pins_are_numbers_of_the_file_where_a_chart_joins_its_vertices(folder):
 
 def test_an_obstacles_trajectory_brings_its_time_between_frames(folder, capsys):
     Trajectory(BALL + np.zeros((3, 1, 1)), BALL_FACES, np.arange(3) / 60).save("ball.vtkhdf")
-    words = ["sheet.obj", "--obstacle", "ball.vtkhdf", "--obstacle-rest", "ball/ball_0.obj"]
-    assert main([*words, "-o", "a.vtkhdf"]) in (0, 1)
+    arguments = ["sheet.obj", "--obstacle", "ball.vtkhdf", "--obstacle-rest", "ball/ball_0.obj"]
+    assert main([*arguments, "-o", "a.vtkhdf"]) in (0, 1)
     assert Trajectory.load("a.vtkhdf").times[1] == pytest.approx(1 / 60)
     assert "between frames" not in capsys.readouterr().out
-    assert main([*words, "--dt", "1/30", "-o", "b.vtkhdf"]) in (0, 1)
+    assert main([*arguments, "--dt", "1/30", "-o", "b.vtkhdf"]) in (0, 1)
     assert Trajectory.load("b.vtkhdf").times[1] == pytest.approx(1 / 30)
     assert "note: ball.vtkhdf has 0.01667 s between frames, and --dt is 0.03333" in capsys.readouterr().out
 

@@ -62,16 +62,20 @@ def tree_of(positions: np.ndarray, faces: np.ndarray) -> FaceTree:
 
 
 def assert_closest(tree: FaceTree, positions: np.ndarray, points: np.ndarray) -> None:
-    found = tree.nearest(points)
+    closest = tree.nearest(points)
     squared, _, _ = igl.point_mesh_squared_distance(
         points.astype(np.float64), positions.astype(np.float64), tree.faces
     )
-    distance = np.linalg.norm(points - found.points, axis=1)
+    distance = np.linalg.norm(points - closest.points, axis=1)
     # Far points lose digits by their own size; feet on slivers are known by fewer, theirs and ours.
     assert distance == pytest.approx(np.sqrt(squared), rel=1e-14, abs=1e-12)
-    assert (found.barycentric >= 0).all() and found.barycentric.sum(axis=1) == pytest.approx(1.0, abs=1e-15)
-    place = np.einsum("sa,sai->si", found.barycentric, positions[tree.faces[found.faces]].astype(np.float64))
-    assert place == pytest.approx(found.points, abs=1e-15 * float(np.abs(positions).max()))
+    assert (closest.barycentric >= 0).all() and closest.barycentric.sum(axis=1) == pytest.approx(
+        1.0, abs=1e-15
+    )
+    place = np.einsum(
+        "sa,sai->si", closest.barycentric, positions[tree.faces[closest.faces]].astype(np.float64)
+    )
+    assert place == pytest.approx(closest.points, abs=1e-15 * float(np.abs(positions).max()))
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
@@ -109,14 +113,14 @@ def test_beyond_a_side_or_a_corner_the_lowest_of_its_faces_answers():
     order = np.random.default_rng(6).permutation(len(faces))
     faces = np.stack([np.roll(face, k) for k, face in enumerate(faces[order])])
     normals = vertex_normals(positions, faces)
-    found = tree_of(positions, faces).nearest(positions + 0.01 * normals)
+    closest = tree_of(positions, faces).nearest(positions + 0.01 * normals)
     corner = np.array([np.flatnonzero((faces == v).any(axis=1))[0] for v in range(len(positions))])
-    assert (found.faces == corner).mean() > 0.99  # a lopsided corner may lean over another face
+    assert (closest.faces == corner).mean() > 0.99  # a lopsided corner may lean over another face
     edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    found = tree_of(positions, faces).nearest((positions + 0.01 * normals)[edges].mean(axis=1))
-    on = (found.barycentric == 0).sum(axis=1) == 1
+    closest = tree_of(positions, faces).nearest((positions + 0.01 * normals)[edges].mean(axis=1))
+    on = (closest.barycentric == 0).sum(axis=1) == 1
     side = np.array([np.flatnonzero(np.isin(faces, edge).sum(axis=1) == 2)[0] for edge in edges])
-    assert on.mean() > 0.9 and (found.faces == side)[on].mean() > 0.99
+    assert on.mean() > 0.9 and (closest.faces == side)[on].mean() > 0.99
 
 
 @pytest.mark.parametrize("name", ["soup 7", "soup 400", "sphere", "sheet"])
@@ -149,10 +153,10 @@ def test_within_reach_answers_are_exact_and_beyond_there_are_none(name):
         near = distance < reach
         assert 0.3 < near.mean() < 0.95
         for hints in (None, exact.faces, generator.integers(-1, len(faces), len(points))):
-            found = tree.nearest(points, hints=hints, reach=reach, **rest)
-            assert (found.faces[near] == exact.faces[near]).all() and (found.faces[~near] == -1).all()
-            assert (found.points[near] == exact.points[near]).all()
-            assert (found.barycentric[near] == exact.barycentric[near]).all()
+            closest = tree.nearest(points, hints=hints, reach=reach, **rest)
+            assert (closest.faces[near] == exact.faces[near]).all() and (closest.faces[~near] == -1).all()
+            assert (closest.points[near] == exact.points[near]).all()
+            assert (closest.barycentric[near] == exact.barycentric[near]).all()
 
 
 @pytest.mark.parametrize("name", ["soup 400", "sphere", "sheet"])
@@ -162,10 +166,10 @@ def test_a_rough_answer_is_at_most_twice_as_far_and_exact_where_it_has_to_be(nam
     best = tree.nearest(points)
     distance = np.linalg.norm(points - best.points, axis=1)
     hints, limit = np.random.default_rng(9).integers(-1, len(faces), len(points)), 0.3
-    found = tree.nearest(points, hints=hints, exact=limit)
+    closest = tree.nearest(points, hints=hints, exact=limit)
     near = distance < limit
-    assert (found.faces[near] == best.faces[near]).all()
-    rough = np.linalg.norm(points - found.points, axis=1)[~near] / distance[~near]
+    assert (closest.faces[near] == best.faces[near]).all()
+    rough = np.linalg.norm(points - closest.points, axis=1)[~near] / distance[~near]
     assert rough.max() <= 2 + 1e-12 and (rough > 1.01).mean() > 0.1
 
 
@@ -181,9 +185,9 @@ def test_only_faces_near_the_place_at_rest_are_met(name, region):
     points, home = generator.normal(size=(2, 60, 3))
     offset = centroids[None] - home[:, None]
     allowed = np.einsum("sfi,sfi->sf", offset, offset) <= region**2
-    found = tree.nearest(points, rest_points=home, region=region).faces
-    assert (found == one_by_one(moved, faces, points, allowed)).all()
-    assert name == "soup 7" or (found != tree.nearest(points).faces).any()
+    closest = tree.nearest(points, rest_points=home, region=region).faces
+    assert (closest == one_by_one(moved, faces, points, allowed)).all()
+    assert name == "soup 7" or (closest != tree.nearest(points).faces).any()
 
 
 def test_a_refitted_tree_answers_as_one_built_for_the_pose():
@@ -194,8 +198,8 @@ def test_a_refitted_tree_answers_as_one_built_for_the_pose():
         moved = scale * positions * [1.0, 0.1, 3.0] + generator.normal(0, 0.1 * scale, positions.shape)
         tree.refit(moved)
         points = moved[generator.permutation(len(moved))] * 1.1
-        found, fresh = tree.nearest(points), tree_of(moved, faces).nearest(points)
-        assert (found.faces == fresh.faces).all() and (found.points == fresh.points).all()
+        closest, fresh = tree.nearest(points), tree_of(moved, faces).nearest(points)
+        assert (closest.faces == fresh.faces).all() and (closest.points == fresh.points).all()
     assert_closest(tree, moved, points)
 
 
@@ -208,8 +212,8 @@ def test_company_changes_nothing(count):
     whole = tree.nearest(points, rest_points=home, region=0.8)
     chosen = np.random.default_rng(8).permutation(len(points))[:count]
     for some in (None, hints[chosen]):
-        found = tree.nearest(points[chosen], rest_points=home[chosen], region=0.8, hints=some)
-        assert (found.faces == whole.faces[chosen]).all() and (found.points == whole.points[chosen]).all()
+        closest = tree.nearest(points[chosen], rest_points=home[chosen], region=0.8, hints=some)
+        assert (closest.faces == whole.faces[chosen]).all() and (closest.points == whole.points[chosen]).all()
 
 
 def test_the_direction_of_a_thin_gap_is_kept():
@@ -217,11 +221,11 @@ def test_the_direction_of_a_thin_gap_is_kept():
     positions, faces = mesh("sheet")
     points = samples(positions, faces)[-len(faces) :]
     points[:, 1] += 1e-9
-    found = tree_of(positions, faces).nearest(points)
-    assert (found.points[:, 1] == 0).all()
-    assert np.abs((points - found.points)[:, [0, 2]]).max() < 1e-15
+    closest = tree_of(positions, faces).nearest(points)
+    assert (closest.points[:, 1] == 0).all()
+    assert np.abs((points - closest.points)[:, [0, 2]]).max() < 1e-15
 
 
 def test_no_points_have_no_closest():
-    found = tree_of(*sphere(1)).nearest(np.empty((0, 3)))
-    assert found.faces.shape == (0,) and found.points.shape == (0, 3)
+    closest = tree_of(*sphere(1)).nearest(np.empty((0, 3)))
+    assert closest.faces.shape == (0,) and closest.points.shape == (0, 3)

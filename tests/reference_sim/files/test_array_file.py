@@ -41,12 +41,12 @@ def npz(member: bytes, method: int = zipfile.ZIP_DEFLATED) -> bytes:
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
 def test_whole_files_are_read_as_numpy_reads_them(tmp_path, save):
     save(tmp_path / "a.npz", poses=POSES, **OTHERS)
-    found = read_arrays(tmp_path / "a.npz")
+    arrays = read_arrays(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as stored:
         for name in stored.files:
-            assert found[name].dtype == stored[name].dtype and found[name].flags.writeable
-            np.testing.assert_array_equal(found[name], stored[name])
-        assert list(found) == stored.files == array_names(tmp_path / "a.npz")
+            assert arrays[name].dtype == stored[name].dtype and arrays[name].flags.writeable
+            np.testing.assert_array_equal(arrays[name], stored[name])
+        assert list(arrays) == stored.files == array_names(tmp_path / "a.npz")
     assert list(read_arrays(tmp_path / "a.npz", ("poses", "absent"))) == ["poses"]
     for name, array in OTHERS.items():
         np.save(tmp_path / f"{name}.npy", array)

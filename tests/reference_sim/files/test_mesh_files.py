@@ -96,7 +96,7 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, su
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "words"),
+    ("name", "text", "message"),
     [
         ("a.obj", None, "no such file"),
         ("a.fbx", "x", "unknown kind of mesh: convert it to one of .obj"),
@@ -129,11 +129,11 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, su
         ),
     ],
 )
-def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, capfd, name, text, words):
+def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, capfd, name, text, message):
     path = tmp_path / name
     if text is not None:
         path.write_text(text)
-    with pytest.raises(MeshError, match=words) as caught:
+    with pytest.raises(MeshError, match=message) as caught:
         read_mesh(path)
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
     printed = capfd.readouterr()

@@ -115,14 +115,14 @@ def test_a_texture_is_no_pattern():
 
 
 @pytest.mark.parametrize(
-    ("spoil", "words"),
+    ("spoil", "message"),
     [
         (lambda uv: None, "has no UV"),
         (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 7, np.nan, uv), "triangle 7 has a corner"),
         (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 4, 0.0, uv), "triangle 4 has no area"),
     ],
 )
-def test_an_incomplete_chart_is_named(spoil, words):
+def test_an_incomplete_chart_is_named(spoil, message):
     positions, faces = SHEET
-    with pytest.raises(MeshError, match=words):
+    with pytest.raises(MeshError, match=message):
         rest_chart(Surface(positions, faces, uv=spoil(own_chart(positions, faces))), 1.0)

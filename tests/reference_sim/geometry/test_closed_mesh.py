@@ -38,7 +38,7 @@ def test_closed_surfaces_pass():
 
 
 @pytest.mark.parametrize(
-    ("positions", "faces", "words"),
+    ("positions", "faces", "message"),
     [
         (BALL, FACES, r"expected \(T, B, 3\) and \(F, 3\)"),
         (BALL[None], FACES[:, :2], r"expected \(T, B, 3\) and \(F, 3\)"),
@@ -60,8 +60,8 @@ def test_closed_surfaces_pass():
         ),
     ],
 )
-def test_what_is_no_closed_surface(positions, faces, words):
-    with pytest.raises(MeshError, match=words):
+def test_what_is_no_closed_surface(positions, faces, message):
+    with pytest.raises(MeshError, match=message):
         check_closed(positions, faces)
 
 

@@ -146,8 +146,8 @@ def test_the_lowest_curvature_is_that_of_the_dense_eigenvalue_problem():
     inverse = np.kron(np.linalg.inv(block), np.eye(3))
     inverse += normals @ np.linalg.inv(normals.T @ matrix @ normals) @ normals.T
     exact = scipy.linalg.eigh(matrix, np.linalg.inv(inverse), eigvals_only=True)[0]
-    found = float(hessian.evidence.split("curvature ")[1].split()[0])
-    assert 0 < exact <= found * 1.05 and found < (1 + 2 * SETTLED) * exact
+    estimate = float(hessian.evidence.split("curvature ")[1].split()[0])
+    assert 0 < exact <= estimate * 1.05 and estimate < (1 + 2 * SETTLED) * exact
 
 
 def test_a_flat_compressed_sheet_is_a_saddle_and_no_answer(large):

@@ -237,7 +237,7 @@ def test_what_cannot_be_read_is_said_in_one_line_and_left_alone(tmp_path, damage
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "message"),
     [
         ({"dt": 0.02}, r"dt_s \(0\.0333.*, now 0\.02\)"),
         ({"substeps": 2}, r"substeps \(1, now 2\)"),
@@ -254,11 +254,11 @@ def test_what_cannot_be_read_is_said_in_one_line_and_left_alone(tmp_path, damage
         ({"frames": 2}, "holds 3 frames already, more than the 2 asked for"),
     ],
 )
-def test_another_run_is_refused_by_what_differs(tmp_path, changes, words):
+def test_another_run_is_refused_by_what_differs(tmp_path, changes, message):
     path = tmp_path / "run.vtkhdf"
     cut_off(path, waved, 3)
     before = path.read_bytes()
-    with pytest.raises(TrajectoryError, match=words):
+    with pytest.raises(TrajectoryError, match=message):
         simulate(**waved(**changes), path=path, resume=True)
     assert path.read_bytes() == before
 

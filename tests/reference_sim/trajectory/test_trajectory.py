@@ -30,15 +30,15 @@ def wave(frames: int = 5) -> Trajectory:
     )
 
 
-def assert_same(found: Trajectory, expected: Trajectory) -> None:
-    assert found.positions.dtype == np.float64 and found.positions.shape == expected.positions.shape
+def assert_same(loaded: Trajectory, expected: Trajectory) -> None:
+    assert loaded.positions.dtype == np.float64 and loaded.positions.shape == expected.positions.shape
     for name in ("positions", "faces", "times", "frame_seconds"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
-    assert (found.status, found.reason) == (expected.status, expected.reason)
-    assert found.provenance == expected.provenance
-    assert set(found.frame_fields) == set(expected.frame_fields)
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(expected, name), err_msg=name)
+    assert (loaded.status, loaded.reason) == (expected.status, expected.reason)
+    assert loaded.provenance == expected.provenance
+    assert set(loaded.frame_fields) == set(expected.frame_fields)
     for name, values in expected.frame_fields.items():
-        np.testing.assert_array_equal(found.frame_fields[name], values, err_msg=name)
+        np.testing.assert_array_equal(loaded.frame_fields[name], values, err_msg=name)
 
 
 @pytest.mark.parametrize("frames", [1, 2, 5])
@@ -88,13 +88,13 @@ def test_an_unfinished_file_gives_its_whole_frames(tmp_path):
             shutil.copy(tmp_path / "live", tmp_path / f"copy{k}")
         writer.finish("converged", "")
     for k in range(3):
-        found = Trajectory.load(tmp_path / f"copy{k}")
-        assert found.status == "unfinished" and found.reason
-        assert found.provenance == {"seed": 3}
-        np.testing.assert_array_equal(found.positions, whole.positions[: k + 1])
-        np.testing.assert_array_equal(found.times, whole.times[: k + 1])
-        np.testing.assert_array_equal(found.frame_seconds, whole.frame_seconds[: k + 1])
-        np.testing.assert_array_equal(found.frame_fields["energy/strain"], np.arange(k + 1) / 7)
+        loaded = Trajectory.load(tmp_path / f"copy{k}")
+        assert loaded.status == "unfinished" and loaded.reason
+        assert loaded.provenance == {"seed": 3}
+        np.testing.assert_array_equal(loaded.positions, whole.positions[: k + 1])
+        np.testing.assert_array_equal(loaded.times, whole.times[: k + 1])
+        np.testing.assert_array_equal(loaded.frame_seconds, whole.frame_seconds[: k + 1])
+        np.testing.assert_array_equal(loaded.frame_fields["energy/strain"], np.arange(k + 1) / 7)
     assert Trajectory.load(tmp_path / "live").status == "converged"
 
 
@@ -103,9 +103,9 @@ def test_a_half_written_frame_does_not_count(tmp_path):
     with h5py.File(tmp_path / "cut", "r+") as file:
         # The count is written last: as if the run had died while frame 3 was being appended.
         file["benchmark"].attrs["frames"] = 3
-    found = Trajectory.load(tmp_path / "cut")
-    assert found.frames == len(found.times) == len(found.frame_seconds) == 3
-    assert found.frame_fields["iterations"].tolist() == [0, 1, 2]
+    loaded = Trajectory.load(tmp_path / "cut")
+    assert loaded.frames == len(loaded.times) == len(loaded.frame_seconds) == 3
+    assert loaded.frame_fields["iterations"].tolist() == [0, 1, 2]
 
 
 def test_a_field_that_begins_late_is_nan_before(tmp_path):
@@ -113,9 +113,9 @@ def test_a_field_that_begins_late_is_nan_before(tmp_path):
         writer.append(REST, 0.0)
         writer.append(REST, 0.1, 0.5, {"energy/strain": 2.0})
         writer.finish("ok", "")
-    found = Trajectory.load(tmp_path / "late")
-    np.testing.assert_array_equal(found.frame_fields["energy/strain"], [np.nan, 2.0])
-    np.testing.assert_array_equal(found.frame_seconds, [np.nan, 0.5])
+    loaded = Trajectory.load(tmp_path / "late")
+    np.testing.assert_array_equal(loaded.frame_fields["energy/strain"], [np.nan, 2.0])
+    np.testing.assert_array_equal(loaded.frame_seconds, [np.nan, 0.5])
 
 
 def test_what_is_no_trajectory_is_named_with_its_path(tmp_path):
