@@ -184,6 +184,8 @@ def test_recipe_refuses_unknown_names():
         find_recipe("papers")
     with pytest.raises(RecipeError, match="'momentum'"):
         Recipe.from_dict({"momentum": 0.9})
+    with pytest.raises(RecipeError, match="'window' is missing"):  # of a version that had no windows
+        Recipe.from_dict({name: value for name, value in DEFAULT.as_dict().items() if name != "window"})
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-import pytest
-
 from snug.recipes.deviations import DEVIATIONS, exchange_deviations
-from snug.recipes.named import PAPER, find_recipe
-from snug.recipes.recipe import DEFAULT, Recipe, RecipeError
+from snug.recipes.named import PAPER
+from snug.recipes.recipe import DEFAULT, Recipe
 
 
 def differing(a: Recipe, b: Recipe) -> set[str]:
@@ -25,9 +23,3 @@ def test_every_deviation_has_its_line_and_changes_nothing_else():
         undone, added = recipes[f"without-{deviation.name}"], recipes[f"paper-with-{deviation.name}"]
         assert differing(undone, DEFAULT) == differing(added, PAPER) == set(deviation.options)
         assert differing(undone, PAPER) == differing(DEFAULT, PAPER) - set(deviation.options)
-
-
-def test_an_unknown_recipe_is_refused_with_the_known_ones():
-    assert find_recipe("paper") is PAPER
-    with pytest.raises(RecipeError, match=r"unknown recipe 'papers': use one of default, paper, .*"):
-        find_recipe("papers")
