@@ -113,4 +113,4 @@ CLIMB = Stride(
     ankle=((0, 10), (10, 14), (20, 14), (32, 9), (44, 6), (54, -4), (63, -20), (72, -4), (82, 9), (92, 8)),
     toe_off=62.0, pelvis_pitch=8.0, pelvis_yaw=5.0, pelvis_roll=4.0,
     arm_mean=2.0, arm_swing=16.0, elbow_mean=35.0, elbow_swing=10.0, trunk_lean=8.0, rises=True,
-)  # fmt: skip
+)

@@ -357,7 +357,7 @@ def moved_joint(regressor):
         (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
     ],
     ids=range(20),
-)  # fmt: skip
+)
 def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     path = saved(tmp_path / "broken.npz", change(layouts["SMPL"]))
     with pytest.raises(BodyError) as caught:

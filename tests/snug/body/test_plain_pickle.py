@@ -111,7 +111,7 @@ def evil(marker: Path) -> dict[str, bytes]:
         "os.system": pickle.dumps(Calls(os.system, shell)),
         "posix": b"cposix\nsystem\n(S'" + shell.encode() + b"'\ntR.",
         "eval": pickle.dumps(Calls(eval, python)),
-        "python 2": b"c__builtin__\neval\n(S\"" + python.encode() + b'"\ntR.',
+        "python 2": b'c__builtin__\neval\n(S"' + python.encode() + b'"\ntR.',
         "inst": b"(S'" + shell.encode() + b"'\nios\nsystem\n.",
         "obj": b"(cos\nsystem\nS'" + shell.encode() + b"'\no.",
         "nested name": raw(name("numpy"), name("ndarray.__class__"), b"\x93", call),
@@ -130,7 +130,7 @@ def evil(marker: Path) -> dict[str, bytes]:
         "slots of a dict": raw(b"}N}(", name("__class__"), b"cnumpy\nndarray\n", b"u\x86b"),
         "call a value": raw(name("os.system"), call),
         "type as value": raw(b"cnumpy\nndarray\n"),
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("trick", sorted(evil(Path("x"))))

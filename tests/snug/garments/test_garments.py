@@ -367,10 +367,11 @@ def test_a_corner_that_clipping_left_twice_counts_once():
     ring = [0, 7, 1, 8, 2, 6, 3, 4, 5]
     faces = np.array([[9, a, b] for a, b in zip(ring, np.roll(ring, -1), strict=True)])
     cuts = [
-        SEAM_CUT, CutPlane("top", (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        SEAM_CUT,
+        CutPlane("top", (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
         CutPlane("side", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         CutPlane("hem", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
-    ]  # fmt: skip
+    ]
     (loop,) = outlines(points, faces, cuts)
     assert sorted(name for name, _ in loop) == ["hem", "seam", "side", "top"]
 

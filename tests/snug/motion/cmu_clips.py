@@ -75,7 +75,7 @@ def cmu_like(splay: float = 20.0, radians: bool = False) -> str:
             (f"{side}wrist", (sign, 0, 0), 1.7, (0, sign * 90, sign * 90), "ry", f"{side}radius"),
             (f"{side}hand", (sign, 0, 0), 0.7, (0, sign * 90, sign * 90), "rx", f"{side}wrist"),
             (f"{side}fingers", (sign, 0, 0), 0.6, (0, sign * 90, sign * 90), "", f"{side}hand"),
-        ]  # fmt: skip
+        ]
     turn = np.pi / 180 if radians else 1.0
     text = f":units\n length {UNIT}\n angle {'rad' if radians else 'deg'}\n:root\n order TX TY TZ RX RY RZ\n"
     text += " axis XYZ\n position 0 0 0\n orientation 0 0 0\n:bonedata\n"

@@ -223,7 +223,7 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
         (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "finite numbers should be here"),
         (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
     ],
-)  # fmt: skip
+)
 def test_a_broken_file_is_refused_by_name(tmp_path, change, words):
     path = written(tmp_path / "clip.bvh")
     path.write_text(change(path.read_text()))
