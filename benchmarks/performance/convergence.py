@@ -31,8 +31,8 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Train; return the end of the training and when the held-out energy came close to it, for good."""
     curve_path, path = settings.files
     path.parent.mkdir(parents=True, exist_ok=True)
-    checkpoint = path.with_name(f".{path.stem}.checkpoint.safetensors")
-    checkpoint = Checkpoint(path=checkpoint, resume=True, key=settings.key)
+    checkpoint_path = path.with_name(f".{path.stem}.checkpoint.safetensors")
+    checkpoint = Checkpoint(path=checkpoint_path, resume=True, key=settings.key)
     chosen, every = settings.training, max(1, settings.steps // POINTS)
     dressed, motions = dressed_body(vertices), training_motions()
     held_out = [motion for motion in motions if motion.name == HELD_OUT]
