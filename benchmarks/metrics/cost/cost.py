@@ -22,19 +22,20 @@ def _size(name: str, unit: str, title: str, definition: str, **more: Any) -> Met
 
 METRICS = (
     _cost("data", "s", "Data generation", "simulation of the training motions, settling included"),
-    _cost("setup", "s", "Making ready", "what a training does before its first step"),
+    _cost("setup", "s", "Preprocessing", "what a training does before its first step"),
     _cost("train", "s", "Training", "wall time of the steps of the training"),
     _size("train_steps", "1", "Steps", "updates of the training"),
-    _size("train_frames", "1", "Training frames", "frames that it learned from, mixed ones included"),
-    _cost("frame", "ms", "Frame", "the method's own work: time of the whole run over the frames computed, "
+    _size("train_frames", "1", "Training frames", "frames that it learned from, augmented ones included"),
+    _cost("frame", "ms", "Inference", "inference time: time of the whole run over the frames computed, "
           "one frame at a time on one thread; the median of repeated runs"),
-    _cost("whole", "ms", "From the pose", "the same and what the method takes as ready: features and joint "
+    _cost("whole", "ms", "End to end", "the same and what the method takes as ready: features and joint "
           "transforms of a network, the posed body of a solver, made one frame at a time: from pose to world "
           "vertices"),
-    _cost("frame_p50", "ms", "Median frame", "50 % of the frames take less own work, each by its median run",
-          ""),
-    _cost("frame_p95", "ms", "Frame, p95", "95 % of the frames take less own work, each by its median run"),
-    _cost("frame_worst", "ms", "Slowest frame", "own work of the slowest frame by its median run", ""),
+    _cost("frame_p50", "ms", "Median frame",
+          "50 % of the frames take less inference time, each by its median run", ""),
+    _cost("frame_p95", "ms", "Frame, p95",
+          "95 % of the frames take less inference time, each by its median run"),
+    _cost("frame_worst", "ms", "Slowest frame", "inference time of the slowest frame by its median run", ""),
     _cost("batch", "ms", "In batch", "time per frame and body of 16 bodies at once"),
     _cost("spread", "%", "Spread", "largest less smallest repeat, as a share of their median", ""),
     _size("memory", "MB", "Memory", "size of the network", table="cost", lower_is_better=True),

@@ -45,7 +45,7 @@ METRICS = (
         _clocked("outside_ratio", "1", "Outside / inside", "time outside of them over time inside"),
         _metric("iterations", "1", "Iterations", "of the minimiser in a frame, median over frames"),
         _metric("iterations_worst", "1", "Most iterations", "of the minimiser in a frame"),
-        _metric("penetrating_vertices", "%", "Below the skin", "vertices inside the body, mean over frames"),
+        _metric("penetrating_vertices", "%", "Penetration", "vertices inside the body, mean over frames"),
         _metric("deep_vertices", "%", "Deep", "vertices more than 5 mm inside the body, mean over frames"),
         _metric("depth_p999", "mm", "Depth, 99.9 %", "99.9 % of all vertices and frames are less deep"),
         table="simulator",
@@ -60,7 +60,7 @@ METRICS = (
     ),
     *_metrics(
         _size("training_frames", "Frames", "poses that the training draws from, augmented motions included"),
-        _clocked("setup", "s", "Making ready", "what a training does before its first step"),
+        _clocked("setup", "s", "Preprocessing", "what a training does before its first step"),
         _clocked("training_step", "ms", "Step", "a training step; the median over blocks of steps"),
         _clocked("paper_training", "h", "Preset paper", "preset paper's number of steps at the median"),
         _size("step_frames", "Frames a step", "poses of one training step"),

@@ -15,7 +15,7 @@ from snug.motion.motion import nearest_pose
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
 
-DISTANCE = "angle to the nearest training pose, mixed ones included, mean over joints: "
+DISTANCE = "angle to the nearest training pose, augmented ones included, mean over joints: "
 
 METRICS = (
     Metric(

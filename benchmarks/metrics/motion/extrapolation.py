@@ -39,7 +39,7 @@ METRICS = (
         definition="largest distance of a vertex from the skinned garment, over all frames",
     ),
     Metric(
-        name="motion/penetration", unit="%", title="Below the skin", table="extrapolation",
+        name="motion/penetration", unit="%", title="Penetration", table="extrapolation",
         lower_is_better=True, definition="vertices inside the body, mean over frames",
     ),
     Metric(

@@ -28,7 +28,7 @@ METRICS = (
     Metric(
         name="time_error/curvature", unit="1/m", title="Time error of mean curvature", table="time_error",
         definition="mean curvature of the reference less its limit of small time steps, by Richardson; only "
-        "where its own observed order is .5 to 1.5",
+        "where its own observed order is 0.5 to 1.5",
     ),
     Metric(
         name="time_error/order", unit="1", title="Observed order", table="time_error",
@@ -37,7 +37,7 @@ METRICS = (
     Metric(
         name="time_error/*", unit="J", title="Time error of {}", table="time_error",
         definition="energy of the reference less its limit of small time steps, by Richardson; only where "
-        "its own observed order is .5 to 1.5",
+        "its own observed order is 0.5 to 1.5",
     ),
     Metric(
         name="time_error/eighth/curvature", unit="1/m", title="Mean curvature less that at dt/8",

@@ -22,7 +22,7 @@ METRICS = (
     Metric(
         name="body/self_intersection", unit="%", title="Body in itself", lower_is_better=True,
         definition="vertices of the body inside another part of it and not so at rest, in the worst of 24 "
-        "judged frames",
+        "evaluated frames",
     ),
     Metric(
         name="body/self_intersection_frame", unit="1", title="Worst frame",

@@ -30,7 +30,7 @@ METRICS = (
         definition="95 % of these distances are smaller",
     ),
     Metric(
-        name="penetration/vertices", unit="%", title="Below the skin", table="penetration",
+        name="penetration/vertices", unit="%", title="Penetration", table="penetration",
         lower_is_better=True, definition="vertices inside the body, none left out, mean over frames",
     ),
     Metric(
@@ -42,15 +42,15 @@ METRICS = (
         definition="99 % of all vertices and frames are less deep; 0 outside",
     ),
     Metric(
-        name="penetration/own_part_p999", unit="mm", title="Own part", table="penetration",
+        name="penetration/own_part_p999", unit="mm", title="Own part, 99.9 %", table="penetration",
         lower_is_better=True,
         definition="99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold of a "
         "hip does not count",
     ),
     Metric(
         name="drift/hem", unit="mm", title="Hem drift", table="penetration",
-        definition="how far the hem's mean height above the pelvis has risen from the first judged frame to "
-        "the last",
+        definition="how far the hem's mean height above the pelvis has risen from the first evaluated frame "
+        "to the last",
     ),
 )  # fmt: skip
 

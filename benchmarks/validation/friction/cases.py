@@ -6,7 +6,7 @@ from benchmarks.validation.case import known_answer
 
 DISCRETE_PATHS = (
     known_answer("friction_creep",
-        "speed of a patch on a slope of tan(a) = .8 mu, over (1 - .2^.5) of the smoothing's: it creeps",
+        "speed of a patch on a slope of tan(a) = 0.8 mu, over (1 - 0.2^0.5) of the smoothing's: it creeps",
         "friction.plane", "creep_speed", options={"ratio": 0.8}, expected=1.0, tolerance=1e-9,
         reason="the residual gradient that the solver may leave"),
     *(

@@ -1,6 +1,6 @@
 """A membrane under the forces that make a chosen smooth surface its equilibrium.
 
-    x(X, Y) = (1.15 X + .04 sin pi X sin pi Y, 1.1 Y + .05 X Y (1 - Y), .15 sin pi X sin pi Y)
+    x(X, Y) = (1.15 X + 0.04 sin pi X sin pi Y, 1.1 Y + 0.05 X Y (1 - Y), 0.15 sin pi X sin pi Y)
 
 The forces are those of the weak form, f_a = int P(grad x) grad phi_a, by quadrature of order 8 in scikit-fem,
 and the border is held on the surface; what the mesh then makes of it may differ by the error of linear
