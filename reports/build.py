@@ -37,8 +37,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     from reports.page.write_page import write_page
     from reports.pictures import PICTURES
     from reports.run.reading import read_run_with_trainings
-    from reports.tables import make_tables
-    from reports.tables.table_files import write_tables
+    from reports.tables import make_tables, write_tables
 
     folder = RunFolder(run_dir)
     run = read_run_with_trainings(folder)

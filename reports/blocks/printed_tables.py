@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import replace
 
 from reports.run.finished_run import Run
-from reports.tables.metric_tables import BY_SCENE
 from reports.tables.outcomes import merged
+from reports.tables.pivot import BY_SCENE
 from reports.tables.table import Cell, Table
 
 LETTERS = 90  # of a sentence in a cell

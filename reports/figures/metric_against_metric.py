@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.results.json_file import ResultsError
-from reports.figures.error_points import draw_legend, draw_points, hollow_remark, missing_remark
+from reports.figures.error_against_time import draw_legend, draw_points, hollow_remark, missing_remark
 from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH, file_name, grid, new_figure
 from reports.run.finished_run import SUITES, Run

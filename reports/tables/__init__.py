@@ -5,16 +5,19 @@ TABLES lists them in order; each entry makes its tables of a run. A new table of
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from reports.run.finished_run import Run
 from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
+from reports.tables.dictionary import dictionary
 from reports.tables.equal_data import EQUAL_DATA
 from reports.tables.findings import findings
-from reports.tables.metric_tables import metric_tables
+from reports.tables.latex import write_latex
 from reports.tables.outcomes import endings, extremes, metrics, unfinished, validation
 from reports.tables.page_one_table import overview
+from reports.tables.pivot import metric_tables
 from reports.tables.speed import SPEED, crossings, error_rivals, reference_uncertainty
 from reports.tables.table import Table
 from reports.tables.trainings import training_curves, trainings
@@ -45,3 +48,13 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
 def make_tables(run: Run) -> dict[str, Table]:
     """Make every table that the run has a number for: name -> table."""
     return {table.name: table for make in TABLES for table in make(run)}
+
+
+def write_tables(folder: Path, run: Run, tables: Mapping[str, Table]) -> None:
+    """Write CSV files, LaTeX and the dictionary of results.csv, in place of those of an earlier report."""
+    for pattern in ("*.csv", "*.tex"):
+        for path in folder.glob(pattern):
+            path.unlink()
+    for table in (*tables.values(), dictionary(run)):
+        table.write_csv(folder)
+    write_latex(run, tables, folder)

@@ -1,4 +1,4 @@
-"""A declared pivot: the rows, columns and cells of a table of means.
+"""A declared pivot: the rows, columns and cells of a table of means; the pivots that metrics declare.
 
 A new table is one declaration in reports.tables.TABLES, for instance
 
@@ -17,6 +17,7 @@ from reports.statistics.means_and_spreads import means
 from reports.tables.paper_values import NOTES, PRINTED
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, metric_column, table
 
+BY_SCENE = ("suite", "scene")  # groups of a table that is not averaged over scenes
 HEADS = {column.name: column for column in (METHOD, GARMENT, SCENE, SUITE)}
 
 
@@ -105,3 +106,32 @@ def pivot(
 
     lines = ((*key, *line) for key, line in zip(wide.index, wide.itertuples(index=False)))
     return metrics, sorted(lines, key=order)
+
+
+def metric_tables(run: Run) -> list[Table]:
+    """Return the two tables of each name that metrics of the run declare."""
+    names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
+    return [table for name in names for declared in declared_pivots(name) for table in declared(run)]
+
+
+def declared_pivots(name: str) -> tuple[Pivot, Pivot]:
+    """Declare the table of means over the scenes of a garment, and the one of every scene in all suites."""
+    title = name.replace("_", " ").capitalize()
+    by_garment = Pivot(
+        name, f"{title}: mean over the scenes of each garment.", ("garment", "method"), of_table=name,
+        select=lambda run: run.garment_rows, lines=_methods_of_garments, grouped_by=("garment",),
+    )  # fmt: skip
+    by_scene = Pivot(
+        f"{name}_by_scene", f"{title}, scene by scene.", (*BY_SCENE, "method"), of_table=name,
+        grouped_by=BY_SCENE,
+    )  # fmt: skip
+    return by_garment, by_scene
+
+
+def _methods_of_garments(run: Run, rows: pd.DataFrame) -> set[tuple[str, ...]]:
+    """Return (garment, method) without ablations, which stand beside their base, and perturbed references."""
+    return {
+        (str(garment), method)
+        for garment, of_garment in rows.groupby("garment")
+        for method in set(run.methods) - run.standing_apart(of_garment) - set(run.reference_ensemble)
+    }

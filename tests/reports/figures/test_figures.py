@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.results.run_folder import RunFolder
-from reports.figures import error_points, hem, histograms, known_answers, method_styles, stability_maps
+from reports.figures import error_against_time, hem, histograms, known_answers, method_styles, stability_maps
 from reports.figures.against_vertices import AgainstVertices
 from reports.figures.chosen_roll_outs import SceneRollOuts
 from reports.figures.dots import Dots
@@ -23,7 +23,7 @@ def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
     axes = new_figure(3, 3).subplots()
     run = run_of([row(method=method) for method in ("snug", "newton-8")])
     points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
-    hollow = error_points.draw_points(axes, run, points, 20.0, band=0.0)
+    hollow = error_against_time.draw_points(axes, run, points, 20.0, band=0.0)
     assert hollow == {"newton-8"}
     low, high = axes.get_ylim()
     shown = [
