@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     folder = Path(options.out)
     demand_new(folder)
-    plan = plan_of(options)
+    plan = plan_export(options)
     try:
         scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
         from benchmarks.external.exported_scene import write_scene  # loads the simulator
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def plan_of(options: argparse.Namespace) -> Plan:
+def plan_export(options: argparse.Namespace) -> Plan:
     """Return the plan of one scene and its simulation alone. Raises ValueError, one line."""
     # Nobody simulates scenes for networks alone: the networks are there to find them, and taken out again.
     methods = ("simulation", "untrained", "snug")

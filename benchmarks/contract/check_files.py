@@ -81,7 +81,7 @@ def check_files(declared: Declarations, folder: Path, seconds: float = SECONDS) 
     Yields:
         Lines for people, and whether the entry is fine there.
     """
-    plan = plan_of(declared, folder)
+    plan = plan_check(declared, folder)
     for entry in declared.methods:
         if not any(cell.entry is entry for cell in plan.cells):
             why = next(filter(None, map(entry.skip, SCENES)), "no scene is meant for it")
@@ -107,7 +107,7 @@ def check_files(declared: Declarations, folder: Path, seconds: float = SECONDS) 
         executor.close()
 
 
-def plan_of(declared: Declarations, folder: Path) -> Plan:
+def plan_check(declared: Declarations, folder: Path) -> Plan:
     """Return the plan of each method in all scenes that fit it, and of each scene with the simulation."""
     bare = [scene for scene in SCENES if scene.name in BARE]
     worn = of_garment(GARMENT).scene(TEST)

@@ -17,10 +17,10 @@ from benchmarks.tasks.task import Context, Outcome
 if TYPE_CHECKING:
     from reference_sim import Trajectory
 
-LEAST = 0.02  # [s] to be measured: run() is called twice at least, unless it takes longer
+LEAST_MEASURED = 0.02  # [s] to be measured: run() is called twice at least, unless it takes longer
 COPIES = 3  # bodies at once
-NEAR = 1e-6  # [m] of what should be in its place; times a frame's length in float32
-SLACK = 1.1  # of the clock: what frames say of themselves may be more by so much, in all
+PLACE_TOLERANCE = 1e-6  # [m] of what should be in its place; times a frame's length in float32
+CLOCK_SLACK = 1.1  # of the clock: what frames say of themselves may be more by so much, in all
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +48,7 @@ class CheckMethod(CellTask):
         method = self._made(findings, context, scene)
         with findings.call("run()", self._hint(scene)):
             if self.cell.timed:
-                trajectory, reading, _ = self.timed(method, LEAST)
+                trajectory, reading, _ = self.timed(method, LEAST_MEASURED)
             else:
                 trajectory, reading = method.run(), Reading((float("nan"),))
         if reading.complaint:
@@ -88,7 +88,7 @@ class CheckMethod(CellTask):
         import numpy as np
 
         x, entry = np.asarray(trajectory.positions, dtype=np.float64), self.cell.entry
-        near = NEAR * max(1.0, float(np.abs(x).max(initial=0.0)))
+        near = PLACE_TOLERANCE * max(1.0, float(np.abs(x).max(initial=0.0)))
         if not entry.gives_first_frame:
             off = float(np.abs(x[0] - scene.start).max())
             findings.demand(
@@ -123,7 +123,7 @@ class CheckMethod(CellTask):
         elif status != "ok":
             findings.notes.append(f"ends as {status}: {reason}")
         stated = float(np.nansum(trajectory.frame_seconds))
-        if self.cell.timed and stated > SLACK * max(reading.runs) + NEAR:
+        if self.cell.timed and stated > CLOCK_SLACK * max(reading.runs) + PLACE_TOLERANCE:
             findings.wrong.append(
                 f"its frames say {stated:.3g} s in all, the clock {max(reading.runs):.3g} s: give "
                 "frame_seconds in seconds, of run() alone"
@@ -172,7 +172,7 @@ class CheckMethod(CellTask):
         if not self.cell.entry.batched:
             return
         with findings.call("batch()"):
-            positions, reading = clocked(method.batch(COPIES), of=lambda made: made, least=LEAST)
+            positions, reading = clocked(method.batch(COPIES), of=lambda made: made, least=LEAST_MEASURED)
         if reading.complaint:
             findings.wrong.append(f"batch(): {UNBELIEVABLE}{reading.complaint}")
         shape = (scene.frames, COPIES, scene.cloth.vertex_count, 3)

@@ -19,7 +19,7 @@ from benchmarks.tasks.task import Context, Outcome, Task
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
 
-SHIFT = 1e-3  # [m] by which the second roll-out is off
+PERTURBATION = 1e-3  # [m] by which the second roll-out is off
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +47,7 @@ class CheckMetrics(Task):
         simulation.prepare(scene)
         first = simulation.run()
         random = np.random.default_rng(0)
-        moved = first.positions + SHIFT * random.standard_normal(first.positions.shape)
+        moved = first.positions + PERTURBATION * random.standard_normal(first.positions.shape)
         group = SceneRollOuts(scene)
         other = replace(entry, name="moved", role="solver")
         group.roll_outs += [

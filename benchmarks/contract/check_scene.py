@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from benchmarks.assets.inputs import FEWEST_FRAMES
 from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Findings, altered, fingerprints
 from benchmarks.methods import find_method
@@ -18,11 +19,10 @@ if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
     from reference_sim.energies import Energy
 
-FEWEST = 3  # frames: inertia needs two before the one that is judged
-MOVED = 0.02  # of the mean edge, for the places at which derivatives are compared
-STEP = 1e-6  # [m] of central differences: their error is some 1e-7 of the derivative
-CLOSE = 1e-4  # of the norm of the gradient, of the Hessian's largest entry
-ROUND_OFF = 1e-13  # of a sum of many terms, as a share of it
+DISPLACEMENT = 0.02  # of the mean edge, for the places at which derivatives are compared
+DIFFERENCE_STEP = 1e-6  # [m] of central differences: their error is some 1e-7 of the derivative
+DERIVATIVE_TOLERANCE = 1e-4  # of the norm of the gradient, of the Hessian's largest entry
+SUM_ROUND_OFF = 1e-13  # of a sum of many terms, as a share of it
 DIRECTIONS = 3  # along which derivatives are compared
 
 
@@ -81,7 +81,9 @@ class CheckScene(Task):
         findings.demand(
             0.0 < scene.dt < np.inf, f"has a time step of {scene.dt} s: give a positive number of seconds"
         )
-        findings.demand(scene.frames >= FEWEST, f"has {scene.frames} frames: at least {FEWEST} are needed")
+        findings.demand(
+            scene.frames >= FEWEST_FRAMES, f"has {scene.frames} frames: at least {FEWEST_FRAMES} are needed"
+        )
         findings.demand(
             bool(scene.energies), "declares no energies: without one there is nothing to minimise"
         )
@@ -126,7 +128,7 @@ def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> 
     cloth, random = scene.cloth, np.random.default_rng(0)
     edges = cloth.edges
     length = float(np.linalg.norm(scene.start[edges[:, 0]] - scene.start[edges[:, 1]], axis=1).mean())
-    x = scene.start + MOVED * length * random.standard_normal(scene.start.shape)
+    x = scene.start + DISPLACEMENT * length * random.standard_normal(scene.start.shape)
     energy.prepare(Step(scene.start, scene.start_velocity, x, scene.dt, scene.obstacle, 1))
     value, gradient = energy.value_and_gradient(x)
     what = f"energy {energy.name}: its"
@@ -138,18 +140,26 @@ def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> 
     moved = np.abs(gradient).max(axis=1) > 0.0  # elsewhere any direction says the same
     for _ in range(DIRECTIONS):
         direction = random.standard_normal(x.shape) * (moved[:, None] if moved.any() else 1.0)
-        ahead, behind = (energy.value_and_gradient(x + sign * STEP * direction) for sign in (1.0, -1.0))
-        slope, stated = (ahead[0] - behind[0]) / (2.0 * STEP), float((gradient * direction).sum())
+        ahead, behind = (
+            energy.value_and_gradient(x + sign * DIFFERENCE_STEP * direction) for sign in (1.0, -1.0)
+        )
+        slope, stated = (ahead[0] - behind[0]) / (2.0 * DIFFERENCE_STEP), float((gradient * direction).sum())
         findings.demand(
-            bool(abs(slope - stated) <= CLOSE * np.linalg.norm(gradient) + ROUND_OFF * abs(value) / STEP),
+            bool(
+                abs(slope - stated)
+                <= DERIVATIVE_TOLERANCE * np.linalg.norm(gradient)
+                + SUM_ROUND_OFF * abs(value) / DIFFERENCE_STEP
+            ),
             f"{what} gradient is not the derivative of its value: {stated:.6g} N along a direction, "
             f"differences say {slope:.6g} N",
         )
-    turned = (ahead[1] - behind[1]) / (2.0 * STEP)
+    turned = (ahead[1] - behind[1]) / (2.0 * DIFFERENCE_STEP)
     product = _times_hessian(energy, x, direction)
     off, most = float(np.abs(turned - product).max()), float(np.abs(turned).max())
     findings.demand(
-        off <= CLOSE * max(most, float(np.abs(product).max())) + ROUND_OFF * np.abs(gradient).max() / STEP,
+        off
+        <= DERIVATIVE_TOLERANCE * max(most, float(np.abs(product).max()))
+        + SUM_ROUND_OFF * np.abs(gradient).max() / DIFFERENCE_STEP,
         f"{what} Hessian is not the derivative of its gradient: off by {off:.3g} of {most:.3g} N/m; leave it "
         "to automatic differentiation, or mend it",
     )

@@ -20,11 +20,17 @@ from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
 
-NEAR = 0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
-BETTER = 0.5  # another unit or axis fits better where its distance is less than so much of the stated one's
-SIZES = 2.0  # times as large, or as small, as the cloth a first frame may be
-LONG = 3.0  # times as long as at rest, edges in the mean: then they join vertices that are no neighbours
-ALIKE = 1e-6  # of a frame rate
+FARTHEST = (
+    0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
+)
+BETTER_FIT = (
+    0.5  # another unit or axis fits better where its distance is less than so much of the stated one's
+)
+SIZE_RATIO = 2.0  # times as large, or as small, as the cloth a first frame may be
+LONGEST_STRETCH = (
+    3.0  # times as long as at rest, edges in the mean: then they join vertices that are no neighbours
+)
+RATE_TOLERANCE = 1e-6  # of a frame rate
 
 
 def fit_to_scene(
@@ -89,7 +95,9 @@ def expected_positions(scene: BuiltScene) -> np.ndarray:
 def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: FileConventions) -> None:
     """Raise RollOutError unless the first frame fits best with the stated unit and up axis."""
     first, size = stored.positions[0], _diagonal(expected)
-    alike = [units for units in METRES if 1 / SIZES < METRES[units] * _diagonal(first) / size < SIZES]
+    alike = [
+        units for units in METRES if 1 / SIZE_RATIO < METRES[units] * _diagonal(first) / size < SIZE_RATIO
+    ]
     if not alike:
         across = METRES[stated.units] * _diagonal(first)
         raise RollOutError(
@@ -103,14 +111,18 @@ def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: FileConvent
     }
     best, given = min(apart, key=lambda names: apart[names]), (stated.units, stated.up)
     here = apart.get(given, np.inf)
-    if best != given and apart[best] < BETTER * here and (given[0] not in alike or apart[best] < NEAR * size):
+    if (
+        best != given
+        and apart[best] < BETTER_FIT * here
+        and (given[0] not in alike or apart[best] < FARTHEST * size)
+    ):
         pairs = zip(("units", "up"), best, given)
         remedy = [f"--{name} {value}" for name, value, stated_value in pairs if value != stated_value]
         raise RollOutError(
             f"its first frame fits the scene's cloth in {best[0]}, {best[1]} up, {apart[best]:.2g} m off, "
             f"and not in {stated.units}, {stated.up} up: give {' '.join(remedy)}"
         )
-    if here > NEAR * size:
+    if here > FARTHEST * size:
         raise RollOutError(
             f"its first frame lies {here:.3g} m from where the scene's cloth starts: write world coordinates "
             "(not relative to the pelvis), from the scene's first frame on"
@@ -127,7 +139,7 @@ def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
         return
     with np.errstate(over="ignore", invalid="ignore"):
         away = np.linalg.norm(positions[:frames].mean(axis=1) - expected[:frames].mean(axis=1), axis=1)
-    far = np.flatnonzero(~(away <= NEAR * _diagonal(expected[0])))
+    far = np.flatnonzero(~(away <= FARTHEST * _diagonal(expected[0])))
     if 2 * len(far) > frames:
         frame = far[0]
         raise RollOutError(
@@ -173,7 +185,7 @@ def _order(
                 "the order: no vertex can be matched; export the scene's mesh and use that"
             )
         return order, "vertices matched by topology"
-    shuffled = _stretch(first, scene) > LONG
+    shuffled = _stretch(first, scene) > LONGEST_STRETCH
     if not stated.match_vertices:
         if shuffled:
             raise RollOutError(
@@ -212,7 +224,7 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: FileConventions) 
     """Return a frame for each of the scene's, linear in time between the file's, and the change in words."""
     rate = 1.0 / scene.dt
     stated_rate, frames = stored.fps, len(stored.positions)
-    if stated.fps is None and stated_rate is not None and abs(stated_rate - rate) > ALIKE * rate:
+    if stated.fps is None and stated_rate is not None and abs(stated_rate - rate) > RATE_TOLERANCE * rate:
         raise RollOutError(
             f"states {stated_rate:g} frames a second, the scene has {rate:g}: give --fps {stated_rate:g} to "
             "re-time it"
