@@ -3,7 +3,7 @@
 A sequence is three files: its simulation (.vtkhdf), the motion (.npz), and the simulated vertices as networks
 see them (.npy), of which training reads a few frames at a time. The index says what all sequences share (the
 settings), and of each its files with their digests, its frames and how it ended. `python -m
-benchmarks.dataset` makes, verifies and merges such folders.
+benchmarks.dataset` builds such folders.
 """
 
 from __future__ import annotations
@@ -186,7 +186,9 @@ def read_motion(path: Path, line: SimulatedSequence) -> Motion:
     try:
         motion = Motion(line.name, arrays["poses"], arrays["translations"], float(arrays["fps"]), "simulated")
     except (KeyError, TypeError) as error:
-        raise DataSetError(f"{path}: no motion of a data set ({error}); verify {path.parents[2]}") from None
+        raise DataSetError(
+            f"{path}: no motion of a data set ({error}); build {path.parents[2]} again"
+        ) from None
     if motion.frames != line.frames:
         raise DataSetError(f"{path}: {motion.frames} frames, {line.frames} by {INDEX}; make it again")
     return motion

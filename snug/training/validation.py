@@ -58,8 +58,10 @@ class Validator:
             sequences=how.network.sequential, device=trainer.device,
         )  # fmt: skip
         if self.data.dt != trainer.data.dt:
-            here, there = 1 / self.data.dt, 1 / trainer.data.dt
-            raise TrainingError(f"validation has {here:g} frames a second, training {there:g}: resample them")
+            validating, training = 1 / self.data.dt, 1 / trainer.data.dt
+            raise TrainingError(
+                f"validation has {validating:g} frames a second, training {training:g}: resample them"
+            )
         self.contact = trainer.contact_of(self.data)
         self.targets = None
         if how.targets:

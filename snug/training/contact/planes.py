@@ -286,9 +286,9 @@ class TrainingContact:
         """Return the state for a checkpoint: changed anchors, ages of all, a search not yet due."""
         changed = torch.as_tensor(np.flatnonzero(self._changed))
         faces, barycentric = (torch.as_tensor(table) for table in self._tables())
-        there = changed.to(faces.device)
+        rows = changed.to(faces.device)
         return {
-            "changed": changed, "faces": faces[there], "barycentric": barycentric[there],
+            "changed": changed, "faces": faces[rows], "barycentric": barycentric[rows],
             "age": torch.as_tensor(self.cache.age.copy()),
         }, {"credit": self._credit}  # fmt: skip
 
