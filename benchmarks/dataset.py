@@ -81,11 +81,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command_line = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     options = make_parser().parse_args(command_line)
-    from benchmarks.datasets.build import build  # loads the simulator
+    from benchmarks.datasets.build import build_data_set  # loads the simulator
     from benchmarks.tasks.task import RunStopped
 
     try:
-        return _report(build(options, command_line))
+        return _report(build_data_set(options, command_line))
     except RunStopped as error:  # as of a full disk
         print(f"{PROGRAM}: {error}; the same command goes on from there", file=sys.stderr)
         return 1

@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-SHOWN = (
+SUMMARY_METRICS = (
     ("energy/total", "total", "J"),
     ("energy/strain", "strain", "J"),
     ("energy/bending", "bending", "J"),
@@ -103,7 +103,9 @@ def summary(plan: Plan) -> str:
     folder, name = RunFolder(plan.folder), plan.cells[-1].method
     rows = [row for row in folder.read_rows() if row.method == name]
     values = {row.metric: row.value for row in rows if row.value is not None}
-    shown = [f"{word} {values[metric]:.4g} {unit}" for metric, word, unit in SHOWN if metric in values]
+    shown = [
+        f"{word} {values[metric]:.4g} {unit}" for metric, word, unit in SUMMARY_METRICS if metric in values
+    ]
     bad = next((f"{row.status}: {row.reason}" for row in rows if row.status != "ok"), "")
     results = ", ".join(filter(None, (bad, *shown)))
     return f"{name} in {plan.scenes[0].name}: {results}; {folder.report_path}"

@@ -1,1 +1,1 @@
-"""Data sets of simulated motions: how they are built, and how several are joined."""
+"""Data sets of simulated motions, for training on more frames than fit into memory: their building."""

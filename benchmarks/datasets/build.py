@@ -38,7 +38,7 @@ from snug.training.simulated_data import INDEX, DataSet, SimulatedSequence, sett
 LONGEST = 1_000_000  # frames of a sequence
 
 
-def build(options: argparse.Namespace, command_line: Sequence[str]) -> DataSet:
+def build_data_set(options: argparse.Namespace, command_line: Sequence[str]) -> DataSet:
     """Simulate what the folder lacks. Raises ValueError, one line, before anything is written."""
     plan, entry = plan_sequences(options, command_line)
     _existing(plan.folder)  # a folder of other things is refused before any work
