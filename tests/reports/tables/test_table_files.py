@@ -14,7 +14,8 @@ from benchmarks.results.run_folder import RunFolder
 from reports import build
 from reports.run.finished_run import make_run
 from reports.run.reading import read_run
-from reports.tables import dictionary, latex, make_tables
+from reports.tables import latex, make_tables
+from reports.tables.dictionary import dictionary
 from tests.reports.report_folder import all_rows, declaration, row
 
 TOP = r"\begin{tabular}[t]{@{}r@{}}"
@@ -140,4 +141,4 @@ def test_a_table_that_the_run_has_not_is_not_written(tmp_path):
     run = read_run(folder)
     latex.write_latex(run, make_tables(run), folder.tables)
     assert [path.name for path in folder.tables.iterdir()] == ["energies.tex"]
-    assert len(dictionary.dictionary(run).rows) == len(results.COLUMNS) + 1
+    assert len(dictionary(run).rows) == len(results.COLUMNS) + 1
