@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.methods.minimisers.kernels import sweep_vertices
-from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
+from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver, with_types_resolved
 from reference_sim.kernels.fast_kernels import step_terms
 from reference_sim.kernels.kernel_argument import KernelArgument
 from reference_sim.minimise.result import Stop
@@ -54,13 +54,8 @@ class VertexBlockDescent(SweepSolver):
 
     def init(self, run: SweepRun) -> Stop | None:
         """Begin at the guess."""
-        run.frozen = self.freeze()
         run.swept = run.x.copy()
-        return None
-
-    def step(self, run: SweepRun) -> Stop | None:
-        """Move every free vertex once."""
-        sweep_vertices(run.swept, self._free, *run.frozen)
+        run.sweep = with_types_resolved(sweep_vertices, run.swept, self._free, *self.freeze())
         return None
 
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+from numba import typeof
+from numba.core.dispatcher import Dispatcher
 
 from reference_sim.minimise.descent import Descent
 from reference_sim.minimise.loop import iterate
@@ -19,11 +23,11 @@ class SweepRun(Descent):
 
     Attributes:
         swept: (V, 3) [m] positions that the sweeps move in place.
-        frozen: arrays that stay the same in all sweeps of a step.
+        sweep: moves them once.
     """
 
     swept: np.ndarray
-    frozen: tuple
+    sweep: Callable[[], object]
 
 
 class SweepSolver(ABC):
@@ -41,11 +45,12 @@ class SweepSolver(ABC):
 
     @abstractmethod
     def init(self, run: SweepRun) -> Stop | None:
-        """Set `run.swept` and `run.frozen`."""
+        """Set `run.swept` and `run.sweep`."""
 
-    @abstractmethod
     def step(self, run: SweepRun) -> Stop | None:
         """Sweep once."""
+        run.sweep()
+        return None
 
     def terminate(self, run: SweepRun) -> Stop | None:
         """Stop after the last sweep, or the one that threw a vertex RUNAWAY_DISTANCE from where it began."""
@@ -57,3 +62,12 @@ class SweepSolver(ABC):
         run.x = run.swept
         run.value, run.g = run.evaluate(run.x)
         return Stop("max_iterations", f"{run.iterations} sweeps done")
+
+
+def with_types_resolved(kernel: Dispatcher, *arguments: object) -> Callable[[], object]:
+    """Return a call of a compiled kernel with these arguments that looks up no types.
+
+    For kernels among the arguments numba does so in Python at every call, which takes longer than a sweep
+    over a small mesh.
+    """
+    return partial(kernel.compile(tuple(map(typeof, arguments))), *arguments)

@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.methods.minimisers.kernels import sweep_constraints
-from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
+from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver, with_types_resolved
 from reference_sim.kernels.fast_kernels import step_terms
 from reference_sim.kernels.kernel_argument import KernelArgument
 from reference_sim.minimise.result import Stop
@@ -54,10 +54,6 @@ class XPBD(SweepSolver):
         pins = self.potential.cloth.pins
         x[pins] = run.x[pins]
         frozen = (constraints.freeze() for constraints in self._terms.kernels)
-        run.swept, run.frozen = x, tuple(zip(self._kernels, frozen))
-        return None
-
-    def step(self, run: SweepRun) -> Stop | None:
-        """Solve every constraint once."""
-        sweep_constraints(run.swept, self._inverse, run.frozen)
+        terms = tuple(zip(self._kernels, frozen))
+        run.swept, run.sweep = x, with_types_resolved(sweep_constraints, x, self._inverse, terms)
         return None
