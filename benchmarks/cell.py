@@ -57,7 +57,7 @@ class Cell:
 
     @property
     def timed(self) -> bool:
-        """Whether its costs are measured; other cells run side by side."""
+        """True if its costs are measured; other cells run side by side."""
         return self.scene.timed and self.entry.timed
 
     def trajectory(self, folder: RunFolder) -> Path:

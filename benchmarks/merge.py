@@ -50,12 +50,12 @@ class MergeError(ValueError):
 @command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    argv = list(sys.argv[1:] if arguments is None else arguments)
     parser = Parser(prog=f"python -m {PROGRAM}", description="Join runs into one folder.", epilog=EXAMPLES)
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folders of benchmarks.run, two or more")
     parser.add_argument("-o", "--out", metavar="DIR", required=True, help="a new folder")
-    options = parser.parse_args(words)
-    line = shlex.join(["python", "-m", PROGRAM, *words])
+    options = parser.parse_args(argv)
+    line = shlex.join(["python", "-m", PROGRAM, *argv])
     rows = merge([Path(run) for run in options.runs], Path(options.out), command=line)
     timed = of_machines(RunFolder(Path(options.out)).read_config())
     if left_out := sum(row.status == "skipped" and row.metric in timed for row in rows):

@@ -1,4 +1,4 @@
-"""What makes a stored result stale beside its inputs: the source, packages and data files that it depends on.
+"""Dependencies that make a stored result stale, beside its inputs: source, packages and data files.
 
 All three follow from the syntax trees of the modules that a task names, imports inside functions included, so
 that a change in one method leaves the results of the others as they are. Comments, formatting and docstrings

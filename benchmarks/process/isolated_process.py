@@ -37,7 +37,7 @@ class WorkerDied(RuntimeError):
 
 
 def new_processes() -> SpawnContext | ForkServerContext:
-    """Where worker processes come from: none of them has anything of this one.
+    """Return the context that worker processes come from: none of them has anything of this one.
 
     On Linux a server forks them that has loaded LOADED_BY_ALL, and nothing more, once: a process is there in
     a quarter of the time. Elsewhere libraries may not outlive a fork, and each process loads its own.
@@ -63,7 +63,7 @@ class IsolatedProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether the process that was last asked is there still."""
+        """True if the process that was last called is still there."""
         return self._process is not None
 
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float | None) -> Any:

@@ -1,4 +1,4 @@
-"""What a worker of a cluster does: each task in a process, in the folder of the run.
+"""A worker of a cluster: it does each task in a process, in the folder of the run.
 
 Everything here is called by cluster_executor, in the process of a worker of dask.distributed. A process stays
 for the next task of its run, and ends when nobody wants it any more.

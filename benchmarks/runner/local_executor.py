@@ -121,7 +121,7 @@ class LocalExecutor:
                 for task, needed in tasks
             }
             try:
-                self._troubles |= {name: died for name, own in begun.items() if (died := own.result())}
+                self._troubles |= {name: died for name, future in begun.items() if (died := future.result())}
             except BaseException:
                 _end(set(begun.values()))
                 raise

@@ -62,7 +62,10 @@ class TaskInputs:
         return {"assets": sizes} | digests
 
     def motion(self, name: str) -> str:
-        """Of a file its content; an embedded one is made by code, looked at by itself."""
+        """Return the name of a motion, with the digest of its content where it is of a file.
+
+        The code that makes an embedded one counts by itself.
+        """
         files = self.plan.inputs.motions
         return f"{name} {digest(files[name])}" if name in files else name
 
@@ -85,7 +88,7 @@ def declared(entry: MethodEntry | Scene | Case | Microbenchmark) -> dict[str, An
 
 
 def modules_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
-    """Of a scene or a method: its module, and what declares it where that is outside."""
+    """Return the module of a scene or a method, and the file that declares it where that is a user's."""
     return tuple(dict.fromkeys(filter(None, (entry.module, entry.declared_in))))
 
 
