@@ -153,7 +153,7 @@ def test_presets_grow():
     assert (*choose_suites([]), "performance") == choose_suites(["all"])  # that one only where it is named
 
 
-TRAININGS = {"snug", "snug.recipes.recipe", "snug.recipes.named", "snug.recipes.deviations"}
+TRAININGS = {"snug", "snug.recipes", "snug.recipes.recipe", "snug.recipes.named", "snug.recipes.deviations"}
 
 
 def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
