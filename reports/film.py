@@ -40,12 +40,12 @@ SWATCH = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).s
 class Stage:
     """Stage with all cloths and the body, one cloth shown at a time: every view has the same camera."""
 
-    def __init__(self, kept: SelectedRollOuts, width: int, azimuth: float) -> None:
+    def __init__(self, selected: SelectedRollOuts, width: int, azimuth: float) -> None:
         import pyvista
         from vtkmodules.vtkCommonCore import vtkLogger
 
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # that there is no screen
-        self.kept, self.axes = kept, camera_axes(-azimuth)
+        self.selected, self.axes = selected, camera_axes(-azimuth)
         self.width, self.height = width - width % 2, round(width * TALL / 2) * 2
         size = [self.width, self.height]
         self.plotter: Any = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
@@ -55,10 +55,10 @@ class Stage:
             self.plotter.add_light(
                 pyvista.Light(position=place, intensity=strength, light_type="camera light")
             )
-        self.meshes = {name: self._added(cloth, CLOTH) for name, cloth in kept.cloths.items()}
-        self.body = self._added(kept.body, BODY) if kept.body else None
+        self.meshes = {name: self._added(cloth, CLOTH) for name, cloth in selected.cloths.items()}
+        self.body = self._added(selected.body, BODY) if selected.body else None
         self.drawn = -1  # frame of the body
-        self.centres, half = camera_path(kept, self.axes)
+        self.centres, half = camera_path(selected, self.axes)
         self.away = half / np.tan(np.radians(ANGLE / 2.0))
 
     def _added(self, cloth: Trajectory, colour: str) -> tuple[Any, Any]:
@@ -76,9 +76,9 @@ class Stage:
         """Return (height,width,3) bytes: that method's cloth on the body; past its end, its last frame."""
         for name, (_, actor) in self.meshes.items():
             actor.visibility = name == method
-        _move(self.meshes[method][0], self.kept.cloths[method].positions, frame)
-        if self.body and self.kept.body and frame != self.drawn:
-            _move(self.body[0], self.kept.body.positions, frame)
+        _move(self.meshes[method][0], self.selected.cloths[method].positions, frame)
+        if self.body and self.selected.body and frame != self.drawn:
+            _move(self.body[0], self.selected.body.positions, frame)
             self.drawn = frame
         camera, centre = self.plotter.camera, self.centres[frame]
         camera.focal_point, camera.up, camera.view_angle = centre, (0.0, 1.0, 0.0), ANGLE
@@ -97,9 +97,9 @@ def _move(mesh, positions: np.ndarray, frame: int) -> None:
     mesh.point_data.active_normals = vertex_normals(mesh.points.astype(float), mesh.regular_faces)
 
 
-def camera_path(kept: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
+def camera_path(selected: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
-    cloths = kept.cloths.values()
+    cloths = selected.cloths.values()
     frames = max(cloth.frames for cloth in cloths)
     seen = [cloth.positions @ axes for cloth in cloths]
     low, high = (
@@ -116,19 +116,21 @@ def camera_path(kept: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, f
     return centres @ axes.T, MARGIN * float(max(up, TALL * right))
 
 
-def pictures(kept: SelectedRollOuts, width: int, azimuth: float) -> Iterator[np.ndarray]:
+def draw_frames(selected: SelectedRollOuts, width: int, azimuth: float) -> Iterator[np.ndarray]:
     """Yield every frame of the film: all views with their names, and the time."""
-    stage = Stage(kept, width, azimuth)
+    stage = Stage(selected, width, azimuth)
     try:
-        longest = max(kept.cloths.values(), key=lambda cloth: cloth.frames)
+        longest = max(selected.cloths.values(), key=lambda cloth: cloth.frames)
         for frame, time in enumerate(longest.times):
-            views = {method: stage.view(method, frame) for method in kept.cloths}
-            yield _composed(kept, views, frame, float(time))
+            views = {method: stage.view(method, frame) for method in selected.cloths}
+            yield _composed(selected, views, frame, float(time))
     finally:
         stage.close()
 
 
-def _composed(kept: SelectedRollOuts, views: dict[str, np.ndarray], frame: int, time: float) -> np.ndarray:
+def _composed(
+    selected: SelectedRollOuts, views: dict[str, np.ndarray], frame: int, time: float
+) -> np.ndarray:
     """Compose views in rows, each under its method's name, with the time [s] below them."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
@@ -144,8 +146,8 @@ def _composed(kept: SelectedRollOuts, views: dict[str, np.ndarray], frame: int, 
     for place, (method, view) in enumerate(views.items()):
         x, y = place % columns * width, place // columns * (height + room)
         image.paste(Image.fromarray(view), (x, y + room))
-        cloth = kept.cloths[method]
-        label = _fitting(draw, kept.run.label(method), font, width)
+        cloth = selected.cloths[method]
+        label = _fitting(draw, selected.run.label(method), font, width)
         draw.text((x + width / 2, y + room / 2), label, INK, font, anchor="mm")
         if frame >= cloth.frames:
             ended = _fitting(draw, f"ended at {cloth.times[-1]:.2f} s: {cloth.status}", font, width)
@@ -242,11 +244,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     demand_possible(path)
     from reports.run.selected_roll_outs import select_roll_outs
 
-    kept = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
-    dt = min(cloth.dt for cloth in kept.cloths.values())
+    selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
+    dt = min(cloth.dt for cloth in selected.cloths.values())
     rate = options.speed / dt if dt > 0.0 else 1.0
     with replacing(path) as temporary:
-        WRITERS[path.suffix](temporary, pictures(kept, options.width, options.azimuth), rate)
+        WRITERS[path.suffix](temporary, draw_frames(selected, options.width, options.azimuth), rate)
     print(path)
     return 0
 

@@ -81,7 +81,7 @@ def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monke
 
     said: list[str] = []
     monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: said.append(label) or label)
-    frames = list(film.pictures(select_roll_outs(run, SCENE, ["simulation", "snug"]), 100, 25.0))
+    frames = list(film.draw_frames(select_roll_outs(run, SCENE, ["simulation", "snug"]), 100, 25.0))
     names = ["Simulation", "SNUG"]
     assert len(frames) == 5 and said == names + names + 3 * [*names, "ended at 0.03 s: ok"]
 
