@@ -63,22 +63,22 @@ class Scene:
 
     @property
     def timed(self) -> bool:
-        """Whether costs are measured in this scene; cells of other scenes run side by side."""
+        """True if costs are measured in this scene; cells of other scenes run side by side."""
         return self.metrics is None or "cost" in self.metrics
 
     @property
     def dynamic(self) -> bool:
-        """Whether metrics need quasi-static solutions of this scene."""
+        """True if metrics need quasi-static solutions of this scene."""
         return self.dressed and (self.metrics is None or "dynamics" in self.metrics)
 
     @property
     def simulated(self) -> bool:
-        """Whether the garment settles on a posed body before the motion starts."""
+        """True if the garment settles on a posed body before the motion starts."""
         return self.dressed and not self.networks_only
 
     @property
     def dressed(self) -> bool:
-        """Whether the scene has a body that wears a garment."""
+        """True if the scene has a body that wears a garment."""
         return bool(self.garment)
 
     def at(self, preset: Preset) -> Scene:
