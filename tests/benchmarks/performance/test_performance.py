@@ -303,14 +303,12 @@ def test_a_killed_convergence_goes_on_to_the_same_curve(small, monkeypatch):
     asked = iter([False, False, False, True])
     stopped = functools.partial(snug.training.train_network.train_network, stop=lambda: next(asked))
     with monkeypatch.context() as patch:
-        patch.setattr(snug.training.train_network, "train_network", stopped)
+        patch.setattr(convergence, "train_network", stopped)
         with pytest.raises(Exception, match="stopped after step 4"):
             convergence.measure(small, vertices=150)
     begun = []
     step_of = snug.training.train_network.train_network
-    monkeypatch.setattr(
-        snug.training.train_network, "train_network", lambda *a, **k: step_of(*a, log=begun.append, **k)
-    )
+    monkeypatch.setattr(convergence, "train_network", lambda *a, **k: step_of(*a, log=begun.append, **k))
     convergence.measure(small, vertices=150)
     assert [row["step"] for row in begun] == [6]  # only what was left
     again = lines(curve)
