@@ -55,7 +55,8 @@ def has_kernel(term: Energy, use: str) -> bool:
 
 def fast_kernel(term: Energy, use: str) -> Any:
     """Return what the term's function for this use gives, or None if it declares none."""
-    return _function(type(term), use)(term) if has_kernel(term, use) else None
+    kind: Any = type(term)  # hashable, which mypy does not see
+    return _function(kind, use)(term) if has_kernel(term, use) else None
 
 
 @cache

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.methods.minimisers.kernels import sweep_vertices
 from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver, with_types_resolved
 from reference_sim.kernels.fast_kernels import step_terms
-from reference_sim.kernels.kernel_argument import KernelArgument
+from reference_sim.kernels.kernel_argument import kernel_argument
 from reference_sim.minimise.result import Stop
 from reference_sim.potential import Potential
 
@@ -40,7 +40,7 @@ class VertexBlockDescent(SweepSolver):
         self._free = np.flatnonzero(potential.cloth.free)
         vertices = potential.cloth.vertex_count
         self._blocks = [
-            (KernelArgument(blocks.kernel), incidence(blocks.stencils, blocks.used, vertices), blocks.freeze)
+            (kernel_argument(blocks.kernel), incidence(blocks.stencils, blocks.used, vertices), blocks.freeze)
             for blocks in self._terms.kernels
         ]
 

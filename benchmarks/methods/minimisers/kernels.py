@@ -25,7 +25,7 @@ def sweep_vertices(x, free, inertia, terms):
         _newton(x, v, g, H)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def block(x, v, inertia, terms, g, H, scratch, out):
     """Write the gradient g (3,) and the convex block H (3, 3) of vertex v.
 

@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.methods.minimisers.kernels import sweep_constraints
 from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver, with_types_resolved
 from reference_sim.kernels.fast_kernels import step_terms
-from reference_sim.kernels.kernel_argument import KernelArgument
+from reference_sim.kernels.kernel_argument import kernel_argument
 from reference_sim.minimise.result import Stop
 from reference_sim.potential import Potential
 
@@ -43,7 +43,7 @@ class XPBD(SweepSolver):
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
         super().__init__(potential, max_iterations=max_iterations)
         self._terms = terms = step_terms(potential, "constraint", "XPBD")
-        self._kernels = [KernelArgument(constraints.kernel) for constraints in terms.kernels]
+        self._kernels = [kernel_argument(constraints.kernel) for constraints in terms.kernels]
         masses, dt = terms.inertia.masses, terms.inertia.dt
         self._inverse = np.where(potential.cloth.free, dt**2 / masses, 0.0)
 

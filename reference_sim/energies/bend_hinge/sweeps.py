@@ -64,7 +64,7 @@ def fold(x, hinge, rest, gradient):
     return angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi) + 0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _add_block(data, x, v, g, H, scratch):
     """Add gradient and convex block of vertex v: the second derivatives of theta are left out."""
     first, corners, hinges, stiffness, rest = data

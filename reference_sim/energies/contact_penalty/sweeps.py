@@ -42,7 +42,7 @@ def depth(x, stencil, weight, margin, point, normal):
     return max(margin - distance, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _add_block(data, x, v, g, H, scratch):
     """Add gradient and block of vertex v."""
     first, corners, stencils, shares, stiffness, margin, points, normals = data

@@ -54,11 +54,10 @@ def hat(D, corner):
     return D[corner - 1, 0], D[corner - 1, 1]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _add_block(data, x, v, g, H, scratch):
     """Add gradient and convex block of vertex v."""
-    first, corners, faces, Dm_inverse, areas, lam, mu = data
-    membrane = faces, Dm_inverse, areas, lam, mu
+    first, corners, membrane = data[0], data[1], data[2:]
     fa, fb = scratch[0], scratch[1]
     for at in range(first[v], first[v + 1]):
         _add_strain(x, corners[at] // 3, corners[at] % 3, membrane, g, H, fa, fb)
@@ -106,10 +105,9 @@ def _stretched(S00, S11, S01):
 @njit(cache=True, error_model="numpy")
 def _solve(data, x, w):
     """Solve the strains of one face after the other."""
-    faces, Dm_inverse, areas, lam, mu, force = data
-    membrane = faces, Dm_inverse, areas, lam, mu
+    membrane, force = data[:5], data[5]
     fa, fb, D = np.empty(3), np.empty(3), np.empty((3, 3, 3))
-    for e in range(len(faces)):
+    for e in range(len(force)):
         _solve_strain(x, w, e, membrane, force[e], fa, fb, D)
     return 0.0
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from reference_sim.kernels.fast_kernels import StepTerms, step_terms
 from reference_sim.kernels.float32_lanes import SCRATCH, Float32Lanes, to_blocks
-from reference_sim.kernels.kernel_argument import KernelArgument
+from reference_sim.kernels.kernel_argument import kernel_argument
 from reference_sim.minimise.compiled import iteration
 from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern
 from reference_sim.minimise.descent import mean_weight
@@ -40,7 +40,7 @@ class CompiledLBFGS:
         self.potential, self.max_iterations = potential, max_iterations
         self._terms = terms = step_terms(potential, "float32_lanes", "CompiledLBFGS")
         self._lanes: tuple[Float32Lanes, ...] = terms.kernels
-        self._gradients = [KernelArgument(lanes.gradient) for lanes in self._lanes]
+        self._gradients = [kernel_argument(lanes.gradient) for lanes in self._lanes]
         self._weight = mean_weight(potential)
         self._tolerance = tolerance * self._weight
         cloth = potential.cloth
@@ -91,7 +91,7 @@ class CompiledLBFGS:
         reason = f"stopped after {int(self._counts[0])} iterations"
         return self._result(x, "max_iterations", reason, seconds, residual)
 
-    def freeze(self, x0: np.ndarray) -> tuple[tuple[KernelArgument, tuple[Any, ...]], ...]:
+    def freeze(self, x0: np.ndarray) -> tuple[tuple[np.ndarray, tuple[Any, ...]], ...]:
         """Return kernel and data of each term of elements for a step from x0 (V, 3) [m]."""
         return tuple(zip(self._gradients, (lanes.freeze(x0) for lanes in self._lanes)))
 
@@ -143,5 +143,5 @@ def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, 
     for k, lanes in changing:
         places = pattern.places(number[lanes.stencils])
         blocks = to_blocks(places.reshape(len(places), -1))
-        stiffening.append((k, KernelArgument(lanes.stiffness), blocks))
+        stiffening.append((k, kernel_argument(lanes.stiffness), blocks))
     return factor, stiffening
