@@ -115,18 +115,18 @@ class FramePlan:
         operations = np.array(self._operations, np.int64)
         return operations, np.concatenate(self._matrices), np.concatenate(self._terms)
 
-    def normalised(self, network: GarmentNetwork) -> slice:
+    def add_normalised(self, network: GarmentNetwork) -> slice:
         """Add the features less the network's mean, over its spread; to be called first."""
         self._terms += [network.input_mean.numpy(), network.input_std.numpy()]
         return self._place(len(network.input_mean))
 
-    def linear(self, layer: nn.Linear, x: slice, activation: type[nn.Module] = nn.Identity) -> slice:
+    def add_linear(self, layer: nn.Linear, x: slice, activation: type[nn.Module] = nn.Identity) -> slice:
         """Add a linear layer of the numbers at x, followed by one of ACTIVATIONS."""
         target = self._place(layer.out_features)
         self._product(ACTIVATIONS[activation], *_numbers_of(layer), x, target.start)
         return target
 
-    def gru(self, gru: nn.GRU, x: slice) -> slice:
+    def add_gru(self, gru: nn.GRU, x: slice) -> slice:
         """Add recurrent units of the numbers at x; return the place of the last layer's new state."""
         size = gru.hidden_size
         inputs, recurrent = self._place(3 * size), self._place(3 * size)
@@ -139,7 +139,7 @@ class FramePlan:
             x = state
         return x
 
-    def offsets(self, network: GarmentNetwork, *parts: tuple[nn.Linear, slice]) -> None:
+    def add_offsets(self, network: GarmentNetwork, *parts: tuple[nn.Linear, slice]) -> None:
         """Add the offsets (3 V,), the sum of linear layers of the numbers at places; to be called last."""
         places, vertices = self._places.copy(), network.vertices
         places[np.isin(places, network.pins)] = vertices  # as those behind: without offset
@@ -163,12 +163,12 @@ class FramePlan:
         matrix = np.pad(matrix, ((0, more), (0, _up(columns, COLUMNS) - columns)))
         first = sum(map(len, self._matrices)), sum(map(len, self._terms))
         self._operations.append((kind, *matrix.shape, *first, x.start, target))
-        weights, factors = stored(matrix, self._precision)
+        weights, factors = store_matrix(matrix, self._precision)
         self._matrices.append(weights.ravel())
         self._terms += [np.float32(scale) * factors, np.float32(scale) * np.pad(bias, (0, more))]
 
 
-def stored(matrix: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:
+def store_matrix(matrix: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:
     """Return a float32 matrix (m, n) in its stored form, and the factor of each row (m,).
 
     Raises ValueError for an unknown precision.
@@ -185,12 +185,12 @@ def stored(matrix: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:
     return np.rint(matrix / factors[:, None]).astype(np.int8), factors
 
 
-def rounded(network: GarmentNetwork, precision: str) -> GarmentNetwork:
+def round_matrices(network: GarmentNetwork, precision: str) -> GarmentNetwork:
     """Return a copy of the network with its matrices rounded to a precision."""
     network = copy.deepcopy(network)
     for parameter in network.parameters():
         if parameter.ndim == 2 and precision != "float32":
-            values, factors = stored(parameter.detach().numpy(), precision)
+            values, factors = store_matrix(parameter.detach().numpy(), precision)
             if precision == "bf16":
                 values = (values.astype(np.uint32) << 16).view(np.float32)
             parameter.data = torch.from_numpy(values * factors[:, None])

@@ -49,8 +49,8 @@ class PoseSpaceDeformation(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.normalised(self)
+        x = plan.add_normalised(self)
         for layer in self.activations:
             if isinstance(layer, nn.Linear):
-                x = plan.linear(layer, x, self.activation)
-        plan.offsets(self, (self.offsets, x))
+                x = plan.add_linear(layer, x, self.activation)
+        plan.add_offsets(self, (self.offsets, x))

@@ -52,7 +52,7 @@ class Regressor(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        plan.offsets(self, (self.offsets, plan.gru(self.gru, plan.normalised(self))))
+        plan.add_offsets(self, (self.offsets, plan.add_gru(self.gru, plan.add_normalised(self))))
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
         """Draw (layers, batch, hidden) from N(0, sigma); it keeps long roll-outs stable."""

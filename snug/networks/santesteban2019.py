@@ -56,10 +56,10 @@ class FitAndWrinkles(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.normalised(self)
+        x = plan.add_normalised(self)
         first, _, drape = self.fit
-        shape = plan.linear(first, slice(x.stop - SHAPES, x.stop), nn.ReLU)
-        plan.offsets(self, (drape, shape), (self.offsets, plan.gru(self.gru, x)))
+        shape = plan.add_linear(first, slice(x.stop - SHAPES, x.stop), nn.ReLU)
+        plan.add_offsets(self, (drape, shape), (self.offsets, plan.add_gru(self.gru, x)))
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
         """Draw (1, batch, 1500) from N(0, sigma)."""

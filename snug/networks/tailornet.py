@@ -48,7 +48,7 @@ class _Perceptron(nn.Module):
     def lay_out(self, plan: FramePlan, x: slice) -> tuple[nn.Linear, slice]:
         """Return the last layer and the place of its inputs, computed from numbers at x."""
         for layer in (self.first, self.second):
-            x = plan.linear(layer, x, nn.ReLU)
+            x = plan.add_linear(layer, x, nn.ReLU)
         return self.last, x
 
 
@@ -120,7 +120,7 @@ class FrequencyMixture(GarmentNetwork):
         """
         if len(self.high) > 1:
             raise ValueError(f"a network of {len(self.high)} pivots has no compiled frame: use one pivot")
-        x = plan.normalised(self)
+        x = plan.add_normalised(self)
         high = cast(_Perceptron, self.high[0])
         pose = slice(x.start, x.stop - SHAPES)
-        plan.offsets(self, self.low.lay_out(plan, x), high.lay_out(plan, pose))
+        plan.add_offsets(self, self.low.lay_out(plan, x), high.lay_out(plan, pose))

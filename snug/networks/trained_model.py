@@ -11,7 +11,7 @@ from torch import Tensor
 
 from snug.networks.architectures import make_network
 from snug.networks.garment_network import GarmentNetwork
-from snug.networks.one_frame import rounded
+from snug.networks.one_frame import round_matrices
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.recipes.recipe import Recipe
 
@@ -78,7 +78,7 @@ class TrainedModel:
 
     def rounded(self, precision: str) -> TrainedModel:
         """Return the model with matrices rounded to that precision. Raises ValueError for an unknown one."""
-        return replace(self, network=rounded(self.network, precision), precision=precision)
+        return replace(self, network=round_matrices(self.network, precision), precision=precision)
 
     def save(self, path: str | Path) -> Path:
         """Write weights and metadata to one safetensors file, whole or not at all; return its path."""

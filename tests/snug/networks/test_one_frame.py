@@ -7,7 +7,7 @@ import torch
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
 from snug.networks.architectures import ARCHITECTURES, make_network
-from snug.networks.one_frame import PRECISIONS, CompiledFrame, FramePlan, rounded, stored
+from snug.networks.one_frame import PRECISIONS, CompiledFrame, FramePlan, round_matrices, store_matrix
 from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
 from snug.networks.tailornet import FrequencyMixture
 from snug.networks.trained_model import TrainedModel
@@ -58,16 +58,16 @@ def test_a_compiled_frame_is_the_modules_own(kind, precision):
 def test_stored_weights_are_the_nearest_of_their_precision(precision, step):
     matrix = np.random.default_rng(0).normal(size=(40, 64)).astype(np.float32)
     matrix[7], matrix[8, 3] = 0.0, 30.0
-    values, factors = stored(matrix, precision)
+    values, factors = store_matrix(matrix, precision)
     assert values.itemsize == {"bf16": 2, "int8": 1}[precision]
     layer = torch.nn.Linear(64, 40)
     layer.weight.data, before = torch.from_numpy(matrix.copy()), layer.bias.clone()
-    nearest = rounded(layer, precision)
+    nearest = round_matrices(layer, precision)
     assert torch.equal(nearest.bias, before) and torch.equal(layer.weight.data, torch.from_numpy(matrix))
     size = np.abs(matrix) if precision == "bf16" else np.abs(matrix).max(axis=1)[:, None]
     error = np.abs(nearest.weight.detach().numpy() - matrix)
     assert (error <= 0.501 * step * size).all() and error.max() > 0.4 * step * size.mean()
-    again, same = stored(nearest.weight.detach().numpy(), precision)
+    again, same = store_matrix(nearest.weight.detach().numpy(), precision)
     assert np.array_equal(again, values) and np.allclose(same, factors, rtol=1e-6, atol=0.0)
 
 
