@@ -1,10 +1,10 @@
 """Compiled kernels as arguments of other compiled kernels.
 
 A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over so that it
-is compiled in, as if it had been called by its name; the caller is compiled anew for each set of kernels. The
-argument is an array whose one field is named after the kernel and the digest of its source (see kernel_cache):
-so numba's type of it names the kernel, what numba keeps on disk is found again by another process and is never
-stale, and a call costs no more than that of any other array.
+is compiled in, as if it had been called by its name; the caller is compiled anew for each set of kernels.
+The argument is an array whose one field is named after the kernel and the digest of its source (see
+kernel_cache). So numba's type of it names the kernel, what numba keeps on disk is found again by another
+process and is never stale, and a call costs no more than that of any other array.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from reference_sim.kernels.kernel_cache import njit, source_digest
 
 @cache  # numba knows the dtype of a record again by its identity
 def kernel_argument(kernel: Dispatcher) -> np.ndarray:
-    """Return what stands for a kernel, compiled by `kernel_cache.njit`, among the arguments of another one."""
+    """Return what stands for a kernel of `kernel_cache.njit` among the arguments of another one."""
     function = kernel.py_func
     name = f"{function.__module__}:{function.__qualname__}@{source_digest(function)}"
     return np.zeros(1, np.dtype([(name, np.int8)]))
