@@ -68,7 +68,10 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
     machines = machines_of(trained, taught_by, outcomes)
     for suite in cell.suites:
-        for row in _rows(cell, suite, outcome, status, reason, metrics, plan.metrics):
+        rows = _rows(
+            cell, suite, outcome, status=status, reason=reason, metrics=metrics, outside=plan.metrics
+        )
+        for row in rows:
             machine = machines.get(row.metric)
             yield row if machine is None else dataclasses.replace(row, hardware=machine)
 
@@ -77,11 +80,13 @@ def _rows(
     cell: Cell,
     suite: str,
     outcome: Outcome,
+    *,
     status: str,
     reason: str,
     metrics: Mapping[str, Any],
     outside: tuple[str, ...],
 ) -> Iterator[Row]:
+    """Yield a row for each metric of a cell in one suite; one that says why, where there is none."""
     scene, entry = cell.scene, cell.entry
     base = Row(
         suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric="cost/frame", unit="ms",
