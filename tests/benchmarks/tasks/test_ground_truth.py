@@ -111,7 +111,7 @@ def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkey
     task = SimulateQuasiStatic(name="still", label="", inputs={}, modules=(), scene=scene)
     worn = dataclasses.replace(scene.build(assets), frames=5)
     assert worn.start.shape  # it has come to rest
-    monkeypatch.setattr(ground_truth, "built", lambda *_: worn)
+    monkeypatch.setattr(ground_truth, "build_scene", lambda *_: worn)
     monkeypatch.setattr(reference_sim, "simulate", partial(simulate, max_iterations=1))
     outcome = task.run(context(tmp_path, assets), {})
     assert outcome.status == "ok"
