@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import torch
 from torch import Tensor, nn
@@ -33,7 +33,7 @@ def find_architecture(kind: str) -> type[GarmentNetwork]:
 
 
 def make_network(
-    kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int, pins: Sequence[int] = ()
+    kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int, pins: Iterable[int] = ()
 ) -> GarmentNetwork:
     """Make a network at its start; the same seed gives the same weights, whatever was drawn before.
 
@@ -67,7 +67,7 @@ def make_network(
     network.pins = tuple(pins)
     if network.pins:
         free = torch.ones(vertices, 1)
-        free[list(pins)] = 0.0
+        free[list(network.pins)] = 0.0
 
         def hold_pins(
             _network: nn.Module, _features: object, output: tuple[Tensor, Tensor | None]

@@ -57,7 +57,7 @@ class FitAndWrinkles(GarmentNetwork):
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
         x = plan.add_normalised(self)
-        first, _, drape = self.fit
+        first, drape = cast(nn.Linear, self.fit[0]), cast(nn.Linear, self.fit[2])
         shape = plan.add_linear(first, slice(x.stop - SHAPES, x.stop), nn.ReLU)
         plan.add_offsets(self, (drape, shape), (self.offsets, plan.add_gru(self.gru, x)))
 

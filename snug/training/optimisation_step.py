@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -18,6 +18,7 @@ from snug.kernels.skinning import FastSkin
 from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
+from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.tensor_file import select_tensors
 from snug.recipes.recipe import Recipe
 from snug.training.augmentation.augmented_set import make_training_set, varies_shape
@@ -122,7 +123,12 @@ class Trainer:
             self.past = SimulatedPast(data, motions, trajectories)
             if recipe.pretraining:
                 begun = time.perf_counter()
-                self.past.pretrain(self.network, self.weights, steps=recipe.pretraining, seed=self.seed)
+                self.past.pretrain(
+                    cast(MotionPerceptron, self.network),
+                    self.weights,
+                    steps=recipe.pretraining,
+                    seed=self.seed,
+                )
                 self.pretraining_seconds = time.perf_counter() - begun
 
     def _hidden_state_cache(self) -> HiddenStateCache | None:
@@ -199,7 +205,7 @@ class Trainer:
             if self.past:
                 terms |= self.past.terms(x, batch)
         means, trusted = self._update(number, windows, terms)
-        if trusted and self.hidden_states:
+        if trusted and self.hidden_states and after is not None:
             self.hidden_states.keep(batch.frames[:, -1], after, self.group)
         if self.contact and posed:
             with self.clock.part("requery"):
@@ -277,7 +283,7 @@ class Trainer:
             stacked.sum(1).mean().backward()
         with self.clock.part("optimiser"):
             parameters = [p for p in self.network.parameters() if p.grad is not None]
-            norm = nn.utils.get_total_norm([p.grad for p in parameters])
+            norm = nn.utils.get_total_norm([p.grad for p in parameters if p.grad is not None])
             if not self.guard.accepts(number, verdict, float(norm), joules, name):
                 return means, False
             if verdict != "update":

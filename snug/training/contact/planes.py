@@ -25,7 +25,7 @@ from snug.training.process_group import ALONE, Group
 from snug.training.training_set import Batch, TrainingSet
 
 # rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
-Posed = tuple[np.ndarray, FrameData, FrameData]
+Posed = tuple[np.ndarray, Any, Any]  # arrays or tensors, as the cache has them
 POSED_TOGETHER = 64  # frames whose bodies are posed by one matrix product
 # Frames before and after a searched one that may take over its anchors; at the start.
 REACH, FIRST_REACH = 3, 7
