@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import inspect
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,11 @@ EXAMPLES = [
     for path in sorted((ROOT / layer).rglob("*.py"))
     if ">>>" in path.read_text(encoding="utf-8")
 ]
+FACES = sorted(
+    ".".join(stub.parent.relative_to(ROOT).parts)
+    for layer in LAYERS
+    for stub in (ROOT / layer).rglob("__init__.pyi")
+)
 
 
 @pytest.mark.parametrize("module", EXAMPLES)
@@ -26,3 +32,12 @@ def test_the_examples_of_a_module_give_what_they_say(module):
 
 def test_every_layer_has_examples():
     assert {module.partition(".")[0] for module in EXAMPLES} == set(LAYERS)
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_a_face_gives_what_it_names_and_its_functions_have_examples(face):
+    package = importlib.import_module(face)
+    public = [getattr(package, name) for name in package.__all__]
+    functions = [thing for thing in public if inspect.isfunction(thing)]
+    assert public
+    assert [thing.__name__ for thing in functions if ">>> " not in (thing.__doc__ or "")] == []
