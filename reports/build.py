@@ -28,6 +28,8 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     Raises:
         ResultsError: when run.json or results.csv is absent, broken or of an earlier version; before anything
             is written.
+
+    >>> pdf, problems = build_report("reports/runs/first")  # doctest: +SKIP
     """
     # Heavy: not needed for --help.
     from reports.blocks.block import Report

@@ -77,6 +77,8 @@ def open_assets(
 
     Raises:
         ValueError: a garment that cannot be tailored to this body.
+
+    >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
     """
     from benchmarks.assets.liveliest_part import liveliest_part
     from snug.garments.templates import find_template
@@ -98,7 +100,11 @@ def open_assets(
 
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:
-    """Make motions of the embedded library."""
+    """Make motions of the embedded library.
+
+    >>> [motion.frames for motion in embedded_motions(["walk"])]
+    [120]
+    """
     from snug.motion.library import make_motion
 
     return [make_motion(name) for name in names]

@@ -97,6 +97,9 @@ def read_inputs(
     Raises:
         ValueError: one line with file and remedy: BodyError, GarmentError, MotionError, or InputError for a
             motion that is too short or has the name of another.
+
+    >>> read_inputs().garment is None
+    True
     """
     worn = None if body is None else UserBody(body, _read_body(body))
     inputs = Inputs(worn, motions=_read_motions(motions, motion_options))

@@ -1,4 +1,3 @@
-from .exported_scene import write_scene as write_scene
 from .roll_out_files import StoredRollOut as StoredRollOut
 from .roll_out_files import read_roll_out as read_roll_out
 from .roll_out_option import FileConventions as FileConventions
@@ -15,5 +14,4 @@ __all__ = [
     "fit_to_scene",
     "parse_roll_out",
     "read_roll_out",
-    "write_scene",
 ]

@@ -63,6 +63,13 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
 
     Raises:
         RollOutError: one line with the file, for whatever is wrong.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     still, faces = np.zeros((5, 3, 3)), np.array([[0, 1, 2]])
+    ...     np.savez(f"{folder}/mine.npz", positions=still, faces=faces, fps=30.0)
+    ...     read_roll_out(f"{folder}/mine.npz").positions.shape
+    (5, 3, 3)
     """
     return _read(str(path), _state(str(path)))
 

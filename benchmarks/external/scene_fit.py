@@ -48,6 +48,8 @@ def fit_to_scene(
 
     Raises:
         RollOutError: with the remedy, without the file's name.
+
+    >>> stored, changes = fit_to_scene(read_roll_out("mine.npz"), scene, FileConventions())  # doctest: +SKIP
     """
     count, cloth = stored.positions.shape[1], scene.cloth
     if count != cloth.vertex_count:

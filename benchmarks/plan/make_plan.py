@@ -31,6 +31,10 @@ def make_plan(request: Request) -> Plan:
     Raises:
         ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing has
             been created then.
+
+    >>> plan = make_plan(Request(scenes=("flag",), methods=("simulation",)))
+    >>> [scene.name for scene in plan.scenes]
+    ['flag']
     """
     suites = choose_suites(request.suites)
     check_seeds(request.seeds)

@@ -55,7 +55,8 @@ def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[list[str], list
 
     Args:
         kind: what is declared.
-        names_and_paths: names, and paths that end with ".py"; a path stands for the names that its file declares.
+        names_and_paths: names, and paths that end with ".py"; a path stands for the names that its file
+            declares.
 
     Raises:
         DeclarationError: a file that cannot be read, or declares none.

@@ -1,7 +1,6 @@
 from .case import Case as Case
 from .case import Measurement as Measurement
 from .case import known_answer as known_answer
-from .convergence import demand_converged as demand_converged
 from .convergence import fitted_order as fitted_order
 from .registry import CASES as CASES
 from .registry import KNOWN_ANSWERS as KNOWN_ANSWERS
@@ -13,7 +12,6 @@ __all__ = [
     "STRESS_TESTS",
     "Case",
     "Measurement",
-    "demand_converged",
     "fitted_order",
     "known_answer",
 ]

@@ -32,6 +32,12 @@ def read_array(path: str | Path) -> np.ndarray:
 
     Raises:
         ArrayFileError: as `read_arrays`.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_array(f"{folder}/x.npy", np.arange(3.0))
+    ...     read_array(f"{folder}/x.npy")
+    array([0., 1., 2.])
     """
     path = Path(path)
     try:
@@ -55,6 +61,12 @@ def read_arrays(
     Raises:
         ArrayFileError: no such file, no archive, encrypted, packed in an unknown way, damaged, an array that
             is not plain or not as long as it declares, more than `limit` bytes together.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.savez(f"{folder}/x.npz", x=np.arange(3.0), y=np.zeros(2))
+    ...     read_arrays(f"{folder}/x.npz", ["x"])
+    {'x': array([0., 1., 2.])}
     """
     path, name = Path(path), ""
     arrays: dict[str, np.ndarray] = {}
@@ -78,6 +90,10 @@ def write_array(path: str | Path, array: np.ndarray) -> None:
 
     Raises:
         OSError: with its errno, which numpy.save hides where the disk is full.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_array(f"{folder}/x.npy", np.zeros(2))
     """
     array = np.ascontiguousarray(array)
     with open(path, "wb") as stream:

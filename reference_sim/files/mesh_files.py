@@ -51,6 +51,13 @@ def read_mesh(path: str | Path) -> Surface:
     Raises:
         MeshError: missing or unreadable file, unknown format, no faces, faces with five corners or more,
             a vertex that is not finite; the message names the file.
+
+    >>> import tempfile
+    >>> from reference_sim.trajectory.point_cache import write_obj
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_obj(Path(folder, "a.obj"), np.eye(3), np.array([[0, 1, 2]]))
+    ...     read_mesh(f"{folder}/a.obj").faces
+    array([[0, 1, 2]])
     """
     path = Path(path)
     if not path.is_file():
@@ -127,6 +134,15 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
 
     Raises:
         MeshError: as `read_mesh`; no files; vertices or faces that do not correspond to the first file's.
+
+    >>> import tempfile
+    >>> from reference_sim.trajectory.point_cache import write_obj
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for frame in range(2):
+    ...         write_obj(Path(folder, f"{frame}.obj"), np.eye(3) + frame, np.array([[0, 1, 2]]))
+    ...     positions, first = read_sequence(f"{folder}/*.obj")
+    >>> positions.shape
+    (2, 3, 3)
     """
     paths = mesh_paths(str(pattern))
     first = read_mesh(paths[0])
@@ -189,6 +205,9 @@ def to_metres_y_up(positions: np.ndarray, *, units: str = "m", up: str = "y") ->
 
     Raises:
         ValueError: unknown unit or axis.
+
+    >>> to_metres_y_up(np.array([[0.0, 0.0, 170.0]]), units="cm", up="z")
+    array([[ 0. ,  1.7, -0. ]])
     """
     if units not in METRES or up not in UP_AXES:
         raise ValueError(

@@ -20,6 +20,9 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
     Raises:
         MeshError: wrong shapes, no frame, NaN, a face without area, an open, non-manifold, inconsistently
             wound or inside-out mesh; the message names vertex, face or edge, and the remedy.
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> check_closed(corners[None], np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
     """
     if positions.ndim != 3 or positions.shape[2] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise MeshError(f"obstacle {positions.shape} and faces {faces.shape}: expected (T, B, 3) and (F, 3)")

@@ -27,6 +27,9 @@ def boundary_loops(faces: Index) -> list[Index]:
 
     Raises:
         ValueError: the mesh is not manifold at its boundary.
+
+    >>> boundary_loops(np.array([[0, 1, 2], [0, 2, 3]]))
+    [array([0, 1, 2, 3])]
     """
     halves = half_edges(faces)
     size = int(faces.max()) + 1
@@ -48,7 +51,12 @@ def boundary_loops(faces: Index) -> list[Index]:
 
 
 def triangle_areas(points: Array, faces: Index) -> Array:
-    """Return the areas (F,) [m^2] of the faces (F,3) between points (V,3) [m]."""
+    """Return the areas (F,) [m^2] of the faces (F,3) between points (V,3) [m].
+
+    >>> points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    >>> triangle_areas(points, np.array([[0, 1, 2]]))
+    array([0.5])
+    """
     return corner_areas(points[faces])
 
 
@@ -61,6 +69,11 @@ def corner_areas(corners: Array) -> Array:
 
 
 def corner_angles(points: Array, faces: Index) -> Array:
-    """Return the angles (F,3) [rad] at the corners of the faces (F,3) between points (V,3) [m]."""
+    """Return the angles (F,3) [rad] at the corners of the faces (F,3) between points (V,3) [m].
+
+    >>> points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    >>> np.degrees(corner_angles(points, np.array([[0, 1, 2]]))).round(6)
+    array([[90., 45., 45.]])
+    """
     after, before = (points[np.roll(faces, -k, axis=1)] - points[faces] for k in (1, 2))
     return np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), np.sum(after * before, axis=2))

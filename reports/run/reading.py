@@ -28,6 +28,8 @@ def read_run(folder: RunFolder) -> Run:
 
     Raises:
         ResultsError: when run.json or results.csv is absent, broken or of an earlier version.
+
+    >>> run = read_run(RunFolder("reports/runs/first"))  # doctest: +SKIP
     """
     if not folder.path.is_dir():
         raise ResultsError(f"{folder.path}: no such folder")

@@ -63,6 +63,8 @@ def tailor_tunic(
     """Tailor a tunic: a longer T-shirt that widens from the waist on, so that its hem swings freely.
 
     flare: how much further [m] the hem stands off than the waist, all around. The rest: see tailor_tshirt.
+
+    >>> garment = tailor_tunic(Body.load(), vertices=300)  # takes 3 s  # doctest: +SKIP
     """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length, "flare": flare}
     return _shirt("tunic", body, vertices, cut)
@@ -80,6 +82,8 @@ def tailor_long_sleeves(
     """Tailor a shirt with long sleeves.
 
     sleeve: share of the whole arm, shoulder to wrist. The rest: see tailor_tshirt.
+
+    >>> garment = tailor_long_sleeves(Body.load(), vertices=300)  # takes 3 s  # doctest: +SKIP
     """
     cut = {"ease": ease, "clearance": clearance, "sleeve": sleeve, "length": length}
     return _shirt("long_sleeves", body, vertices, cut, end="left_wrist", bones=LONG_SLEEVE_BONES)
@@ -94,7 +98,10 @@ def tailor_tank_top(
     strap: float = 0.06,
     length: float = 0.09,
 ) -> Garment:
-    """Tailor a shirt without sleeves. strap: width of its straps [m]. The rest: see tailor_tshirt."""
+    """Tailor a shirt without sleeves. strap: width of its straps [m]. The rest: see tailor_tshirt.
+
+    >>> garment = tailor_tank_top(Body.load(), vertices=300)  # takes 3 s  # doctest: +SKIP
+    """
     cut = {"ease": ease, "clearance": clearance, "strap": strap, "length": length}
     return _sleeveless("tank_top", body, vertices, cut)
 
@@ -112,6 +119,8 @@ def tailor_dress(
     """Tailor a dress without sleeves, to above the knee, whose lower part follows both thighs.
 
     flare: how much further [m] the hem stands off than the waist, all around. The rest: see tailor_tank_top.
+
+    >>> garment = tailor_dress(Body.load(), vertices=300)  # takes 3 s  # doctest: +SKIP
     """
     cut = {"ease": ease, "clearance": clearance, "strap": strap, "length": length, "flare": flare}
     return _sleeveless("dress", body, vertices, cut, SKIRT_SMOOTHING)
@@ -140,6 +149,8 @@ def tailor_skirt(
 
     Raises:
         GarmentError: see tailor_tshirt.
+
+    >>> garment = tailor_skirt(Body.load(), vertices=300)  # takes 3 s  # doctest: +SKIP
     """
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length, "flare": flare}
     _check_ranges("skirt", {"vertices": vertices, **cut})
@@ -171,6 +182,8 @@ def tailor_trousers(
 
     Raises:
         GarmentError: see tailor_tshirt.
+
+    >>> garment = tailor_trousers(Body.load(), vertices=300)  # takes 3 s  # doctest: +SKIP
     """
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length}
     return _trousers("trousers", body, vertices, cut)
@@ -185,7 +198,10 @@ def tailor_shorts(
     rise: float = 0.17,
     length: float = 0.25,
 ) -> Garment:
-    """Tailor shorts: trousers that end above the knee. See tailor_trousers."""
+    """Tailor shorts: trousers that end above the knee. See tailor_trousers.
+
+    >>> garment = tailor_shorts(Body.load(), vertices=300)  # takes 3 s  # doctest: +SKIP
+    """
     cut = {"ease": ease, "clearance": clearance, "rise": rise, "length": length}
     return _trousers("shorts", body, vertices, cut)
 

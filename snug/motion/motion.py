@@ -191,6 +191,10 @@ def place(motion: Motion) -> Motion:
 
     The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second percentile
     of the lower foot's height over all frames is taken for the floor.
+
+    >>> from snug.motion.library import make_motion
+    >>> bool(abs(place(make_motion("walk")).translations[0, 0]) < 1e-9)
+    True
     """
     placed = turn_about_vertical(motion, -heading(motion.poses[0]))
     poses, translations = placed.poses, placed.translations

@@ -55,6 +55,10 @@ def roll_out(
 
     Raises:
         RollOutError: if the model does not fit the garment or the motion.
+
+    >>> trajectory = roll_out(TrainedModel.load("snug.safetensors"), dressed, motion)  # doctest: +SKIP
+    >>> trajectory.status  # doctest: +SKIP
+    'ok'
     """
     if not quasi_static:
         return prepare_roll_out(model, dressed, motion, betas)()

@@ -22,6 +22,9 @@ def find_energy(name: str) -> Callable[..., Energy]:
         ValueError: an unknown name, one that two have, or an energy that cannot be trained: it is made of
             more than a cloth, must be prepared for each step of a simulation (Energy.prepare), or finds its
             stencils anew as vertices move (Energy.dynamic).
+
+    >>> find_energy("strain").__name__
+    'StretchStVK'
     """
     for class_name in energies.MODULE_OF:
         getattr(energies, class_name)  # imported by it

@@ -111,7 +111,11 @@ RECIPE_OF_KIND = {
 
 
 def find_recipe(name: str) -> Recipe:
-    """Return the recipe of that name. Raises RecipeError naming the known ones."""
+    """Return the recipe of that name. Raises RecipeError naming the known ones.
+
+    >>> find_recipe("paper").window
+    3
+    """
     if name not in RECIPES:
         raise RecipeError(f"unknown recipe {name!r}: use one of {', '.join(RECIPES)}")
     return RECIPES[name]

@@ -2,7 +2,6 @@ from .checkpoint import Checkpoint as Checkpoint
 from .kinds import KINDS as KINDS
 from .losses.vertex_targets import TargetError as TargetError
 from .simulated_data import DataSet as DataSet
-from .train_network import untrained_model as untrained_model
 from .training_loop import Interrupted as Interrupted
 from .training_set import TrainingError as TrainingError
 from .validation import Validation as Validation
@@ -15,5 +14,4 @@ __all__ = [
     "TargetError",
     "TrainingError",
     "Validation",
-    "untrained_model",
 ]

@@ -73,6 +73,8 @@ def train_network(
         ValueError: TrainingError, TargetError, RecipeError, DeviceError or TensorFileError, naming what is
             missing or diverged.
         snug.training.training_loop.Interrupted: when `stop` returned True.
+
+    >>> model = train_network("snug", dressed, motions, steps=2000, seed=0)  # doctest: +SKIP
     """
     start = time.perf_counter()
     trainer = Trainer(

@@ -52,6 +52,9 @@ def program(
 
     Raises:
         DeclarationError: the command lacks {scene} or {out}.
+
+    >>> program("mine", "python mine.py {scene} {out}").role
+    'external'
     """
     for place in PLACES:
         if place not in command:
