@@ -9,11 +9,13 @@ process and is never stale, and a call costs no more than that of any other arra
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from importlib import import_module
 from typing import Any
 
 import numpy as np
+from numba import typeof
 from numba.core.dispatcher import Dispatcher
 from numba.extending import overload
 
@@ -38,22 +40,33 @@ def _load(kind: Any) -> Dispatcher:
 @njit(cache=True)
 def call_each(terms, out, *arguments):
     """Set out[k] to kernel(data, *arguments) of the k-th of terms ((kernel_argument, data), ...)."""
-    _call_from(terms, out, 0, arguments)
+    _call_from(0, terms, out, arguments)
 
 
-def _call_from(terms, out, k, arguments):
+def _call_from(first, terms, out, arguments):
     """Stand for the overload below."""
     raise NotImplementedError
 
 
-@overload(_call_from)
-def _overloaded_call_from(terms, out, k, arguments):
-    if len(terms) == 0:
-        return lambda terms, out, k, arguments: None
-    kernel = _load(terms[0][0])
+@overload(_call_from, prefer_literal=True)
+def _overloaded_call_from(first, terms, out, arguments):
+    # A slice of the tuple of terms would count the references to all of its arrays at every call.
+    at, after = first.literal_value, first.literal_value + 1
+    if at == len(terms):
+        return lambda first, terms, out, arguments: None
+    kernel = _load(terms[at][0])
 
-    def implementation(terms, out, k, arguments):
-        out[k] = kernel(terms[0][1], *arguments)
-        _call_from(terms[1:], out, k + 1, arguments)
+    def implementation(first, terms, out, arguments):
+        out[at] = kernel(terms[at][1], *arguments)
+        _call_from(after, terms, out, arguments)
 
     return implementation
+
+
+def with_types_resolved(kernel: Dispatcher, *arguments: object) -> Callable[[], object]:
+    """Return a call of a compiled kernel with these arguments that looks up no types.
+
+    For kernels among the arguments numba does so in Python at every call, which takes longer than a sweep
+    over a small mesh.
+    """
+    return partial(kernel.compile(tuple(map(typeof, arguments))), *arguments)

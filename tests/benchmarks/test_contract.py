@@ -22,6 +22,8 @@ from reference_sim import Trajectory
 from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
 
+MISBEHAVING = "tests.benchmarks.runner.misbehaving"
+
 _as_before = pytest.fixture(autouse=True)(as_before)
 
 
@@ -183,18 +185,20 @@ def test_the_check_catches_every_known_misbehaviour(how, words, tmp_path, monkey
 @pytest.mark.parametrize(("how", "words"), [("segfault", "SIGSEGV"), ("hang", "no answer within 4 s")])
 def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monkeypatch):
     entry = MethodEntry(
-        name=how, description="", module="tests.benchmarks.runner.misbehaving", options={"how": how}, declared_in="tests.benchmarks.runner.misbehaving",
+        name=how,
+        description="",
+        module=MISBEHAVING,
+        options={"how": how},
+        declared_in=MISBEHAVING,
         needs_no_obstacle=True,
-    )  # fmt: skip
+    )
     monkeypatch.setattr("benchmarks.contract.check_files.BARE", ("free_fall",))
     found = list(check_files(Declarations([entry]), tmp_path, 4.0))
     assert [fine for _, fine in found] == [False] and words in found[0][0]
 
 
 def test_the_check_says_what_is_skipped_everywhere(tmp_path):
-    entry = MethodEntry(
-        name="m", description="", module="tests.benchmarks.runner.misbehaving", package="nowhere"
-    )
+    entry = MethodEntry(name="m", description="", module=MISBEHAVING, package="nowhere")
     ((line, fine),) = check_files(Declarations([entry]), tmp_path)
     assert not fine and "is skipped in every scene: m needs the package nowhere" in line
 

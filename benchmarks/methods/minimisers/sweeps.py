@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
-from numba import typeof
-from numba.core.dispatcher import Dispatcher
 
 from reference_sim.minimise.descent import Descent
 from reference_sim.minimise.loop import iterate
@@ -62,12 +59,3 @@ class SweepSolver(ABC):
         run.x = run.swept
         run.value, run.g = run.evaluate(run.x)
         return Stop("max_iterations", f"{run.iterations} sweeps done")
-
-
-def with_types_resolved(kernel: Dispatcher, *arguments: object) -> Callable[[], object]:
-    """Return a call of a compiled kernel with these arguments that looks up no types.
-
-    For kernels among the arguments numba does so in Python at every call, which takes longer than a sweep
-    over a small mesh.
-    """
-    return partial(kernel.compile(tuple(map(typeof, arguments))), *arguments)

@@ -22,9 +22,9 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.methods.minimisers.kernels import sweep_constraints
-from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver, with_types_resolved
+from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
 from reference_sim.kernels.fast_kernels import step_terms
-from reference_sim.kernels.kernel_argument import kernel_argument
+from reference_sim.kernels.kernel_argument import kernel_argument, with_types_resolved
 from reference_sim.minimise.result import Stop
 from reference_sim.potential import Potential
 

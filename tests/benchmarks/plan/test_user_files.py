@@ -285,8 +285,8 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
     Path(home).write_text("")
     recipe = dataclasses.replace(DEFAULT, name="windy", window=4)
     entry = MethodEntry(
-        name="windy", description="", module="benchmarks.methods.networks.network", declared_in=home, needs_body=True,
-        trained="windy", training=Training("snug", recipe), options={"kind": "windy"},
+        name="windy", description="", module="benchmarks.methods.networks.network", declared_in=home,
+        needs_body=True, trained="windy", training=Training("snug", recipe), options={"kind": "windy"},
     )  # fmt: skip
     cell = Cell(of_garment("tshirt").scene("kick").at(TINY), entry, 0, ("garments",))
     plan = Plan(

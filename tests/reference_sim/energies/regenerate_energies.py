@@ -1,4 +1,6 @@
-"""python tests/reference_sim/energies/regenerate_energies.py [--write]: what changed in energies.csv, and with --write keep it.
+"""Print what changed in energies.csv; with --write keep it.
+
+    python -m tests.reference_sim.energies.regenerate_energies [--write]
 
 A change here is a change of physics or of the minimum that the solver finds: look at every line before
 keeping it, and say in the commit why it had to be.

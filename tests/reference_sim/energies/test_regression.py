@@ -28,7 +28,7 @@ def test_the_energies_are_those_that_were_kept(scene, kept):
         far = abs(value - kept[scene, frame, term])
         assert far <= TOLERANCE * sizes[scene, term], (
             f"{scene}, frame {frame}: {term} {kept[scene, frame, term]!r} -> {value!r} J; if that is meant: "
-            "python tests/reference_sim/energies/regenerate_energies.py"
+            "python -m tests.reference_sim.energies.regenerate_energies"
         )
 
 
