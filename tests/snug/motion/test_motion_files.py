@@ -1,4 +1,4 @@
-"""Files of motions: one motion in many forms, its vertical axis, its recording errors. Damage: test_fuzz.py."""
+"""Files of motions: one motion in many forms, its vertical axis, recording errors. Damage: test_fuzz.py."""
 
 import re
 from dataclasses import replace
