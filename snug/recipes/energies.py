@@ -23,8 +23,8 @@ def find_energy(name: str) -> Callable[..., Energy]:
             more than a cloth, must be prepared for each step of a simulation (Energy.prepare), or finds its
             stencils anew as vertices move (Energy.dynamic).
 
-    >>> find_energy("strain").__name__
-    'StretchStVK'
+    >>> find_energy("gravity").__name__
+    'Gravity'
     """
     for class_name in energies.MODULE_OF:
         getattr(energies, class_name)  # imported by it
