@@ -1,10 +1,10 @@
+from .declarations import DeclarationError as DeclarationError
 from .method import Method as Method
 from .method import MethodEntry as MethodEntry
 from .methods.outside.program import program as program
 from .metric import Estimate as Estimate
 from .metric import Metric as Metric
 from .metric import RollOut as RollOut
-from .registry import DeclarationError as DeclarationError
 from .scene import BuiltScene as BuiltScene
 from .scene import Scene as Scene
 from .training import Training as Training

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.contract.check_files import SECONDS, check_files, read_files
+from benchmarks.declarations import DeclarationError
 from benchmarks.process.timing import one_thread
-from benchmarks.registry import DeclarationError
 from reference_sim.command.command_line import Parser, command
 
 PROGRAM = "benchmarks.check"

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import add_scene_options, scene_fields, split
 from benchmarks.plan.plan import Plan, PlanError

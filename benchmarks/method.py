@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.registry import DeclarationError, load
+from benchmarks.declarations import DeclarationError, load
 from benchmarks.results.row import ROLES
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_option import RollOutError
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import PROGRAM, make_parser, request_of_run
 from benchmarks.plan.plan import Plan
 from benchmarks.process.timing import one_thread
-from benchmarks.registry import DeclarationError
 from benchmarks.tasks.task import RunStopped
 
 

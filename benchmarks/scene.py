@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.registry import DeclarationError, by_name, load
+from benchmarks.declarations import DeclarationError, by_name, load
 
 if TYPE_CHECKING:
     import numpy as np

@@ -2,7 +2,7 @@ from .cloth import Cloth as Cloth
 from .cloth import MeshError as MeshError
 from .material import GRAVITY as GRAVITY
 from .material import Material as Material
-from .minimise.methods import minimise as minimise
+from .minimise.minimisers import minimise as minimise
 from .minimise.result import Result as Result
 from .obstacle import Obstacle as Obstacle
 from .potential import Potential as Potential

@@ -13,7 +13,7 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.inertia import Inertia
 from reference_sim.fingerprint import fingerprint
-from reference_sim.minimise.methods import Minimiser, make_minimiser
+from reference_sim.minimise.minimisers import Minimiser, make_minimiser
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 from reference_sim.trajectory.resume import PartialRun

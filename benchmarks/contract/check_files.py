@@ -12,13 +12,13 @@ from benchmarks.cell import Cell
 from benchmarks.contract.check_method import CheckMethod
 from benchmarks.contract.check_metric import CheckMetrics
 from benchmarks.contract.check_scene import CheckScene
+from benchmarks.declarations import DeclarationError
 from benchmarks.method import MethodEntry
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Metric
 from benchmarks.plan import user_files
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.presets import find_preset
-from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.local_executor import LocalExecutor

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Findings
-from benchmarks.methods import find_method
-from benchmarks.registry import load
+from benchmarks.declarations import load
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.results.row import STATUSES
 from benchmarks.scene import Scene
 from benchmarks.tasks.task import Context, Outcome, Task

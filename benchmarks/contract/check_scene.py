@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from benchmarks.assets.inputs import FEWEST_FRAMES
 from benchmarks.cell import TaskId
 from benchmarks.contract.findings import Findings, altered, fingerprints
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.scene import BuiltScene, Scene
 from benchmarks.tasks.task import Context, Outcome, Task
 

@@ -13,13 +13,13 @@ from benchmarks import provenance
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.assets.inputs import FEWEST_FRAMES, read_inputs
 from benchmarks.cell import TaskId
+from benchmarks.declarations import by_name
 from benchmarks.method import MethodEntry
-from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.plan.make_plan import WORKERS, check_garment_name, choose_states, scenes_of_file
 from benchmarks.plan.options import split
 from benchmarks.plan.plan import Motions, Plan, PlanError
 from benchmarks.presets import find_preset
-from benchmarks.registry import by_name
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.execute_plan import executor_of
@@ -101,7 +101,7 @@ def plan_sequences(options: argparse.Namespace, command_line: Sequence[str]) -> 
         find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
     )
     if options.scheduler:
-        from benchmarks.process.scheduler import check_scheduler
+        from benchmarks.process.cluster_address import check_scheduler
 
         check_scheduler(options.scheduler)
     inputs = read_inputs(Path(options.body) if options.body else None, garment_file)

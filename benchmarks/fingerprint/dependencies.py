@@ -23,8 +23,8 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
+from benchmarks.declarations import DeclarationError
 from benchmarks.fingerprint.digest import digest, digest_of_file
-from benchmarks.registry import DeclarationError
 
 ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,7 +43,7 @@ def software(*modules: str) -> dict[str, str]:
 def code_of(*modules: str) -> dict[str, str]:
     """Return file -> digest of its code, of these modules and all of ours that they import, directly or not.
 
-    >>> "benchmarks/registry.py" in code_of("benchmarks.fingerprint.dependencies")
+    >>> "benchmarks/declarations.py" in code_of("benchmarks.fingerprint.dependencies")
     True
     """
     paths = set().union(*(_closure(find_module(module)) for module in modules))

@@ -18,9 +18,9 @@ from dataclasses import replace
 from functools import cache
 from types import ModuleType
 
+from benchmarks.declarations import DeclarationError, by_name, load
 from benchmarks.metric import Metric
 from benchmarks.metrics.cost.microbenchmarks import METRICS as OF_MICROBENCHMARKS
-from benchmarks.registry import DeclarationError, by_name, load
 
 MODULES = {
     "energy": "benchmarks.metrics.energies.energy",
@@ -28,7 +28,7 @@ MODULES = {
     "excess": "benchmarks.metrics.energies.excess",
     "curvature": "benchmarks.metrics.surface.curvature",
     "shape": "benchmarks.metrics.surface.rest_shape",
-    "geometry": "benchmarks.metrics.surface.distances",
+    "geometry": "benchmarks.metrics.surface.penetration_and_distances",
     "body": "benchmarks.metrics.surface.body_intersections",
     "optimality": "benchmarks.metrics.energies.energy_gap",
     "solver": "benchmarks.metrics.cost.relaxed_frames",

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.methods.solvers.simulation import Simulation
-from benchmarks.metrics.surface.distances import DEEP, penetration
+from benchmarks.metrics.surface.penetration_and_distances import DEEP, penetration
 from benchmarks.performance.microbenchmark import Settings
 from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene

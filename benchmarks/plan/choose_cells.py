@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from benchmarks.cell import Cell
+from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import MethodEntry
-from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE, Microbenchmark
 from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.motion_split import nearest
@@ -18,7 +19,6 @@ from benchmarks.plan.plan import Motions, PlanError
 from benchmarks.plan.roll_out_cells import roll_out_cells
 from benchmarks.plan.suites import SUITE_NAMES, SUITES, Extent, Suite
 from benchmarks.presets import PRESETS, Preset
-from benchmarks.registry import DeclarationError, by_name
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes
 from benchmarks.validation.case import METHOD

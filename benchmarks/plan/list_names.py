@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from benchmarks.method import MethodEntry
-from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.choose_cells import default_suites

@@ -165,7 +165,7 @@ def check_scheduler_fits(request: Request) -> None:
         )
     if request.roll_outs:
         raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
-    from benchmarks.process.scheduler import check_scheduler  # loads dask
+    from benchmarks.process.cluster_address import check_scheduler  # loads dask
 
     check_scheduler(request.scheduler)
 

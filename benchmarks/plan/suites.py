@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from benchmarks.methods import FURTHER_METHODS, METHODS
 from benchmarks.methods.catalogue.ablations import RECIPE_DEVIATIONS
+from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS
 from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import Preset

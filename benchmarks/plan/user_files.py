@@ -15,11 +15,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load
 from benchmarks.fingerprint.dependencies import code_of, find_module, place_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.registry import DeclarationError, by_name, demand_that_it_is, load
 from benchmarks.scene import Scene
 from benchmarks.training import Training
 

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 
 from benchmarks.assets.assets import Assets
 from benchmarks.fingerprint.digest import damaged
+from benchmarks.process.cluster_address import connect
 from benchmarks.process.errors import one_line
-from benchmarks.process.scheduler import connect
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster_worker
 from benchmarks.runner.local_executor import POLL, Bar, Done, LocalExecutor, Ready

@@ -67,7 +67,7 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
     """Return the executor of the plan's tasks. Raises RunStopped where its cluster is gone."""
     if not plan.scheduler:
         return LocalExecutor(folder, assets, plan.workers)
-    from benchmarks.process.scheduler import ClusterError
+    from benchmarks.process.cluster_address import ClusterError
     from benchmarks.runner.cluster_executor import ClusterExecutor
 
     try:

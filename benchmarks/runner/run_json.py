@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.fingerprint.digest import digest, digest_of_file
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs

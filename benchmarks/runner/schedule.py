@@ -14,7 +14,7 @@ from benchmarks.cell import Cell, flat
 from benchmarks.fingerprint.dependencies import find_module
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.metrics import MODULE_OF, names_of

@@ -17,8 +17,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.presets import PRESETS
-from benchmarks.registry import DeclarationError, by_name
 from benchmarks.scene import Scene
 from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.cell import Cell, TaskId
+from benchmarks.declarations import load
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import find_metric, modules, names_of
 from benchmarks.process.errors import one_line
-from benchmarks.registry import load
 from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder

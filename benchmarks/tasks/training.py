@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.cell import TaskId
+from benchmarks.declarations import load
 from benchmarks.fingerprint.digest import digest
-from benchmarks.registry import load
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.tasks.task import Context, Outcome, Task
 

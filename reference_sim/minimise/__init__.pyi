@@ -1,8 +1,8 @@
 from .lbfgs import LBFGS as LBFGS
-from .methods import MINIMISERS as MINIMISERS
-from .methods import Minimiser as Minimiser
-from .methods import make_minimiser as make_minimiser
-from .methods import minimise as minimise
+from .minimisers import MINIMISERS as MINIMISERS
+from .minimisers import Minimiser as Minimiser
+from .minimisers import make_minimiser as make_minimiser
+from .minimisers import minimise as minimise
 from .newton import Newton as Newton
 from .result import STATUSES as STATUSES
 from .result import Result as Result

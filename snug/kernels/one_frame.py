@@ -1,8 +1,8 @@
-"""Network and skinning of one frame as one compiled call, laid out by snug.networks.one_frame.
+"""Network and skinning of one frame as one compiled call, laid out by snug.networks.frame_layout.
 
 A frame alone is one pass over all weights, matrix after matrix: its time is that of fetching them. So each
 matrix lies in one piece, in the order of use, float32, bf16 (the upper halves of float32, as uint16) or int8
-(a factor for each row). tests/snug/networks/test_one_frame.py compares the values with torch's own modules.
+(a factor for each row). tests/snug/networks/test_frame_layout.py compares them with torch.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@
 | architectures | the table of kinds; `make_network` |
 | dressed_body, motion_features | `DressedBody`: a garment on a body, and the inputs of networks |
 | trained_model, tensor_file | `TrainedModel` and its file |
-| one_frame | a network and skinning laid out as one compiled call |
+| frame_layout | a network and skinning laid out as one compiled call |
 | roll_out | a network run over a motion, frame by frame: `snug.roll_out` |
 
 >>> from snug.networks import ARCHITECTURES, make_network

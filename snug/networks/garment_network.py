@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 
 if TYPE_CHECKING:
-    from snug.networks.one_frame import FramePlan
+    from snug.networks.frame_layout import FramePlan
 
 
 class GarmentNetwork(nn.Module):

@@ -17,7 +17,7 @@ from snug.kernels.gru import run_gru, run_linear
 from snug.networks.garment_network import GarmentNetwork, zero
 
 if TYPE_CHECKING:
-    from snug.networks.one_frame import FramePlan
+    from snug.networks.frame_layout import FramePlan
 
 HIDDEN, LAYERS = 256, 4
 

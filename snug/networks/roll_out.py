@@ -1,6 +1,6 @@
 """Roll-outs: a trained network run over a motion, one frame at a time, as an application would.
 
-Times of frames are those of network and skinning, one compiled call each (snug.networks.one_frame); their
+Times of frames are those of network and skinning, one compiled call each (snug.networks.frame_layout); their
 inputs come from `prepare_frame_inputs`. Many bodies at once go through torch.
 """
 
@@ -18,7 +18,7 @@ from reference_sim.trajectory.trajectory import Trajectory
 from snug.body.skinning import skin
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import FEATURE_SETS, DressedBody
-from snug.networks.one_frame import CompiledFrame
+from snug.networks.frame_layout import CompiledFrame
 from snug.networks.trained_model import TrainedModel
 
 WARM_UP = 10  # frames computed and thrown away, before the caller starts a clock

@@ -23,7 +23,7 @@ from snug.networks.garment_network import GarmentNetwork, zero
 from snug.networks.regressor import random_gru_state
 
 if TYPE_CHECKING:
-    from snug.networks.one_frame import FramePlan
+    from snug.networks.frame_layout import FramePlan
 
 FIT_WIDTH, WRINKLE_WIDTH = 20, 1500
 

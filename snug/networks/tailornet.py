@@ -24,7 +24,7 @@ from snug.body.parametric_body import SHAPES
 from snug.networks.garment_network import GarmentNetwork, zero
 
 if TYPE_CHECKING:
-    from snug.networks.one_frame import FramePlan
+    from snug.networks.frame_layout import FramePlan
 
 WIDTH, DROPOUT = 1024, 0.2
 SIGMA = 1.0  # of the kernel, in units of the shape numbers

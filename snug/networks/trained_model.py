@@ -10,8 +10,8 @@ from typing import Any
 from torch import Tensor
 
 from snug.networks.architectures import make_network
+from snug.networks.frame_layout import round_matrices
 from snug.networks.garment_network import GarmentNetwork
-from snug.networks.one_frame import round_matrices
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.recipes.recipe import Recipe
 
@@ -43,7 +43,7 @@ class TrainedModel:
             frames], and as `seconds/<part>` the mean time of the parts of a step.
         summary: numbers and names of high windows, of updates left out, of returns to good weights.
         unit: of the loss: joules, or a distance from the simulated vertices.
-        precision: of the matrices in roll-outs, one of snug.networks.one_frame.PRECISIONS; not in its file.
+        precision: of the matrices in roll-outs, one of frame_layout.PRECISIONS; not in its file.
 
     Example:
         >>> from snug.recipes.recipe import DEFAULT

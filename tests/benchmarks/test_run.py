@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import methods, run
-from benchmarks.methods import METHODS
+from benchmarks import run
+from benchmarks.methods.catalogue import all_methods as methods
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan.make_plan import choose_folder
 from benchmarks.plan.plan import Motions, PlanError

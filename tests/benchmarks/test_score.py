@@ -18,7 +18,7 @@ from benchmarks.external.roll_out_option import FileConventions, RollOutOption
 from benchmarks.external.scene_files import write_obj
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.fingerprint.digest import digest
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan.make_plan import make_plan

@@ -8,7 +8,7 @@ ENERGY_GAP, STEP, ENERGY, CURVATURE, DISTANCES, BODY, HEM, DYNAMICS, EXCESS, CON
     f"benchmarks/metrics/{name}.py"
     for name in (
         "energies/energy_gap", "energies/replayed_step", "energies/energy", "surface/curvature",
-        "surface/distances", "surface/body_intersections", "motion/hem", "motion/dynamics",
+        "surface/penetration_and_distances", "surface/body_intersections", "motion/hem", "motion/dynamics",
         "energies/excess", "motion/conservation",
     )
 )  # fmt: skip

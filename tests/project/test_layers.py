@@ -36,7 +36,7 @@ FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate", "refer
 # A run ends by making the report of the run that it wrote.
 EXCEPTIONS = {("benchmarks/runner/execute_plan.py", "reports.build.build_report")}
 # Headline geometry must not share an error with the physics.
-PURE = ("benchmarks/metrics/surface/curvature.py", "benchmarks/metrics/surface/distances.py")
+PURE = ("benchmarks/metrics/surface/curvature.py", "benchmarks/metrics/surface/penetration_and_distances.py")
 DECLARATION = "benchmarks.metric.Metric"  # name, unit and definition: no physics
 
 
@@ -113,7 +113,7 @@ def test_the_named_files_exist():
         ("reports/a.py", "from benchmarks import run"),
         ("reports/a.py", "import reference_sim"),
         ("reports/a.py", "from ..snug import body"),
-        ("benchmarks/metrics/surface/distances.py", "from reference_sim import Potential"),
+        ("benchmarks/metrics/surface/penetration_and_distances.py", "from reference_sim import Potential"),
     ],
 )
 def test_a_planted_import_is_found(path, source):
@@ -132,7 +132,7 @@ def test_a_planted_import_is_found(path, source):
         ("reports/a.py", "from benchmarks.results.run_folder import RunFolder\nfrom .tables import f"),
         ("reports/a.py", "def f():\n    from reference_sim.trajectory.trajectory import Trajectory"),
         (
-            "benchmarks/metrics/surface/distances.py",
+            "benchmarks/metrics/surface/penetration_and_distances.py",
             "if TYPE_CHECKING:\n    from reference_sim import Obstacle",
         ),
     ],

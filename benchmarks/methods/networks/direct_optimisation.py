@@ -26,7 +26,7 @@ from reference_sim.energies.contact_penalty.definition import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
-from reference_sim.minimise.methods import make_minimiser
+from reference_sim.minimise.minimisers import make_minimiser
 from reference_sim.potential import Potential
 from reference_sim.trajectory.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody

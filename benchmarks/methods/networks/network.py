@@ -21,7 +21,7 @@ from snug.networks.trained_model import TrainedModel
 class Network(Method):
     """Network read from its file. Features are made and the network is warmed up before run().
 
-    precision: of its matrices, one of snug.networks.one_frame.PRECISIONS.
+    precision: of its matrices, one of snug.networks.frame_layout.PRECISIONS.
     then: applied to each frame, as post-processing.
     """
 

@@ -22,7 +22,7 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
 from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
-from reference_sim.minimise.methods import Minimiser, make_minimiser
+from reference_sim.minimise.minimisers import Minimiser, make_minimiser
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 from reference_sim.trajectory.trajectory import Trajectory

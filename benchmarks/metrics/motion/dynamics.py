@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.metric import Metric
 from benchmarks.metrics.motion.hem import AFTER, HemMotion, stop_frame
-from benchmarks.metrics.surface.distances import rms
+from benchmarks.metrics.surface.penetration_and_distances import rms
 from snug.body.skeleton import rotation_matrices
 
 if TYPE_CHECKING:

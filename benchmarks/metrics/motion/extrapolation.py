@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.metric import Metric, skinned
 from benchmarks.metrics.energies import energy
-from benchmarks.metrics.surface import distances as geometry
+from benchmarks.metrics.surface import penetration_and_distances as geometry
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut

@@ -18,7 +18,7 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.material import Material
-from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 
 K = 1e-5  # [J] hinge stiffness: so small that the strip hardly sags in its own plane before it buckles

@@ -24,7 +24,7 @@ from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.material import Material
-from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.minimisers import minimise
 from reference_sim.obstacle import Planes
 from reference_sim.potential import Potential
 from reference_sim.time_loop import simulate

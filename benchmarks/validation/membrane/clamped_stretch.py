@@ -17,7 +17,7 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.material import Material
-from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 
 STRETCH = 1.2

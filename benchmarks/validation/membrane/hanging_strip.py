@@ -16,7 +16,7 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.material import GRAVITY, Material
-from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 
 E2 = 32.965  # [N/m] membrane modulus

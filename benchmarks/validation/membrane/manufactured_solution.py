@@ -20,7 +20,7 @@ from benchmarks.validation.dead_load import DeadLoad
 from reference_sim.cloth import Cloth
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.material import Material
-from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 
 CELLS = (8, 16, 32)

@@ -18,7 +18,7 @@ import torch
 from benchmarks.validation.case import Measurement
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.energy import Energy
-from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.minimisers import minimise
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 

@@ -13,7 +13,7 @@ from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.material import Material
-from reference_sim.minimise.methods import minimise
+from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 
 LBFGS_STEPS = 60

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.kernels.float32_lanes import (
+from reference_sim.kernels.float32_layout import (
     FAST,
     HALF,
     LANES_FLOAT32,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reference_sim.contact.closest_point import by_cells
-from reference_sim.kernels.float32_lanes import (
+from reference_sim.kernels.float32_layout import (
     FAST,
     LANES_FLOAT32,
     THREE,

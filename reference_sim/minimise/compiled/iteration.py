@@ -9,7 +9,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from reference_sim.kernels.float32_lanes import FAST, HALF
+from reference_sim.kernels.float32_layout import FAST, HALF
 from reference_sim.kernels.kernel_argument import call_each
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.minimise.compiled.scalar_factor import factorise, solve

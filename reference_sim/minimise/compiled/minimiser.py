@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from reference_sim.kernels.fast_kernels import StepTerms, step_terms
-from reference_sim.kernels.float32_lanes import SCRATCH, Float32Lanes, to_blocks
+from reference_sim.kernels.float32_layout import SCRATCH, Float32Lanes, to_blocks
 from reference_sim.kernels.kernel_argument import kernel_argument
 from reference_sim.minimise.compiled import iteration
 from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern

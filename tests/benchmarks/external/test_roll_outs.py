@@ -14,7 +14,7 @@ from benchmarks.external.roll_out_files import read_roll_out
 from benchmarks.external.roll_out_option import FileConventions, RollOutError, RollOutOption, parse_roll_out
 from benchmarks.external.vertex_correspondence import same_topology
 from benchmarks.meshes import torus
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.scenes.from_roll_out import declared

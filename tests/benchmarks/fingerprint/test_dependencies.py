@@ -10,7 +10,7 @@ import pytest
 from benchmarks.fingerprint import dependencies as source
 from benchmarks.fingerprint.dependencies import code_of, data_of, packages_of
 from benchmarks.fingerprint.digest import digest
-from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.metrics import MODULE_OF
 from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.scenes import FURTHER_SCENES, SCENES
@@ -31,7 +31,7 @@ FILES = {
     "reference_sim/terms/twist/lanes.py": "def make(term):\n    return 2 * term\n",
     "snug/network.py": "import torch\nfrom reference_sim.terms import Unknown\n",
     "snug/data/body.npz": "weights",
-    "benchmarks/methods/__init__.py": "from . import one, other\n",
+    "benchmarks/methods/catalogue/all_methods.py": "from . import one, other\n",
     "benchmarks/methods/one.py": (
         '"""Words."""\nfrom typing import TYPE_CHECKING\nfrom reference_sim import Cloth\n'
         "from ..scene import build\nif TYPE_CHECKING:\n    from snug.network import Network\n"

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.motion_split import split_motions

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, request_of_run

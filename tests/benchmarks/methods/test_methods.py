@@ -12,7 +12,7 @@ import pytest
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.cell import Cell
 from benchmarks.method import Method
-from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import find_preset

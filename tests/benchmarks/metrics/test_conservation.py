@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cell import Cell
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import conservation
 from benchmarks.metrics.motion.conservation import law_series

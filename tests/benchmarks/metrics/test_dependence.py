@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.assets import Assets
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.plan import Motions

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import dynamics
 from benchmarks.metrics.motion.hem import (

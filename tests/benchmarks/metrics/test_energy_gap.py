@@ -14,7 +14,7 @@ import pytest
 import torch
 from scipy.optimize import minimize
 
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.energies import energy_gap as module
 from benchmarks.metrics.energies import replayed_step

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import cylinder_patch, icosphere, right_grid, torus
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut
 from benchmarks.metrics import declared, find_metric
 from benchmarks.metrics.cost import training_distance
@@ -26,7 +26,12 @@ from benchmarks.metrics.surface.curvature import (
     histogram_distance,
     mean_curvature,
 )
-from benchmarks.metrics.surface.distances import distance_rms, hem_drift, own_part_depth, penetration
+from benchmarks.metrics.surface.penetration_and_distances import (
+    distance_rms,
+    hem_drift,
+    own_part_depth,
+    penetration,
+)
 from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
 from benchmarks.metrics.surface.self_intersections import intersecting, intersecting_share
 from benchmarks.results.row import Row

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.energies import energy, excess
 from benchmarks.metrics.motion import dynamics
 from benchmarks.metrics.motion.hem import HemMotion
 from benchmarks.metrics.surface import curvature
-from benchmarks.metrics.surface import distances as geometry
+from benchmarks.metrics.surface import penetration_and_distances as geometry
 from benchmarks.results.row import Row, as_right
 from benchmarks.runner.rows import with_uncertainty
 from benchmarks.tasks.metric_task import compared, measured

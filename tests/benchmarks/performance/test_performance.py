@@ -15,7 +15,7 @@ import pytest
 
 import snug.training.train_network
 from benchmarks import provenance, run
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metrics import find_metric
 from benchmarks.metrics.cost.microbenchmarks import METRICS, PROCESS_MEMORY

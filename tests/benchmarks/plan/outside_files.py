@@ -91,7 +91,7 @@ np.savez(sys.argv[2], positions=cloth["start_positions"] + up, seconds_per_frame
 PROGRAM_FILE = """
 import sys
 from pathlib import Path
-from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.methods.outside.program import program
 
 SCRIPT = Path(__file__).with_name("theirs_run.py")

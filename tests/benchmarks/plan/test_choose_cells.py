@@ -150,8 +150,9 @@ def test_what_no_suite_lists_is_met_by_its_whole_name():
 
 
 def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
-    from benchmarks import methods, scenes
+    from benchmarks import scenes
     from benchmarks.method import MethodEntry
+    from benchmarks.methods.catalogue import all_methods as methods
     from benchmarks.scene import Scene
 
     mine = Scene(name="my_scene", description="", module="my_scene")

@@ -11,7 +11,7 @@ import pytest
 from benchmarks import provenance
 from benchmarks.assets.inputs import Inputs, UserGarment, read_inputs
 from benchmarks.cell import Cell
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.make_plan import scenes_of_file
 from benchmarks.plan.plan import Motions, Network

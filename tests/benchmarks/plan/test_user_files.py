@@ -11,15 +11,15 @@ import pytest
 
 from benchmarks import metric, run
 from benchmarks.cell import Cell
+from benchmarks.declarations import DeclarationError
 from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
-from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.methods.outside.program import program
 from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan import user_files
 from benchmarks.plan.plan import Motions, Plan
-from benchmarks.registry import DeclarationError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from benchmarks.runner.task_inputs import declared

@@ -24,7 +24,7 @@ from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.plan.make_plan import check_scheduler_fits
 from benchmarks.plan.plan import PlanError
 from benchmarks.plan.request import Request
-from benchmarks.process import scheduler
+from benchmarks.process import cluster_address as scheduler
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster_executor as runner_side
 from benchmarks.runner import cluster_worker

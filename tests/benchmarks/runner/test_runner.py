@@ -15,7 +15,7 @@ import pytest
 
 from benchmarks import run
 from benchmarks.cell import Cell
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.assets.assets import Assets
 from benchmarks.cell import Cell
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import extrapolation

@@ -13,7 +13,7 @@ from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.assets.inputs import read_inputs
 from benchmarks.assets.liveliest_part import joint_speeds, liveliest_part
 from benchmarks.meshes import sphere, square_sheet
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metrics.surface import body_shape
 from benchmarks.plan.choose_cells import choose_suites
 from benchmarks.plan.plan import network_of

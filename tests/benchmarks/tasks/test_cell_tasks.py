@@ -14,7 +14,7 @@ import pytest
 
 from benchmarks import run
 from benchmarks.cell import Cell
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.program import program
 from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cell import Cell
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.runner.schedule import Schedule, tasks_of

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.methods import METHODS
+from benchmarks.methods.catalogue.all_methods import METHODS
 from reports.document.layout import lay_out_table
 from reports.statistics.frame_shares import share_of_frames, with_shares
 from reports.statistics.paper_claims import BEFORE, CLAIMS, counts, in_words, judged, with_before

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from benchmarks.assets.assets import Assets
-from benchmarks.methods import find_method
+from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts, skinned
 from benchmarks.metrics.motion import long_roll_out as metric
 from benchmarks.plan.choose_cells import PRESETS

@@ -7,7 +7,7 @@ import torch
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
 from snug.networks.architectures import ARCHITECTURES, make_network
-from snug.networks.one_frame import PRECISIONS, CompiledFrame, FramePlan, round_matrices, store_matrix
+from snug.networks.frame_layout import PRECISIONS, CompiledFrame, FramePlan, round_matrices, store_matrix
 from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
 from snug.networks.tailornet import FrequencyMixture
 from snug.networks.trained_model import TrainedModel

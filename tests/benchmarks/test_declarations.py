@@ -6,11 +6,12 @@ import dataclasses
 
 import pytest
 
-from benchmarks import methods, metrics, run, scenes
+from benchmarks import metrics, run, scenes
+from benchmarks.declarations import DeclarationError
 from benchmarks.fingerprint.dependencies import code_of
+from benchmarks.methods.catalogue import all_methods as methods
 from benchmarks.metric import Metric
 from benchmarks.presets import find_preset
-from benchmarks.registry import DeclarationError
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 

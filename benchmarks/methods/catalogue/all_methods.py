@@ -1,0 +1,75 @@
+"""All methods, in one visible tuple. Nothing is imported until a cell needs it.
+
+>>> len({method.name for method in METHODS}) == len(METHODS)
+True
+"""
+
+from __future__ import annotations
+
+from benchmarks.declarations import by_name
+from benchmarks.method import MethodEntry
+from benchmarks.methods.catalogue import ablations, networks
+from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
+from benchmarks.methods.catalogue.networks import network
+from benchmarks.methods.catalogue.solvers import SOLVERS, warm_started
+
+# They run when they are named: further baselines, ablations of SNUG, post-processing, the bound.
+FURTHER_METHODS = (
+    *networks.NETWORKS,
+    *ablations.RECIPES,
+    *ablations.PRECISIONS,
+    *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs", trained="snug-dynamic",
+                  pairing_group="snug"),
+    *networks.POST_PROCESSED,
+    MethodEntry(
+        name="direct-optimisation",
+        label="Vertices optimised directly",
+        description="no network: the vertices of a whole clip optimised directly, the least energy found",
+        module="benchmarks.methods.networks.direct_optimisation",
+        needs_body=True,
+        gives_first_frame=True,
+        static_known=False,
+        role="bound",
+    ),
+)  # fmt: skip
+
+METHODS = (
+    MethodEntry(
+        name="simulation",
+        label="Simulation",
+        description="the reference: backward Euler minimised to tolerance 1e-6",
+        module="benchmarks.methods.solvers.simulation",
+        role="reference",
+        conserving=True,
+    ),
+    MethodEntry(
+        name="skinning",
+        label="Skinning alone",
+        description="the garment follows the body's joints, nothing else: the free baseline",
+        module="benchmarks.methods.networks.skinning",
+        needs_body=True,
+        dtype="float32",
+        gives_first_frame=True,
+        conserving=True,
+    ),
+    network("untrained", "SNUG, untrained",
+            "the SNUG network with a random last layer (SNUG itself starts as skinning)",
+            role="baseline", conserving=False, timed=False),  # a frame of it costs what one of SNUG does
+    network("snug", "SNUG", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
+    network("supervised", "Supervised", "the SNUG network trained on simulated vertices instead"),
+    network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
+    *FURTHER_METHODS,
+    *ablations.RECIPE_DEVIATIONS,
+    *EQUAL_DATA,
+    *SOLVERS,
+)  # fmt: skip
+
+
+def find_method(name: str) -> MethodEntry:
+    """Return the entry of that name. Raises KeyError.
+
+    >>> find_method("newton-4").reporting.level
+    4
+    """
+    return by_name("method", METHODS)[name]
