@@ -1,4 +1,4 @@
-"""How a term declares its fast kernels, and how a solver or a training finds them.
+"""Declaration of a term's fast kernels, and how a solver or a training finds them.
 
 An `Energy` names in its class attribute `kernels` what it has, by use (USES): "module:function", or the name
 of a function of its own file. The module is imported when a solver asks. Nobody keeps a list of terms. Where

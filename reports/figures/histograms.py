@@ -24,7 +24,7 @@ RARE = 0.01  # [%] the lowest share that is shown
 
 
 class Histograms(Figure[Motion]):
-    """How often vertices have which mean curvature and change of area, in the motion shown at length."""
+    """Histograms over vertices of the mean curvature and change of area, in the motion shown at length."""
 
     name = "histograms"
 

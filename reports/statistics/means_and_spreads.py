@@ -50,7 +50,7 @@ class Mean:
 
     @property
     def complete(self) -> bool:
-        """Whether every cell that should have the metric has it."""
+        """True if every cell that should have the metric has it."""
         return self.missing == 0
 
     @property
