@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -57,8 +58,12 @@ class Case:
 
     def run(self) -> Row:
         """Measure here and now and return the row. What is raised becomes a failed row with its reason."""
+        from reference_sim.kernels.fast_kernels import SlowPathWarning
+
         try:
-            measured = self._imported(self.function)(**self.options)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SlowPathWarning)  # a case is not timed
+                measured = self._imported(self.function)(**self.options)
             if isinstance(measured, Measurement):
                 return self.row(measured.value, measured.status, measured.reason, terms=measured.terms)
             value, expected = measured if isinstance(measured, tuple) else (measured, self.expected)
