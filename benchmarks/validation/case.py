@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import math
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -58,11 +60,8 @@ class Case:
 
     def run(self) -> Row:
         """Measure here and now and return the row. What is raised becomes a failed row with its reason."""
-        from reference_sim.kernels.fast_kernels import SlowPathWarning
-
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SlowPathWarning)  # a case is not timed
+            with slow_paths_allowed():
                 measured = self._imported(self.function)(**self.options)
             if isinstance(measured, Measurement):
                 return self.row(measured.value, measured.status, measured.reason, terms=measured.terms)
@@ -73,7 +72,8 @@ class Case:
 
     def warm_up(self) -> None:
         """Compile what the first case of a process would otherwise compile within its deadline."""
-        self._imported("warm_up", lambda: None)()
+        with slow_paths_allowed():
+            self._imported("warm_up", lambda: None)()
 
     def judged(self, value: float, expected: float | None) -> Row:
         """Return the row of a number: ok where it is finite and within the tolerance of the expected one."""
@@ -115,6 +115,16 @@ class Case:
 
     def _imported(self, *name_and_default: Any) -> Any:
         return getattr(importlib.import_module(self.module), *name_and_default)
+
+
+@contextmanager
+def slow_paths_allowed() -> Iterator[None]:
+    """Say nothing of terms without a fast kernel: a case is not timed."""
+    from reference_sim.kernels.fast_kernels import SlowPathWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SlowPathWarning)
+        yield
 
 
 def known_answer(
