@@ -129,7 +129,7 @@ BREACHES = {
 
 
 def look(make, tmp_path, monkeypatch, scene="hanging_sheet", **fields) -> list[str]:
-    """What the check finds wrong with such a method."""
+    """Run the contract check on a method built by `make` and return the faults that it finds."""
     module = type(sys)("breaches")
     module.make = make
     monkeypatch.setitem(sys.modules, "breaches", module)

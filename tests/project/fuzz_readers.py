@@ -205,7 +205,7 @@ def read_header(path: Path) -> None:
 
 
 def read_rows(path: Path, name: str = "results.csv") -> None:
-    """That file of a run beside whole other ones; up to the tables of the report."""
+    """Read a run whose file `name` is the one at `path`, the others intact, up to the report's tables."""
     from reports.blocks.block import Report
     from reports.document.content import content
     from reports.run.reading import read_run
@@ -337,7 +337,7 @@ class Problem:
 
 
 def problem_of(reader: Reader, path: Path) -> tuple[str, bool]:
-    """What is wrong with how a file was met, or empty; and whether it was refused."""
+    """Return the fault in how `reader` handles a file (empty if none), and whether it refused the file."""
     try:
         with quiet() as noise:
             reader.read(path)

@@ -31,7 +31,7 @@ def children(pid: int) -> list[int]:
 
 
 def slope(samples: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Of the least-squares line through (x, y), and its standard error as of independent samples."""
+    """Return the slope of the least-squares line and its standard error, taking samples as independent."""
     x, y = np.array(samples, float).T
     (growth, _), covariance = np.polyfit(x, y, 1, cov=True)
     return float(growth), float(np.sqrt(covariance[0, 0]))

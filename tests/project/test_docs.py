@@ -128,7 +128,9 @@ def table_rows(path: Path) -> list[list[str]]:
 
 
 def effect_text(kind: str, metric: str, text: str) -> str:
-    """As docs/paper.md writes it: a ratio in two places, or two digits where it is small; whole points;
+    """Return an effect as docs/paper.md writes it.
+
+    A ratio in two places, or two digits where it is small; whole points;
     other differences in two places, or three below 1.
     """
     value = float(text)
@@ -170,7 +172,7 @@ def test_the_page_of_the_paper_says_what_the_published_findings_say():
 
 
 def heading_anchors(path: Path) -> set[str]:
-    """What GitHub makes of the headings of a document."""
+    """Return the anchors that GitHub makes of a document's headings."""
     titles = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.M)
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 

@@ -1,4 +1,4 @@
-"""Who may import whom, read from the syntax tree: the rules of the architecture, held by a test."""
+"""The architecture's rules of which package may import which, checked on the syntax tree."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def planted(fault: Fault | None, folder: Path) -> Path:
 
 
 def outcome(folder: Path, names: tuple[str, ...] = (), enough: int = ENOUGH) -> tuple[int, list[list[str]]]:
-    """How many checks ran in the copy, and which of them failed and why."""
+    """Run the checks in the copy; return how many ran, and those that failed with their reasons."""
     environment = os.environ | {"PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", RUNNER, json.dumps(names), str(enough)]
     try:
@@ -109,7 +109,7 @@ def test_a_fault_is_caught_by_the_check_made_for_it(fault, tmp_path):
 
 
 def notices(file: str, fault: Fault | None, folder: Path) -> bool:
-    """Whether a test of tests/<file>.py fails on the copy with the fault."""
+    """Return whether a test of tests/<file>.py fails on a copy with the fault."""
     copy = planted(fault, folder)
     shutil.copytree(ROOT / "tests", copy / "tests", ignore=shutil.ignore_patterns("__pycache__"))
     environment = os.environ | {"PYTHONPATH": str(copy), "OMP_NUM_THREADS": "1"}

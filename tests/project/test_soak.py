@@ -1,4 +1,4 @@
-"""What works for long takes no more memory than what it keeps."""
+"""Long simulations and trainings take no more memory than the results that they keep."""
 
 from __future__ import annotations
 

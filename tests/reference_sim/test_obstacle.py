@@ -27,7 +27,7 @@ def around(count: int, seed: int, low: float, high: float) -> tuple[np.ndarray, 
 
 
 def sagitta(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """How far below the true sphere the deepest face of the mesh lies [m]."""
+    """Return how far below the true sphere the deepest face of the mesh lies [m]."""
     corner = vertices[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -93,7 +93,7 @@ def skipped(reason="no body here", **more) -> Row:
 
 
 def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
-    """What run.json says of these rows."""
+    """Return the content of run.json for these rows."""
     metrics = {r.metric: r for r in sorted(rows, key=lambda r: r.metric == "energy/total")}
     cases = {
         r.scene: {

@@ -1,4 +1,4 @@
-"""What a reader would miss is found: each planted defect is one finding, and a sound run has none."""
+"""The check of a run reports each planted defect as one finding, and none in a sound run."""
 
 from __future__ import annotations
 

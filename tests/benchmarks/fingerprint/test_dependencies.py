@@ -1,4 +1,4 @@
-"""What a task depends on is found from the source: no more, so that it is kept; no less."""
+"""A task's dependencies are read from the source: all that it uses, and nothing else that would rerun it."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ class DenseStep:
 
 
 def module_is_scaled() -> bool:
-    """Whether hinges are scaled by l^2 / (4 (A1 + A2)) of the rest state, as the scene's are."""
+    """Return whether the scene scales its hinges by l^2 / (4 (A1 + A2)) of the rest state."""
     scene = small_scene("hanging_sheet", cells=2)
     return any(getattr(term, "scaling", "") == "length_area" for term in scene.energies)
 
@@ -180,7 +180,7 @@ def roll_outs(scene, *trajectories):
 
 
 def test_one_scale_serves_all_methods_of_a_scene():
-    """What the first guess lies above the reference's own steps; a method's history has no part in it."""
+    """The scale is the mean energy of first guess minus reference step; a method's history does not enter."""
     scene = small_scene("hanging_sheet", cells=4)
     x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=8, start=scene.start).positions
     wild = x + 0.05 * np.random.default_rng(0).standard_normal(x.shape)

@@ -1,4 +1,4 @@
-"""What differs by less than simulations that are as right as the reference: the column `uncertainty`."""
+"""The column `uncertainty`: the difference between the reference and equally valid simulations."""
 
 from __future__ import annotations
 

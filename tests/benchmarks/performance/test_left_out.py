@@ -1,4 +1,4 @@
-"""What a scene does not need is left out of it: not imported, not built, not evaluated."""
+"""A scene imports, builds and evaluates nothing that it does not declare."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ METHODS = (program("theirs", f"{sys.executable} -I {SCRIPT} {{scene}} {{out}}", 
 
 
 def as_before():
-    """What a test has loaded from outside is forgotten."""
+    """Restore the search path and unload the outside modules after a test that loaded them."""
     path, modules = list(sys.path), set(sys.modules)
     yield
     sys.path[:] = path

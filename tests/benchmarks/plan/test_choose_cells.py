@@ -1,4 +1,4 @@
-"""What a request becomes: cells and cases, and motions divided into training and test."""
+"""A request is resolved into cells and cases, with motions divided into training and test."""
 
 from __future__ import annotations
 

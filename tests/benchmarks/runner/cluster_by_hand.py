@@ -91,7 +91,7 @@ def cluster(folder: Path, workers: int) -> Iterator[Cluster]:
 
 
 def worker() -> int:
-    """Who has asked for this process: not its parent, which is the server that forked it."""
+    """Return the id of the process that asked for this one, not of the server that forked it."""
     asking = multiprocessing.parent_process()
     assert asking is not None and asking.pid is not None
     return asking.pid

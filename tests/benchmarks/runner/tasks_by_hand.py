@@ -42,7 +42,7 @@ def training(name: str, *motions: str, steps: int, key: str = "0", device: str =
 
 
 def context(folder, assets: Assets | None = None, **fields) -> Context:
-    """Of a process in which a task runs."""
+    """Return the context of a process in which a task runs."""
     return Context(RunFolder(folder), assets, **fields)
 
 

@@ -87,7 +87,7 @@ WORDS += ["--methods", "simulation,skinning,supervised,snug"]
 
 
 def run_dressed(folder: Path) -> dict:
-    """What the command leaves there that does not come from the clock."""
+    """Run the command into `folder` and return its rows without costs and measured times."""
     assert run.main([*WORDS, "-o", str(folder)]) == 0
     rows = RunFolder(folder).read_rows()
     kept = [row for row in rows if not row.metric.startswith("cost/") and row.unit not in ("s", "ms", "MB")]

@@ -38,7 +38,7 @@ class Add(Task):
         context.memo["done"] = [f"{self.name} begun beside {self._others(context.folder.path)}"]
 
     def _others(self, folder) -> int:
-        """How many others have begun once one has, or after a while."""
+        """Return how many other tasks have begun: wait for the first, at most 10 s."""
         (folder / self.name).touch()
         for _ in range(100):
             if (others := len(list(folder.iterdir())) - 1) > 0:

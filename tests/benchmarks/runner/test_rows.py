@@ -69,7 +69,7 @@ def test_a_time_that_cannot_be_believed_fails_the_cell():
 
 
 def rows(cell: Cell, outcome: Outcome, metrics: dict[str, float] | None = None, **more: Outcome) -> list[Row]:
-    """Of one cell with these metrics; more: outcomes of other tasks of it by kind."""
+    """Return the rows of one cell with these metrics; more: outcomes of its other tasks by kind."""
     outcomes = {("cell", cell.name): outcome} | {(kind, cell.name): other for kind, other in more.items()}
     if metrics is not None:
         outcomes["metrics", cell.name] = Outcome(result=metrics)

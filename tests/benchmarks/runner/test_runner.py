@@ -279,7 +279,7 @@ def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, m
 
 
 def test_a_dry_run_decides_as_the_run_does(tmp_path):
-    """What fails cannot be foreseen; everything else can."""
+    """A dry run foresees every decision of the run except those that follow from a failure."""
 
     def planned_and_done(dies: bool, *only: str) -> tuple[set[str], set[str]]:
         tasks = (
@@ -434,6 +434,6 @@ def test_killed_at_any_moment_a_run_ends_as_one_that_was_not(tmp_path):
 
 
 def measured(folder: Path) -> dict[tuple[str, str], tuple[float | None, str]]:
-    """What does not come from clock and process."""
+    """Return value and status of every row but the costs, which depend on clock and process."""
     rows = RunFolder(folder).read_rows()
     return {(r.method, r.metric): (r.value, r.status) for r in rows if not r.metric.startswith("cost/")}

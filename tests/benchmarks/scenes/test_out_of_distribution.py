@@ -52,7 +52,7 @@ def walk():
 
 @pytest.fixture(scope="module")
 def models(assets, walk, tmp_path_factory):
-    """Where a network with a random last layer lies."""
+    """Return the folder of a saved network with a random last layer."""
     folder = tmp_path_factory.mktemp("models")
     dressed = DressedBody(assets.body, assets.garments["tshirt"])
     untrained_model("snug", dressed, [walk], seed=0).save(model_path(folder, "snug", 0))

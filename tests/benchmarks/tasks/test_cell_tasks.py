@@ -67,13 +67,13 @@ def finish(plan: Plan, *stages: str) -> Runner:
 
 
 def outcome_of(plan: Plan, number: int = 0) -> Outcome:
-    """Of one cell, its process ended."""
+    """Run one cell to the end of its process and return its outcome."""
     one = dataclasses.replace(plan, cells=plan.cells[number : number + 1])
     return finish(one).outcomes["cell", plan.cells[number].name]
 
 
 def found_of(plan: Plan, kind: str = "cell", number: int = 0):
-    """What the folder says of a cell, or of its metrics."""
+    """Return the cache entry of a cell, or of its metrics, in the plan's folder."""
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=plan.only))
     return {task.id: found for task, found, _ in runner.preview()}[kind, plan.cells[number].name]
 

@@ -36,7 +36,7 @@ def clips_of(part: int, method: str = "simulation") -> SimulateClips:
 
 
 def still(clip, entry) -> Trajectory:
-    """What a simulation of this clip may leave."""
+    """Return a converged trajectory of this clip, every coordinate equal to the number in the clip's name."""
     positions = np.full((clip.frames, 150, 3), float(clip.name.split("_")[1]))
     faces = tube_dress().garment.faces
     return Trajectory(positions, faces, np.arange(clip.frames) / 30.0, status="converged")

@@ -118,7 +118,7 @@ def test_an_honest_failure_keeps_its_name_and_says_what_collapsed(solved):
 
 
 def test_where_collapse_pays_is_a_matter_of_two_numbers():
-    """Of every case that does not converge for want of a minimum; the ordinary sheet is far from it."""
+    """A case without a minimum has a triangle whose collapse pays; the ordinary sheet is far from that."""
     for options in ({"stiffness": 1e-2}, {"terms": "bending"}, {"bending": 1e4}, {"bending": 100.0}):
         cost, gain = collapse_energies(sheet_step(**options).potential)
         assert (gain > cost).any(), options

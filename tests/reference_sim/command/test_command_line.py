@@ -1,4 +1,4 @@
-"""What all commands share: one line and an exit status, whatever they meet."""
+"""Every command reports a user's error in one line and by its exit status, and raises a fault of its own."""
 
 from __future__ import annotations
 

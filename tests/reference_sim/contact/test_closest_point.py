@@ -89,7 +89,7 @@ def test_distances_are_those_of_libigl(name, kind):
 def one_by_one(
     positions: np.ndarray, faces: np.ndarray, points: np.ndarray, allowed: np.ndarray | None = None
 ) -> np.ndarray:
-    """Of the faces that allowed (S, F) grants, or of all, the lowest of those at the least distance (S,)."""
+    """Return the closest face (S,) among `allowed` (S, F), or among all; at a tie the lowest index."""
     corners = positions[np.sort(faces, axis=1)]
     squared = np.array([[closest_on_triangle(corners, f, *p)[2] for f in range(len(faces))] for p in points])
     if allowed is not None:

@@ -1,4 +1,4 @@
-"""What newton's solvers minimise, written from their sources in float64 on our stencils.
+"""The energies that newton's solvers minimise, written from their sources in float64 on our stencils.
 
 SolverVBD (evaluate_neo_hookean_membrane_force_hessian), per triangle of rest area A:
     E = A [mu/2 (|F|^2 - 2) + L/2 (J - a)^2] + const,  J = |f0 x f1|,  L = lambda + mu,  a = 1 + mu/L

@@ -130,7 +130,7 @@ def computed(name: str) -> Energies:
 
 
 def stored() -> Energies:
-    """What energies.csv holds."""
+    """Return the energies [J] in energies.csv by scene, frame and term."""
     with STORE.open(newline="", encoding="utf-8") as stream:
         lines = list(csv.DictReader(stream))
     return {(line["scene"], int(line["frame"]), line["term"]): float(line[COLUMNS[3]]) for line in lines}

@@ -152,7 +152,7 @@ def test_a_folded_sheet_comes_to_rest_on_itself():
 
 
 def test_without_self_contact_the_same_sheet_falls_through_itself():
-    """What the test above would miss if its sheet did not press on itself."""
+    """Without self-contact the folded sheet intersects itself: self-contact keeps its layers apart."""
     fallen, cloth, floor = fall_shut(False)
     x = fallen.positions[-1]
     assert fallen.status == "converged" and cuts(x, cloth.edges, x, cloth.faces).any()

@@ -1,4 +1,4 @@
-"""What is refused as the surface of a body, in words that name element and remedy."""
+"""A mesh that is no closed surface is refused as a body; the message names the element and the remedy."""
 
 from __future__ import annotations
 

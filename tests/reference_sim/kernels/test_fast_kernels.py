@@ -63,7 +63,7 @@ def cloth() -> Cloth:
 
 @pytest.fixture
 def told_anew():
-    """What earlier tests were told is told again."""
+    """Forget the warnings that earlier tests triggered, so that each is issued again."""
     fast_kernels._warn_once.cache_clear()
 
 

@@ -127,7 +127,7 @@ def test_no_letter_is_smaller_than_7_points(report):
 
 
 def test_pages_are_few_and_full(report):
-    """Of all but the last no third is blank at a stretch; the header and the footer do not count."""
+    """No page but the last has a blank stretch of a third of its height, header and footer not counted."""
     assert len(report) <= MOST_PAGES
     for page in list(report)[:-1]:
         image = page.render(scale=0.5).to_numpy().min(axis=(1, 2))

@@ -334,7 +334,7 @@ def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(t
 
 
 def in_browser(path: Path, script: str, folder: Path) -> dict:
-    """What the script found in the page, opened from disk in a browser without a window."""
+    """Open the page from disk in a headless browser and return the result of the script."""
     page = path.read_text(encoding="utf-8")
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
     page = page.replace("script-src '", f"script-src 'sha256-{digest}' '", 1)

@@ -1,4 +1,4 @@
-"""What the paper claims: numbers decide, after Holm; ties and what cannot be told are said."""
+"""The paper's claims get verdicts from Holm-corrected tests; ties and inconclusive results are reported."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_no_verdict_hangs_on_where_gravity_is_zero():
 
 
 def test_the_lines_of_the_table_are_one_family():
-    """What is significant by itself is not beside three that are not."""
+    """A claim that is significant alone is inconclusive once corrected for three others that are not."""
     snug, pbns = np.array((0.80, 0.82, 0.84)), np.array((0.93, 0.95, 1.02))
     alone = told(seeds("snug", snug) + seeds("pbns", pbns))[STRAIN]
     assert 0.05 / 4 < alone.p < 0.05 and alone.verdict == "holds"

@@ -26,7 +26,7 @@ from tests.reports.report_folder import row, run_of
 
 
 def mean_over(grid, method="snug"):
-    """Of rows with the values grid[motion][seed]."""
+    """Return the mean over rows with the values grid[motion][seed]."""
     rows = [
         row(f"tshirt/{m}", method, value=float(value), seed=s)
         for m, values in enumerate(np.atleast_2d(grid))
@@ -84,7 +84,7 @@ def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
 
 @pytest.mark.parametrize(("method", "freed"), [("simulation", 1 / 3), ("pbns", 1 + 1 / 3)])
 def test_one_number_beside_several_seeds(method, freed):
-    """What no seed changes is a known number; what could have seeds is one draw more of the same scatter."""
+    """A method without seeds has no scatter; one run of a seeded method is one more draw of the scatter."""
     found = effect(mean_over([[-0.4]], method), mean_over(ONE - 1.2))
     half = stats.t.ppf(0.975, 2) * ONE.std(ddof=1) * math.sqrt(freed)
     assert found.interval[1] - found.interval[0] == pytest.approx(2.0 * half, rel=NOISE)

@@ -127,7 +127,7 @@ def plain_arrays(body: Body) -> dict[str, np.ndarray]:
 
 
 def read_again(arrays: dict[str, np.ndarray]) -> Body:
-    """As a user's file gives it."""
+    """Return the body that these arrays give when written to a file and read back."""
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder) / "body.npz", **arrays)
         return read_body(Path(folder) / "body.npz")

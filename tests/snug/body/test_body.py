@@ -211,7 +211,7 @@ def small(body):
 
 @pytest.fixture(scope="module")
 def layouts(small):
-    """What users have: of the family's three sizes, plain, in an A pose, as written by the package itself."""
+    """Return arrays of the body layouts that users have: SMPL, SMPL-H, SMPL-X, A pose and plain."""
     smpl = smpl_arrays(small)
     return {
         "SMPL": smpl,

@@ -52,7 +52,7 @@ def saved(tmp_path, garment, *, positions=None, faces=None, uv=None, name="mine.
 
 
 def energies(garment):
-    """Of a garment that is a little out of shape."""
+    """Return stretching and bending energy [J] of a slightly deformed garment."""
     cloth = garment.cloth()
     x = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.003, cloth.rest_positions.shape)
     return [term(cloth).value_and_gradient(x)[0] for term in (StretchStVK, BendHinge)]

@@ -65,7 +65,7 @@ def test_each_motion_has_one_role_and_no_kind_is_in_two(library):
 
 @pytest.mark.parametrize("name", STOPPING)
 class TestStops:
-    """What moves until one frame and not at all after it."""
+    """Motions that move until one frame and hold still after it."""
 
     def test_stops_within_one_frame_and_holds(self, name):
         motion = make_motion(name)
@@ -173,7 +173,7 @@ FROZEN = {  # frames, mean sizes of rotations [rad] and of translations [m]
 
 
 def test_the_test_motions_are_frozen(library):
-    """Who changes one makes another test set: docs/protocol.md."""
+    """The test motions are those of docs/protocol.md; changing one of them makes another test set."""
     assert set(FROZEN) == set(TEST)
     for name, (frames, turn, way) in FROZEN.items():
         motion = library[name]

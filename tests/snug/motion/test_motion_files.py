@@ -26,7 +26,7 @@ def write(path, motion, turn=Y_UP, **changes):
 
 
 def refused(path, words, **reading):
-    """Whether reading the file is refused in one line that names it and holds a match of the words."""
+    """Return whether reading is refused in one line that names the file; assert that it matches `words`."""
     with pytest.raises(MotionError) as caught:
         load_motions(path, options=MotionFileOptions(**reading))
     said = str(caught.value)

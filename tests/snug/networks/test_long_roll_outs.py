@@ -33,7 +33,7 @@ def assets_of(dressed, *motions):
 
 
 def found_of(scene, x):
-    """What is measured of the kept frames x (T,V,3) [m]."""
+    """Return the metric's measurements of the kept frames x (T,V,3) [m]."""
     group = SceneRollOuts(scene)
     trajectory = Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
     group.roll_outs.append(RollOut(group, find_method("snug"), trajectory))

@@ -1,4 +1,4 @@
-"""What windows start from: the state that the network last had after the frame before."""
+"""Training windows start from the network's latest hidden state after the preceding frame."""
 
 from __future__ import annotations
 
