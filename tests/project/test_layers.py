@@ -28,7 +28,6 @@ ALLOWED = {
         "reference_sim.files.array_file",
         "reference_sim.trajectory.point_cache",
         "reference_sim.files.atomic_files",
-        "reference_sim.cloth",  # what lies under the skin is looked up as the simulator does
         "reference_sim.obstacle",
     ),
 }
