@@ -136,8 +136,8 @@ def effect_text(kind: str, metric: str, text: str) -> str:
     value = float(text)
     if kind == "difference":
         places = 0 if "%" in metric else 2 if abs(value) >= 1.0 else 3
-        return re.sub(r"^(-?)0\.", r"\1.", f"{value:.{places}f}")
-    return (f"{value:.2f}" if value >= 0.1 else f"{value:.2g}").removeprefix("0")
+        return f"{value:.{places}f}"
+    return f"{value:.2f}" if value >= 0.1 else f"{value:.2g}"
 
 
 def test_the_page_of_the_paper_counts_its_own_verdicts():
