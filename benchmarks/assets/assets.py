@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Assets:
-    """A body, its garments and the motions, all by name; each motion at most `preset.frames` long.
+    """A body, its garments and the motions, all by name; each as long as the preset lets it be.
 
     clips: motion -> frames of its liveliest part. bodies: motion or clip -> posed body (T,B,3) [m], where
     ready made.
@@ -66,14 +66,16 @@ def open_assets(
     garments: Iterable[str],
     *,
     inputs: Inputs | None = None,
+    training: Collection[str] = (),
 ) -> Assets:
     """Tailor these garments and no others to the body, and cut motions to the preset's length.
 
     Args:
-        preset: vertices of a garment, frames of a motion and of a clip.
+        preset: vertices of a garment, frames of a motion, of one that trains, and of a clip.
         motions: at their full length.
         garments: names of templates, or that of the user's garment, which is taken as read.
         inputs: the user's body and garment; without them the package's body.
+        training: names of the motions that train.
 
     Raises:
         ValueError: a garment that cannot be tailored to this body.
@@ -91,7 +93,8 @@ def open_assets(
         else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
         for name in garments
     }
-    whole = [motion.cut(0, preset.frames) for motion in motions]
+    longest = {True: preset.train_frames, False: preset.frames}
+    whole = [motion.cut(0, longest[motion.name in training]) for motion in motions]
     clips = {
         motion.name: liveliest_part(wearer, motion, preset.clip_frames, preset.warm_up_frames)
         for motion in whole

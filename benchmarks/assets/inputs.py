@@ -121,12 +121,14 @@ def _read_motions(paths: Sequence[str], options: MotionFileOptions | None) -> di
     files = [path for path in paths if path != LIBRARY]
     if not files:
         return motions
-    from snug.motion import library
     from snug.motion.files import load_motions  # its readers are slow to load
+    from snug.motion.library import LIBRARY as MADE
+    from snug.motion.recorded.table import CLIPS
 
     for path in files:
         for motion in load_motions(path, options=options):
-            if motion.name in motions or motion.name in library.LIBRARY:
+            # A file of a recorded clip's name takes the clip's place.
+            if motion.name in motions or (motion.name in MADE and motion.name not in CLIPS):
                 raise InputError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST_FRAMES:
                 raise InputError(

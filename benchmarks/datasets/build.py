@@ -96,9 +96,13 @@ def plan_sequences(options: argparse.Namespace, command_line: Sequence[str]) -> 
         worn = (of_garment(options.garment),)
     if why := methods[options.method].skip(worn[0].scene("")):
         raise PlanError(f"--method {options.method}: {why}")
-    motions = choose_sequences(options, dynamic=worn[0].dynamic)
+    motions = choose_sequences(options)
     preset = replace(
-        find_preset("quick"), garment_vertices=options.vertices, frames=LONGEST, settle_frames=options.settle
+        find_preset("quick"),
+        garment_vertices=options.vertices,
+        frames=LONGEST,
+        train_frames=LONGEST,
+        settle_frames=options.settle,
     )
     if options.scheduler:
         from benchmarks.process.cluster_address import check_scheduler
@@ -118,7 +122,7 @@ def plan_sequences(options: argparse.Namespace, command_line: Sequence[str]) -> 
     return plan, methods[options.method]
 
 
-def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str, Motion]:
+def choose_sequences(options: argparse.Namespace) -> dict[str, Motion]:
     """Return name -> motion of each sequence. Raises ValueError for names that come twice, and for none."""
     from snug.motion import library
     from snug.motion.files import load_motions
@@ -126,8 +130,7 @@ def choose_sequences(options: argparse.Namespace, *, dynamic: bool) -> dict[str,
 
     reading, given = parse_motion_options(options), list[Motion]()
     for path in options.motions or ["library"]:
-        names = library.DYNAMIC_TRAIN if dynamic else library.TRAIN
-        given += embedded_motions(names) if path == "library" else load_motions(path, options=reading)
+        given += embedded_motions(library.TRAIN) if path == "library" else load_motions(path, options=reading)
     count = len(given) if options.sequences is None else options.sequences
     if more := max(0, count - len(given)):
         turn, lifted = DEFAULT.mixed_turn, DEFAULT.mixed_lift

@@ -20,7 +20,7 @@ from snug.training.checkpoint import Checkpoint
 from snug.training.train_network import train_network
 from snug.training.validation import Validation
 
-HELD_OUT = "lunge"  # the training motion that is rolled out
+HELD_OUT = "05_14"  # the training motion that is rolled out
 POINTS = 60  # of the curve
 CLOSE = (3, 1)  # [%] of the last value within which a curve counts as there
 PAPER_SECONDS = 2 * 3600.0  # of the paper's training, on a GPU

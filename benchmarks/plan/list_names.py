@@ -18,7 +18,8 @@ from benchmarks.validation.registry import CASES
 
 def list_names() -> str:
     """Return suites, scenes, methods, motions and presets, one line each."""
-    from snug.motion.library import DYNAMIC_TEST, DYNAMIC_TRAIN, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
+    from snug.motion.library import CONTROL, DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
+    from snug.motion.recorded.table import CLIPS
 
     swinging = dict.fromkeys(DYNAMIC_TEST, "test") | dict.fromkeys(DYNAMIC_VALIDATION, "validation")
     roles = dict.fromkeys(TEST, "test") | dict.fromkeys(VALIDATION, "validation") | swinging
@@ -45,8 +46,11 @@ def list_names() -> str:
             "methods, and the suites in which they take part without being named",
             ((m.name, f"{m.description} {_where(m)}") for m in METHODS),
         ),
-        ("training motions", ((name, "") for name in TRAIN)),
-        ("training motions of garments with dynamics", ((name, "") for name in DYNAMIC_TRAIN)),
+        (
+            "training motions",
+            ((name, f"{CLIPS[name].content}, {CLIPS[name].frames} frames") for name in TRAIN),
+        ),
+        ("motions without a role", ((name, "") for name in CONTROL)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
         (f"microbenchmarks of suite {SUITE}", {b.name: b.description for b in MICROBENCHMARKS}.items()),

@@ -29,51 +29,47 @@ def split_motions(
         validation_names: motions that validate; without any, those of the library do.
         split: the role whose motions are measured, "test" or "validation".
 
-    Validation and test motions of the library never train, and its test motions never validate. Where
-    nothing is left to train on, the library trains.
+    Validation and test motions of the library never train, and its test motions never validate: where a part
+    of a recorded clip is measured, no other part of that clip trains. Where nothing is left to train on, the
+    library trains.
 
     Raises:
         PlanError: a name that no motion has, or a split without motions.
     """
-    from snug.motion.library import (
-        DYNAMIC_TEST,
-        DYNAMIC_TRAIN,
-        DYNAMIC_VALIDATION,
-        TEST,
-        TRAIN,
-        VALIDATION,
-    )
+    from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION
+    from snug.motion.recorded.table import clip_of
 
     with_library = library or not files
-    names = [*sorted(files), *((*TRAIN, *VALIDATION, *TEST) if with_library else ())]
+    learned = dict.fromkeys((*sorted(files), *(TRAIN if with_library else ())))
+    names = list(dict.fromkeys((*learned, *(LIBRARY if with_library else ()))))
     for option, chosen in (("--test-motions", test_names), ("--validation-motions", validation_names)):
         for name in chosen:
             if name not in names:
                 raise PlanError(f"{option}: unknown motion '{name}'; {nearest(name, names)}")
+    tested = {clip_of(name) for name in (*test_names, *(TEST if with_library else ()))}
     for name in validation_names:
-        if name in (*test_names, *TEST):
+        if clip_of(name) in tested:
             raise PlanError(f"--validation-motions: '{name}' is a test motion; choose others")
     # Whoever names motions means all of them, whatever the size of the preset.
     few, fewer = preset.train_motions, preset.test_motions
     test = tuple(name for name in names if name in test_names)
     if not test:
-        test = TEST[:fewer] if with_library else tuple(n for n in names if n not in validation_names)[:1]
+        test = TEST[:fewer] if with_library else tuple(n for n in learned if n not in validation_names)[:1]
     validation = tuple(name for name in names if name in validation_names)
     if with_library and not validation:
         validation = tuple(name for name in VALIDATION if name not in test)[:fewer]
-    held_out = (*test, *validation, *VALIDATION, *TEST)
-    train = tuple(name for name in names if name not in held_out)
+    of_library = (*VALIDATION, *TEST) if with_library else ()
+    held_out = {clip_of(name) for name in (*test, *validation, *of_library)}
+    train = tuple(name for name in learned if clip_of(name) not in held_out)
     train = train or tuple(name for name in TRAIN if name not in held_out)
     motions = Motions(
         train=train[:few],
         test=test,
         files=tuple(files),
-        dynamic_train=DYNAMIC_TRAIN[:few],
         dynamic_test=DYNAMIC_TEST[:fewer],
         validation=validation,
         dynamic_validation=DYNAMIC_VALIDATION[:fewer],
         split=split,
-        chosen=bool(files or library or (test_names if split == "test" else validation_names)),
     )
     if not motions.measured:
         raise PlanError(f"--split {split}: no motion has this role; name some by --{split}-motions")

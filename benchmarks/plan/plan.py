@@ -69,21 +69,19 @@ class Network:
 class Motions:
     """Names of the motions of a run by their roles.
 
-    files: those that came from a user's files. dynamic_*: the same for garments that swing. worn: the
+    files: those that came from a user's files. dynamic_*: those measured of garments that swing. worn: the
     garments of the run; the first is that of a run where none is named. split: the role whose motions stand
-    in the suites' scenes, "test" or "validation"; chosen: whether the user has named those.
+    in the suites' scenes, "test" or "validation".
     """
 
     train: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
     files: Collection[str] = ()
-    dynamic_train: tuple[str, ...] = ()
     dynamic_test: tuple[str, ...] = ()
     worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
     validation: tuple[str, ...] = ()
     dynamic_validation: tuple[str, ...] = ()
     split: str = "test"
-    chosen: bool = False
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -100,7 +98,7 @@ class Motions:
         roles = {
             "test": (*self.test, *self.dynamic_test),
             "validation": (*self.validation, *self.dynamic_validation),
-            "training": (*self.train, *self.dynamic_train),
+            "training": self.train,
         }
         return next((role for role, names in roles.items() if motion in names), "")
 
@@ -108,10 +106,6 @@ class Motions:
     def first_garment(self) -> str:
         """The name of the first one."""
         return self.worn[0].garment
-
-    def train_of(self, garment: str) -> tuple[str, ...]:
-        """Return the names of the motions that networks of a garment train on."""
-        return self.dynamic_train if of_garment(garment, self.worn).dynamic else self.train
 
     def validation_of(self, garment: str) -> tuple[str, ...]:
         """Return the names of a garment's validation motions."""
@@ -187,11 +181,13 @@ class Plan:
         from benchmarks.assets.assets import embedded_motions, open_assets  # loads numpy
 
         names = [name for garment in self.garments for name in self.motions_of(garment)]
-        names += [name for network in self.networks for name in self.motions.train_of(network.garment)]
+        if self.networks:
+            names += self.motions.train
         names, read = list(dict.fromkeys(names)), self.inputs.motions
         motions = [read[name] for name in names if name in read]
         motions += embedded_motions(name for name in names if name not in read)
-        return open_assets(self.preset, motions, self.garments, inputs=self.inputs)
+        train = self.motions.train
+        return open_assets(self.preset, motions, self.garments, inputs=self.inputs, training=train)
 
 
 def check_names(cells: Sequence[Cell]) -> None:

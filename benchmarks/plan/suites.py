@@ -49,17 +49,11 @@ class Suite:
 
 # --- garments ----------------------------------------------------------------------------------------------
 
-FEW_MOTIONS = 3
-
 
 def _whole_motions(extent: Extent) -> list[str]:
-    """Return scenes of the first garment in each motion of the split, and of garments that swing at paper.
-
-    The quick subset has FEW_MOTIONS of them, unless the user has named motions.
-    """
+    """Return scenes of the first garment in each motion of the split, and of garments that swing at paper."""
     first, *others = extent.motions.worn
-    count = None if extent.full or extent.motions.chosen else FEW_MOTIONS
-    names = [first.scene(name).name for name in extent.motions.measured[:count]]
+    names = [first.scene(name).name for name in extent.motions.measured]
     names += [there_and_back(name, first.garment).name for name in extent.motions.measured[:1]]
     if extent.further:
         names += [o.scene(name).name for o in others if o.dynamic for name in extent.motions.dynamic_measured]

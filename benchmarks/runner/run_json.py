@@ -53,7 +53,7 @@ class RunLog:
                 f"{what} {garment}": list(names(garment))
                 for garment in plan.garments
                 for what, names in (
-                    ("train", plan.motions.train_of),
+                    ("train", lambda _: plan.motions.train),
                     ("validation", plan.motions.validation_of),
                     ("test", plan.motions.test_of),
                 )

@@ -32,6 +32,7 @@ from benchmarks.tasks.microbenchmark import RunMicrobenchmark
 from benchmarks.tasks.task import Task
 from benchmarks.tasks.training import LONGEST, TrainNetwork
 from benchmarks.training import Simulated
+from snug.motion.recorded.table import CLIPS
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
@@ -288,13 +289,14 @@ class Schedule:
     # --- facts of the plan ---------------------------------------------------------------------------------
 
     def _frames(self, motion: str) -> int:
-        """Return the frames of a motion, as far as progress goes: the library's have some hundred."""
-        files = self.plan.inputs.motions
-        return min(self.preset.frames, files[motion].frames if motion in files else 100)
+        """Return the frames of a motion, as far as progress goes: those made by code have some hundred."""
+        files, train = self.plan.inputs.motions, self.plan.motions.train
+        frames = files[motion].frames if motion in files else CLIPS[motion].frames if motion in CLIPS else 100
+        return min(self.preset.train_frames if motion in train else self.preset.frames, frames)
 
     def _learned(self, network: Network) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the motions that a network trains on, and those that stop its training."""
-        motions, training = self.plan.motions.train_of(network.garment), network.training
+        motions, training = self.plan.motions.train, network.training
         count = training.held_out if training and training.held_out < len(motions) else 0
         last = len(motions) - count
         return motions[:last], motions[last:] if training and training.converged else ()

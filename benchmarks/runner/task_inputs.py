@@ -53,7 +53,8 @@ class TaskInputs:
 
     def of_body(self, garment: str) -> dict[str, Any]:
         """Return the inputs that the assets are made from."""
-        sizes = {"vertices": self.preset.garment_vertices, "frames": self.preset.frames, "garment": garment}
+        names = ("garment_vertices", "frames", "train_frames")
+        sizes = {name: getattr(self.preset, name) for name in names} | {"garment": garment}
         digests: dict[str, str] = {}
         if user_body := self.plan.inputs.body:
             digests["body"] = user_body.digest

@@ -11,7 +11,7 @@ from typing import Any
 from benchmarks.presets import Dependence
 from benchmarks.scene import Scene
 
-WALK = "walk"  # a training motion: what breaks here breaks next to what was learned
+WALK = "walk"  # made by code, without a role; walks of recordings train: what breaks here breaks next to them
 ORDINARY = "out_of_distribution/ordinary"
 
 

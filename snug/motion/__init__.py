@@ -4,7 +4,8 @@
 | --- | --- |
 | motion | `Motion`, and operations on one: resample, place, mirror, spread arms |
 | library | the motions of the package by name and role; `make_motion` |
-| clips | tables of angles that the library is made of |
+| clips | tables of angles that the motions made by code consist of |
+| recorded | recorded clips of the library, under their own notice |
 | files | `load_motions`: a user's files, checked and ready to use |
 | options | facts that a file does not state, such as its vertical axis |
 | formats | the table of readers: acclaim, bvh, smpl_arrays; joint_names matches foreign skeletons |
@@ -13,7 +14,7 @@
 
 >>> from snug.motion import LIBRARY, make_motion
 >>> len(LIBRARY)
-38
+99
 >>> kick = make_motion("kick")
 >>> kick.poses.shape, kick.fps
 ((78, 24, 3), 30.0)

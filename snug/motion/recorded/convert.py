@@ -30,7 +30,7 @@ OPTIONS = MotionFileOptions(repair=True)
 
 
 def convert(file: Path) -> tuple[Motion, list[tuple[str, str, str, str]]]:
-    """Return a clip at 30 fps, repaired, placed, its arms clear, and the repairs: clip, rate, joint, frames."""
+    """Return a clip as the library has it, and its repairs: clip, rate [1/s], joint and frames of each."""
     recorded = READERS[file.suffix](file, OPTIONS)
     read = read_motion(file, OPTIONS)
     sampled = resample(read)
@@ -49,7 +49,7 @@ def convert(file: Path) -> tuple[Motion, list[tuple[str, str, str, str]]]:
 def _repairs(
     clip: str, before: np.ndarray, after: np.ndarray, fps: float
 ) -> Iterator[tuple[str, str, str, str]]:
-    """Yield clip, rate [1/s], joint and frames where rotations (T,24,3) differ; hands are damped, not named."""
+    """Yield clip, rate, joint and frames where rotations (T,24,3) differ; hands were damped, not repaired."""
     changed = (np.abs(after - before) > 1e-9).any(axis=2)
     changed[:, HANDS] = False
     for joint in np.flatnonzero(changed.any(axis=0)):

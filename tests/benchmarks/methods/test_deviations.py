@@ -25,7 +25,7 @@ NAMES = {
 
 def chosen(*methods, **changes):
     words = {"suites": ("garments", "extremes"), "preset": find_preset("paper")} | changes
-    motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
+    motions = Motions(("walk",), ("kick",), {}, ("twist_stop",))
     cells = choose_cells(Selection(motions=motions, methods=methods, **words))[0]
     return {cell.method for cell in cells}
 
@@ -49,7 +49,7 @@ def test_a_recipe_is_never_chosen_by_the_test_motions():
     words = [word for line in EXAMPLES.splitlines() if "snug-without" in line for word in line.split()]
     assert words and "--split validation" in EXAMPLES and "--test-motions" not in words
     motions = split_motions([], [], find_preset("quick"), split="validation")
-    assert motions.measured == VALIDATION and not set(TEST) & {*motions.measured, *motions.train}
+    assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
     with pytest.raises(PlanError, match="'dance_turn' is a test motion"):
         split_motions([], [], find_preset("quick"), validation_names=["dance_turn"], split="validation")
 

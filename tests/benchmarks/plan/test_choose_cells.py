@@ -10,7 +10,6 @@ from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.plan import Motions, PlanError
-from benchmarks.plan.suites import FEW_MOTIONS
 from benchmarks.presets import find_preset
 from benchmarks.validation.stress.cases import MAPS
 
@@ -104,26 +103,26 @@ def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is
 
 
 def dynamic(suites, **changes):
-    motions = Motions(("walk",), ("kick",), {}, ("walk",), ("twist_stop",))
+    motions = Motions(("walk",), ("kick",), {}, ("twist_stop",))
     words = {name: tuple(value) for name, value in changes.items()}
     return choose_cells(
         Selection(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **words)
     )[0]
 
 
-def test_the_quick_subset_has_some_motions_and_all_where_the_suite_or_they_are_named():
+def test_preset_quick_has_eight_motions_preset_paper_all_and_either_those_that_are_named():
     def motions(full=False, preset="quick", **choice):
         of = split_motions([], choice.get("tests", []), find_preset(preset), **choice.get("split", {}))
         request = Selection(suites=("garments",), full=full, preset=find_preset(preset), motions=of)
         return {cell.scene.motion for cell in choose_cells(request)[0] if cell.scene.part == "whole"}
 
     everything = set(split_motions([], [], find_preset("quick")).test)
-    assert len(everything) == 5 and motions(full=True) == motions(preset="paper") >= everything
-    assert motions() < everything and len(motions()) == FEW_MOTIONS
+    assert len(everything) == 8 and motions() == motions(full=True) == everything < motions(preset="paper")
+    assert len(motions(preset="paper")) == 22
     named = ["kick", "punch", "walk", "bow"]
     assert motions(tests=named) == set(named)
     assert motions(split={"validation_names": named, "split": "validation"}) == set(named)
-    assert len(motions(tests=["walk"], split={"split": "validation"})) == FEW_MOTIONS
+    assert len(motions(tests=["walk"], split={"split": "validation"})) == 8
 
 
 def test_networks_of_a_second_garment_are_left_out_with_a_reason_until_its_scenes_are_named():
@@ -178,13 +177,14 @@ def test_motions_are_divided_as_help_says():
 
     quick = find_preset("quick")
     library = split_motions([], [], quick)
-    assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
-    assert library.files == () and library.measured == TEST
+    assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION[:8], TEST[:8])
+    assert library.files == () and library.measured == TEST[:8]
+    assert split_motions([], [], find_preset("paper")).test == TEST
     moved = split_motions([], ["walk", "kick"], quick)
-    assert moved.test == ("walk", "kick") and "kick" not in moved.validation
+    assert set(moved.test) == {"walk", "kick"} and "kick" not in moved.validation
     assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
     other = split_motions([], [], quick, validation_names=["bow"], split="validation")
-    assert (other.validation, other.test, other.measured) == (("bow",), TEST, ("bow",))
+    assert (other.validation, other.test, other.measured) == (("bow",), TEST[:8], ("bow",))
     assert not {"bow", *VALIDATION, *TEST} & set(other.train)
     small = split_motions([], [], SMOKE)
     assert (len(small.train), len(small.test)) == (SMOKE.train_motions, SMOKE.test_motions)
@@ -197,14 +197,22 @@ def test_motions_are_divided_as_help_says():
     chosen = split_motions(clips, ["c", "b"], quick)
     assert (chosen.train, chosen.test) == (("a",), ("b", "c"))
     both = split_motions(clips, [], quick, library=True)
-    assert both.train == ("a", "b", "c", *TRAIN) and both.test == TEST
+    assert both.train == ("a", "b", "c", *TRAIN) and both.test == TEST[:8]
     single = split_motions("a", [], quick)
     assert (single.train, single.test) == (TRAIN, ("a",))
     roles = split_motions(clips, ["b"], quick, validation_names=["a", "c"])  # none is left to train on
     assert (roles.train, roles.validation, roles.test) == (TRAIN, ("a", "c"), ("b",))
     assert [roles.role_of(name) for name in ("a", "b", "walk", "kick")] == [
-        "validation", "test", "training", "",
+        "validation", "test", "", "",
     ]  # fmt: skip
+    # A user's files of clips whose parts are measured do not train, nor does the library's.
+    own = split_motions(["01_01", "05_02", "05_12", "a"], [], quick, library=True)
+    assert own.train[:2] == ("05_12", "a") and not {"01_01", "05_02"} & set(own.train)
+    alone = split_motions(["01_01", "05_02", "05_12"], ["05_12"], quick)
+    assert (alone.train, alone.test) == (("01_01", "05_02"), ("05_12",))
+    assert "05_12" not in split_motions(["05_12"], [], quick).train
+    whole = split_motions([], ["01_01", "05_04"], quick)
+    assert set(whole.test) == {"01_01", "05_04"} and "05_04" not in whole.train
     for words, said in (
         ({"test_names": ["a"], "validation_names": ["a"]}, "'a' is a test motion"),
         ({"test_names": [], "validation_names": ["d"]}, "--validation-motions: unknown motion 'd'"),

@@ -1,0 +1,143 @@
+"""Recorded clips of the library: composition, roles, frozen content, and that no recording error is left."""
+
+import re
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.presets import find_preset
+from snug.body.skeleton import rotation_matrices, sole_points
+from snug.motion.library import (
+    CONTROL,
+    DYNAMIC_TEST,
+    DYNAMIC_VALIDATION,
+    LIBRARY,
+    TEST,
+    TRAIN,
+    VALIDATION,
+    make_motion,
+)
+from snug.motion.motion import arm_clearance, joint_speeds
+from snug.motion.raw_motion import RawMotion
+from snug.motion.recorded.convert import TURN_LIMIT
+from snug.motion.recorded.table import CLIPS, CLIPS_FILE, SEGMENTS, SEGMENTS_OF, clip_of, digest_of
+from snug.motion.recording_errors import MAX_TURN_SPEED, remove_recording_errors
+
+ROOT = Path(__file__).resolve().parents[3]
+NOTICE = "snug/motion/recorded/NOTICE.md"
+# What a public re-implementation of the paper's recipe trains on, and validates with.
+THEIR_TRAINING = {"02_04", "02_05", "05_12", "05_13", "05_14", "05_20"}
+MEASURED = [name for name in (*VALIDATION, *TEST) if clip_of(name) in CLIPS]
+
+
+@pytest.fixture(scope="module")
+def clips():
+    return {name: make_motion(name) for name in CLIPS}
+
+
+def test_each_motion_has_one_role_and_no_clip_has_frames_in_two():
+    roles = {
+        "training": TRAIN,
+        "validation": (*VALIDATION, *DYNAMIC_VALIDATION),
+        "test": TEST,
+        "none": CONTROL,
+    }
+    names = [name for role in roles.values() for name in role]
+    assert len(set(names)) == len(names) and set(DYNAMIC_TEST) < set(TEST)
+    clips_of = {role: {clip_of(name) for name in names} for role, names in roles.items()}
+    assert sum(map(len, clips_of.values())) == len(set().union(*clips_of.values()))
+    assert set(CLIPS) < set().union(*clips_of.values())
+    assert set(LIBRARY) == {*names, *CLIPS}
+
+
+def test_the_library_has_the_composition_that_the_protocol_states():
+    frames = {name: SEGMENTS[name].stop - SEGMENTS[name].start for name in SEGMENTS}
+    frames |= {name: clip.frames for name, clip in CLIPS.items()}
+    assert len(TRAIN) == 34 and sum(frames[name] for name in TRAIN) == 6268
+    assert set(TRAIN) >= THEIR_TRAINING
+    recorded = [name for name in TEST if name in frames]
+    assert len(TEST) == 22 and len(recorded) == 17 and sum(frames[name] for name in recorded) == 1699
+    assert {"01_01", "07_02"} <= {clip_of(name) for name in recorded}
+    assert len(MEASURED) - len(recorded) == 6
+    assert all(90 <= frames[name] <= 150 for name in MEASURED if name != "07_02")
+    eight = TEST[: find_preset("quick").test_motions]
+    assert len(eight) == 8 and "01_01_a" in eight and 3 <= len(set(eight) & set(recorded)) <= 5
+
+
+def test_test_motions_have_kinds_that_no_training_motion_has(clips):
+    known = {clips[name].kind.split(",")[0] for name in TRAIN}
+    new = {make_motion(name).kind.split(",")[0] for name in TEST} - known
+    assert {"sword play", "basketball: shot after a dribble", "cartwheel lean"} <= new
+
+
+def test_the_clips_are_frozen(clips):
+    for name, clip in CLIPS.items():
+        motion = clips[name]
+        found = digest_of(motion.poses.astype(np.float32), motion.translations.astype(np.float32))
+        assert (motion.frames, found) == (clip.frames, clip.digest), name
+
+
+@pytest.mark.parametrize("name", CLIPS)
+def test_a_clip_is_a_person_on_the_floor_without_recording_errors(name, clips):
+    motion = clips[name]
+    assert motion.name == name and motion.fps == 30.0 and motion.kind == CLIPS[name].content
+    assert joint_speeds(motion).max() < TURN_LIMIT < MAX_TURN_SPEED
+    raw = RawMotion(
+        path=CLIPS_FILE, poses=motion.poses, translations=motion.translations, fps=30.0, source=""
+    )
+    assert remove_recording_errors(raw, repair=False, turn_limit=TURN_LIMIT) is raw
+    lowest = sole_points(motion.poses, motion.translations)[..., 1].min(axis=1)
+    assert abs(np.percentile(lowest, 2.0)) < 1e-6
+    assert (arm_clearance(motion).min(axis=1) > np.radians(25.0)).mean() >= 0.95
+    np.testing.assert_allclose(motion.translations[0, [0, 2]], 0.0, atol=1e-6)
+
+
+def test_a_stricter_limit_finds_what_the_usual_one_lets_pass():
+    poses, way = np.zeros((30, 24, 3)), np.zeros((30, 3))
+    poses[15, 16, 0] = np.radians(70.0)  # 37 rad/s
+    raw = RawMotion(path=Path("turn.npz"), poses=poses, translations=way, fps=30.0, source="turn.npz")
+    assert remove_recording_errors(raw, repair=True) is raw
+    repaired = remove_recording_errors(raw, repair=True, turn_limit=TURN_LIMIT)
+    assert not repaired.poses.any() and "left_shoulder jumps in frames 13-17" in repaired.source
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_a_segment_starts_at_the_origin_facing_forward_on_the_clips_floor(name, clips):
+    motion, clip = make_motion(name), clips[clip_of(name)]
+    _, start, stop = SEGMENTS.get(name, (name, 0, clip.frames))
+    assert motion.name == name and motion.frames == stop - start
+    np.testing.assert_allclose(motion.translations[0, [0, 2]], 0.0, atol=1e-6)
+    np.testing.assert_allclose(motion.translations[:, 1], clip.translations[start:stop, 1], atol=1e-12)
+    assert rotation_matrices(motion.poses[0, 0])[0, 2] == pytest.approx(0.0, abs=1e-6)
+    np.testing.assert_array_equal(motion.poses[:, 1:], clip.poses[start:stop, 1:])
+    steps = [np.linalg.norm(np.diff(m.translations, axis=0), axis=1) for m in (motion, clip.cut(start, stop))]
+    np.testing.assert_allclose(*steps, atol=1e-12)
+
+
+def test_segments_cover_their_clip_without_overlap():
+    for clip, count in SEGMENTS_OF.items():
+        edges = [
+            (SEGMENTS[f"{clip}_{letter}"].start, SEGMENTS[f"{clip}_{letter}"].stop)
+            for letter in "abcdefg"[:count]
+        ]
+        assert edges[0][0] == 0 and edges[-1][1] == CLIPS[clip].frames
+        assert all(before[1] == after[0] for before, after in pairwise(edges))
+
+
+def test_the_notice_is_shipped_and_the_file_is_small():
+    notice = (ROOT / NOTICE).read_text(encoding="utf-8")
+    assert "mocap.cs.cmu.edu" in notice and "EIA-0196217" in notice
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["tool"]["setuptools"]["package-data"]["snug.motion.recorded"] == ["*.npz", "*.md"]
+    assert NOTICE in project["project"]["license-files"]
+    assert NOTICE in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert CLIPS_FILE.stat().st_size < 2.5e6
+
+
+def test_the_notice_lists_every_repair():
+    notice = (ROOT / NOTICE).read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d\d_\d\d) \| (\d+) \| (\w+) \| ([\d, -]+) \|$", notice, re.M)
+    assert len(rows) == 14 and {row[0] for row in rows} <= set(CLIPS)
