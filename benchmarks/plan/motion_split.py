@@ -51,25 +51,26 @@ def split_motions(
         if clip_of(name) in tested:
             raise PlanError(f"--validation-motions: '{name}' is a test motion; choose others")
     # Whoever names motions means all of them, whatever the size of the preset.
-    few, fewer = preset.train_motions, preset.test_motions
+    named = test_names if split == "test" else validation_names
     test = tuple(name for name in names if name in test_names)
     if not test:
-        test = TEST[:fewer] if with_library else tuple(n for n in learned if n not in validation_names)[:1]
+        test = TEST if with_library else tuple(n for n in learned if n not in validation_names)[:1]
     validation = tuple(name for name in names if name in validation_names)
     if with_library and not validation:
-        validation = tuple(name for name in VALIDATION if name not in test)[:fewer]
+        validation = tuple(name for name in VALIDATION if name not in test)
     of_library = (*VALIDATION, *TEST) if with_library else ()
     held_out = {clip_of(name) for name in (*test, *validation, *of_library)}
     train = tuple(name for name in learned if clip_of(name) not in held_out)
     train = train or tuple(name for name in TRAIN if name not in held_out)
     motions = Motions(
-        train=train[:few],
+        train=train[: preset.train_motions],
         test=test,
         files=tuple(files),
-        dynamic_test=DYNAMIC_TEST[:fewer],
+        dynamic_test=DYNAMIC_TEST,
         validation=validation,
-        dynamic_validation=DYNAMIC_VALIDATION[:fewer],
+        dynamic_validation=DYNAMIC_VALIDATION,
         split=split,
+        few=None if named else preset.test_motions,
     )
     if not motions.measured:
         raise PlanError(f"--split {split}: no motion has this role; name some by --{split}-motions")

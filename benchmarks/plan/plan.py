@@ -71,7 +71,7 @@ class Motions:
 
     files: those that came from a user's files. dynamic_*: those measured of garments that swing. worn: the
     garments of the run; the first is that of a run where none is named. split: the role whose motions stand
-    in the suites' scenes, "test" or "validation".
+    in the suites' scenes, "test" or "validation". few: so many of them, the first, stand there; None: all.
     """
 
     train: tuple[str, ...] = ()
@@ -82,16 +82,17 @@ class Motions:
     validation: tuple[str, ...] = ()
     dynamic_validation: tuple[str, ...] = ()
     split: str = "test"
+    few: int | None = None
 
     @property
     def measured(self) -> tuple[str, ...]:
         """Those of the split."""
-        return self.test if self.split == "test" else self.validation
+        return (self.test if self.split == "test" else self.validation)[: self.few]
 
     @property
     def dynamic_measured(self) -> tuple[str, ...]:
         """The same for garments that swing."""
-        return self.dynamic_test if self.split == "test" else self.dynamic_validation
+        return (self.dynamic_test if self.split == "test" else self.dynamic_validation)[: self.few]
 
     def role_of(self, motion: str) -> str:
         """Return its role: "training", "validation", "test", or empty where it has none in this run."""
@@ -117,7 +118,7 @@ class Motions:
 
     def measured_of(self, garment: str) -> tuple[str, ...]:
         """Return the names of a garment's motions of the split."""
-        return self.test_of(garment) if self.split == "test" else self.validation_of(garment)
+        return self.dynamic_measured if of_garment(garment, self.worn).dynamic else self.measured
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -127,7 +127,7 @@ def complaints(folder: Path) -> dict[str, str]:
 
 def test_the_index_says_what_there_is(built):
     found = DataSet.read(built)
-    assert [line.name for line in found.sequences] == ["walk", "brisk_walk", "run"]
+    assert [line.name for line in found.sequences] == ["07_01", "02_01", "02_02"]
     assert all(line.usable and line.status == "converged" and line.seconds > 0 for line in found.sequences)
     for line, motion in zip(found.sequences, found.motions(), strict=True):
         whole = Trajectory.load(built / line.trajectory)
@@ -144,8 +144,8 @@ def test_a_flipped_bit_is_found_and_its_sequence_alone_is_made_again(mine, tube,
     flip(mine / DataSet.read(mine).sequences[1].trajectory)
     (mine / DataSet.read(mine).sequences[2].motion).unlink()
     assert complaints(mine) == {
-        "brisk_walk": "trajectories/tube-brisk_walk/simulation.vtkhdf is damaged",
-        "run": "trajectories/tube-run/motion.npz is gone",
+        "02_01": "trajectories/tube-02_01/simulation.vtkhdf is damaged",
+        "02_02": "trajectories/tube-02_02/motion.npz is gone",
     }
     (command,) = DataSet.read(mine).commands
     assert command.split() == ["python", "-m", "benchmarks.dataset", *words(tube, mine)[:-2]]
@@ -232,11 +232,11 @@ def test_a_folder_of_other_things_is_refused(tube, tmp_path, capsys):
 
 
 def test_more_sequences_are_mixed_from_the_given_ones(tube, tmp_path):
-    options = dataset.make_parser().parse_args(words(tube, tmp_path, "--sequences", "16"))
-    motions = build_dataset.choose_sequences(options, dynamic=False)
-    assert list(motions)[-3:] == ["lunge", "mixed_0", "mixed_1"] and len(motions) == 16
-    more = dataset.make_parser().parse_args(words(tube, tmp_path, "--sequences", "20", "--from", "14"))
-    later = build_dataset.choose_sequences(more, dynamic=False)
+    options = dataset.make_parser().parse_args(words(tube, tmp_path, "--sequences", "36"))
+    motions = build_dataset.choose_sequences(options)
+    assert list(motions)[-3:] == ["07_12", "mixed_0", "mixed_1"] and len(motions) == 36
+    more = dataset.make_parser().parse_args(words(tube, tmp_path, "--sequences", "40", "--from", "34"))
+    later = build_dataset.choose_sequences(more)
     assert list(later) == [f"mixed_{number}" for number in range(6)]
     assert np.array_equal(later["mixed_1"].poses, motions["mixed_1"].poses)
 
@@ -313,11 +313,11 @@ def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (lambda x: x.__setitem__((5, 7, 1), np.nan) or x, "'brisk_walk' is not finite at frame 5"),
+        (lambda x: x.__setitem__((5, 7, 1), np.nan) or x, "'02_01' is not finite at frame 5"),
         (lambda x: x[:-1], "expected \\(18, 150, 3\\) of float32"),
         (lambda x: x.astype(float), "of float64, expected"),
-        (lambda x: np.array(["a", None], dtype=object), "brisk_walk"),
-        (lambda x: None, "brisk_walk"),
+        (lambda x: np.array(["a", None], dtype=object), "02_01"),
+        (lambda x: None, "02_01"),
     ],
 )
 @pytest.mark.parametrize("kind", ["supervised", "tailornet"])

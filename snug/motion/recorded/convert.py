@@ -75,7 +75,7 @@ def main() -> None:
         arrays |= {f"{name}/source": np.array(motion.source)}
         repairs += repaired
         print(f"{name}: {motion.frames} frames, digest {digest_of(poses, translations)}")
-    np.savez_compressed(CLIPS_FILE, **arrays)
+    np.savez_compressed(CLIPS_FILE, **arrays)  # type: ignore[arg-type]
     print("\n".join(["| clip | frames a second | joint | frames repaired |", "| --- | --- | --- | --- |"]))
     print("\n".join(f"| {' | '.join(row)} |" for row in repairs))
 

@@ -116,7 +116,7 @@ def test_preset_quick_has_eight_motions_preset_paper_all_and_either_those_that_a
         request = Selection(suites=("garments",), full=full, preset=find_preset(preset), motions=of)
         return {cell.scene.motion for cell in choose_cells(request)[0] if cell.scene.part == "whole"}
 
-    everything = set(split_motions([], [], find_preset("quick")).test)
+    everything = set(split_motions([], [], find_preset("quick")).measured)
     assert len(everything) == 8 and motions() == motions(full=True) == everything < motions(preset="paper")
     assert len(motions(preset="paper")) == 22
     named = ["kick", "punch", "walk", "bow"]
@@ -177,17 +177,17 @@ def test_motions_are_divided_as_help_says():
 
     quick = find_preset("quick")
     library = split_motions([], [], quick)
-    assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION[:8], TEST[:8])
+    assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
     assert library.files == () and library.measured == TEST[:8]
-    assert split_motions([], [], find_preset("paper")).test == TEST
+    assert split_motions([], [], find_preset("paper")).measured == TEST
     moved = split_motions([], ["walk", "kick"], quick)
     assert set(moved.test) == {"walk", "kick"} and "kick" not in moved.validation
     assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
     other = split_motions([], [], quick, validation_names=["bow"], split="validation")
-    assert (other.validation, other.test, other.measured) == (("bow",), TEST[:8], ("bow",))
+    assert (other.validation, other.test, other.measured) == (("bow",), TEST, ("bow",))
     assert not {"bow", *VALIDATION, *TEST} & set(other.train)
     small = split_motions([], [], SMOKE)
-    assert (len(small.train), len(small.test)) == (SMOKE.train_motions, SMOKE.test_motions)
+    assert (len(small.train), len(small.measured)) == (SMOKE.train_motions, SMOKE.test_motions)
 
     clips = "abc"
     files = split_motions(clips, [], quick)
@@ -197,7 +197,7 @@ def test_motions_are_divided_as_help_says():
     chosen = split_motions(clips, ["c", "b"], quick)
     assert (chosen.train, chosen.test) == (("a",), ("b", "c"))
     both = split_motions(clips, [], quick, library=True)
-    assert both.train == ("a", "b", "c", *TRAIN) and both.test == TEST[:8]
+    assert both.train == ("a", "b", "c", *TRAIN) and both.measured == TEST[:8]
     single = split_motions("a", [], quick)
     assert (single.train, single.test) == (TRAIN, ("a",))
     roles = split_motions(clips, ["b"], quick, validation_names=["a", "c"])  # none is left to train on
