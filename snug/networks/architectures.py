@@ -8,6 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from snug.networks.garment_network import GarmentNetwork
+from snug.networks.initialisation import initialise, zero
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.pbns import PoseSpaceDeformation
 from snug.networks.regressor import Regressor
@@ -41,7 +42,8 @@ def make_network(
         kind: one of ARCHITECTURES.
         inputs: number of features D.
         vertices: number of vertices V.
-        recipe: gives the scale of the output and whether the last layer starts at zero.
+        recipe: gives the rules of initialisation, whether the last layer starts at zero instead, and the
+            scale of the output.
         seed: of the random weights.
         pins: vertices without offset, which the body carries.
 
@@ -61,9 +63,10 @@ def make_network(
     architecture = find_architecture(kind)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        network = architecture(
-            inputs, vertices, output_scale=recipe.output_scale, zero_last_layer=recipe.zero_last_layer
-        )
+        network = architecture(inputs, vertices, output_scale=recipe.output_scale)
+        initialise(network, recipe.initialisation)
+    if recipe.zero_last_layer:
+        zero(*network.last_layers())
     network.pins = tuple(pins)
     if network.pins:
         free = torch.ones(vertices, 1)

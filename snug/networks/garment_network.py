@@ -33,9 +33,7 @@ class GarmentNetwork(nn.Module):
     input_mean: Tensor
     input_std: Tensor
 
-    def __init__(
-        self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
-    ) -> None:
+    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__()
         self.vertices, self.output_scale = vertices, output_scale
         self.register_buffer("input_mean", torch.zeros(inputs))
@@ -54,6 +52,10 @@ class GarmentNetwork(nn.Module):
         """Draw the state that a training window starts from; None for a network without one."""
         return None
 
+    def last_layers(self) -> tuple[nn.Linear, ...]:
+        """Return the layers whose sum the offsets are."""
+        raise NotImplementedError
+
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
         raise NotImplementedError
@@ -63,10 +65,3 @@ class GarmentNetwork(nn.Module):
         """Memory of the weights and of the input normalisation [MB]."""
         tensors = [*self.parameters(), *self.buffers()]
         return sum(t.numel() * t.element_size() for t in tensors) / 1e6
-
-
-def zero(*layers: nn.Linear) -> None:
-    """Set weights and biases of the layers to zero, so that training starts at the skinned garment."""
-    for layer in layers:
-        for parameter in layer.parameters():
-            nn.init.zeros_(parameter)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from torch import Tensor, nn
 
 from snug.kernels.gru import run_linear
-from snug.networks.garment_network import GarmentNetwork, zero
+from snug.networks.garment_network import GarmentNetwork
 
 if TYPE_CHECKING:
     from snug.networks.frame_layout import FramePlan
@@ -29,23 +29,23 @@ class PoseSpaceDeformation(GarmentNetwork):
     activation: type[nn.Module] = nn.ReLU
     constant = False  # whether there is a deformation in every pose
 
-    def __init__(
-        self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
-    ) -> None:
+    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
         sizes = pairwise((inputs, *self.widths))
         layers = [layer for a, b in sizes for layer in (nn.Linear(a, b), self.activation())]
         self.activations = nn.Sequential(*layers)
         # The deformation matrix, (width, V, 3) flattened.
         self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=self.constant)
-        if zero_last_layer:
-            zero(self.offsets)
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""
         hidden = self.activations(self.normalise(features))
         flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), None
+
+    def last_layers(self) -> tuple[nn.Linear, ...]:
+        """Return the layers whose sum the offsets are."""
+        return (self.offsets,)
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""

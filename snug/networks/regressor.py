@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from snug.kernels.gru import run_gru, run_linear
-from snug.networks.garment_network import GarmentNetwork, zero
+from snug.networks.garment_network import GarmentNetwork
 
 if TYPE_CHECKING:
     from snug.networks.frame_layout import FramePlan
@@ -34,21 +34,22 @@ class Regressor(GarmentNetwork):
         vertices: int,
         *,
         output_scale: float = 1.0,
-        zero_last_layer: bool = False,
         hidden: int = HIDDEN,
         layers: int = LAYERS,
     ) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
         self.gru = nn.GRU(inputs, hidden, layers, batch_first=True)
         self.offsets = nn.Linear(hidden, 3 * vertices)
-        if zero_last_layer:
-            zero(self.offsets)
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """Return offsets (N, T, V, 3) [m] and the state after the last frame."""
         hidden, state = run_gru(self.gru, self.normalise(features), state, closed_form=self.closed_form)
         flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), state
+
+    def last_layers(self) -> tuple[nn.Linear, ...]:
+        """Return the layers whose sum the offsets are."""
+        return (self.offsets,)
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from snug.body.parametric_body import SHAPES
 from snug.kernels.gru import run_gru, run_linear
-from snug.networks.garment_network import GarmentNetwork, zero
+from snug.networks.garment_network import GarmentNetwork
 from snug.networks.regressor import random_gru_state
 
 if TYPE_CHECKING:
@@ -34,16 +34,11 @@ class FitAndWrinkles(GarmentNetwork):
     feature_set = "pose_shape"
     sequential = True
 
-    def __init__(
-        self, inputs: int, vertices: int, *, output_scale: float = 1.0, zero_last_layer: bool = False
-    ) -> None:
+    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
-        drape = nn.Linear(FIT_WIDTH, 3 * vertices)
-        self.fit = nn.Sequential(nn.Linear(SHAPES, FIT_WIDTH), nn.ReLU(), drape)
+        self.fit = nn.Sequential(nn.Linear(SHAPES, FIT_WIDTH), nn.ReLU(), nn.Linear(FIT_WIDTH, 3 * vertices))
         self.gru = nn.GRU(inputs, WRINKLE_WIDTH, batch_first=True)
         self.offsets = nn.Linear(WRINKLE_WIDTH, 3 * vertices)
-        if zero_last_layer:
-            zero(drape, self.offsets)
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """Return offsets (N, T, V, 3) [m] and the state (1, N, 1500) after the last frame."""
@@ -53,6 +48,10 @@ class FitAndWrinkles(GarmentNetwork):
         shape = self.fit[:-1](normalised[..., -SHAPES:])
         flat = run_linear(drape, shape, closed_form=fast) + run_linear(self.offsets, hidden, closed_form=fast)
         return (self.output_scale * flat).unflatten(-1, (self.vertices, 3)), state
+
+    def last_layers(self) -> tuple[nn.Linear, ...]:
+        """Return the layers whose sum the offsets are."""
+        return cast(nn.Linear, self.fit[-1]), self.offsets
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""

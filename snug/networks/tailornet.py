@@ -21,7 +21,7 @@ import torch
 from torch import Tensor, nn
 
 from snug.body.parametric_body import SHAPES
-from snug.networks.garment_network import GarmentNetwork, zero
+from snug.networks.garment_network import GarmentNetwork
 
 if TYPE_CHECKING:
     from snug.networks.frame_layout import FramePlan
@@ -33,12 +33,10 @@ SIGMA = 1.0  # of the kernel, in units of the shape numbers
 class _Perceptron(nn.Module):
     """A map from numbers (N, T, D) to (N, T, 3V); a mask (N, 1, 1024) scales the first layer in training."""
 
-    def __init__(self, inputs: int, outputs: int, *, zero_last_layer: bool) -> None:
+    def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
         self.first, self.second = nn.Linear(inputs, WIDTH), nn.Linear(WIDTH, WIDTH)
         self.last = nn.Linear(WIDTH, outputs)
-        if zero_last_layer:
-            zero(self.last)
 
     def forward(self, numbers: Tensor, mask: Tensor | None) -> Tensor:
         hidden = torch.relu(self.first(numbers))
@@ -59,7 +57,6 @@ class FrequencyMixture(GarmentNetwork):
         inputs: number of features.
         vertices: number of the garment's vertices.
         output_scale: factor on the offsets.
-        zero_last_layer: whether the offsets start at zero.
         pivots: body shapes (K, 10); by default the mean body alone.
     """
 
@@ -73,15 +70,12 @@ class FrequencyMixture(GarmentNetwork):
         vertices: int,
         *,
         output_scale: float = 1.0,
-        zero_last_layer: bool = False,
         pivots: Sequence[Sequence[float]] = ((0.0,) * SHAPES,),
     ) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
         self.register_buffer("pivots", torch.as_tensor(pivots, dtype=torch.float32))
-        self.low = _Perceptron(inputs, 3 * vertices, zero_last_layer=zero_last_layer)
-        self.high = nn.ModuleList(
-            _Perceptron(inputs - SHAPES, 3 * vertices, zero_last_layer=zero_last_layer) for _ in pivots
-        )
+        self.low = _Perceptron(inputs, 3 * vertices)
+        self.high = nn.ModuleList(_Perceptron(inputs - SHAPES, 3 * vertices) for _ in pivots)
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
         """Draw dropout masks (1 + K, N, 1, 1024) from the training's own generator."""
@@ -111,6 +105,10 @@ class FrequencyMixture(GarmentNetwork):
         """Return offsets (N, T, V, 3) [m] and no state."""
         low, high = self.bands(features, state)
         return low + high, None
+
+    def last_layers(self) -> tuple[nn.Linear, ...]:
+        """Return the layers whose sum the offsets are."""
+        return (self.low.last, *(cast(_Perceptron, net).last for net in self.high))
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan.

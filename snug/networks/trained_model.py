@@ -15,7 +15,7 @@ from snug.networks.garment_network import GarmentNetwork
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.recipes.recipe import Recipe
 
-MODEL_FORMAT = "snug-model-8"
+MODEL_FORMAT = "snug-model-9"
 _TYPES: dict[str, Any] = {
     "kind": str, "unit": str, "recipe": dict, "inputs": int, "vertices": int, "pins": list, "seed": int,
     "steps": int, "seconds": int | float, "setup_seconds": int | float, "history": list, "summary": dict,

@@ -26,6 +26,7 @@ class Deviation:
 
 
 DEVIATIONS = (
+    Deviation("torch-defaults", ("initialisation", "adam_epsilon"), "the starts of torch, not of Keras"),
     Deviation("zero-last-layer", ("zero_last_layer",), "a last layer of zero"),
     Deviation("small-output", ("output_scale",), "its small output"),
     Deviation("six-numbers", ("pose_input",), "six numbers a joint"),

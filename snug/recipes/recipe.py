@@ -11,6 +11,8 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
+INITIALISATIONS = ("torch", "keras")
+INERTIA_FORMS = ("equation_5", "detached_past", "two_transitions")
 
 
 class RecipeError(ValueError):
@@ -29,9 +31,12 @@ class Recipe:
         velocity_frame: axes of the root velocity, `root` or `world`.
         smoothing: sweeps of neighbour averaging over the borrowed skinning weights, at 1000 vertices (see
             DressedBody.weights).
+        initialisation: rules by which the random weights are drawn, `torch` or `keras`, see
+            snug.networks.initialisation.
         zero_last_layer: start at the skinned template instead of at centimetres of noise.
         output_scale: factor on the predicted offsets.
         learning_rate: of Adam.
+        adam_epsilon: added to the root of Adam's second moment; torch has 1e-8, Keras 1e-7.
         weight_decay: share, times the rate, taken off each weight in a step (AdamW, Loshchilov and Hutter
             2019).
         schedule: of the learning rate: `cosine` (half a cosine, down to a hundredth at the last step),
@@ -54,7 +59,7 @@ class Recipe:
             (its posed body, its anchors, the state before it) then stays true.
         shape_share: share of these clips that leave the mean body.
         contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
-        contact_stiffness: of ContactPenalty; None takes the simulator's default.
+        contact_stiffness: of ContactPenalty, per area of cloth [J/m^5]; None takes the simulator's default.
         contact_margin: of ContactPenalty; None takes the simulator's default.
         contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most
             one of each window; in between anchors walk with the cloth.
@@ -64,6 +69,11 @@ class Recipe:
         mixed_lift: share of their thighs that are lifted.
         terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
             snug.recipes.energies. Leaving one out is an ablation, and it is then never evaluated.
+        inertia_form: `equation_5` (the inertia of each frame with two before it in its window, through
+            which its gradient reaches all three), `detached_past` (the same without a gradient to the two
+            frames before, as in Neural Cloth Simulation and GAPS) or `two_transitions` (the published code of
+            SNUG's authors: the second frame has an inertia too, about a cloth that stood still before it).
+            A window's inertia is the mean over the frames that have one.
         material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or
             `pbns` (edges, hinges, uniform mass and squared contact of PBNS, see
             snug.training.losses.pbns_material, with its own stiffness and margin of contact).
@@ -80,9 +90,11 @@ class Recipe:
     pose_input: str = "six"
     velocity_frame: str = "root"
     smoothing: int = 20
+    initialisation: str = "torch"
     zero_last_layer: bool = True
     output_scale: float = 0.1
     learning_rate: float = 2e-3
+    adam_epsilon: float = 1e-8
     weight_decay: float = 0.1
     schedule: str = "cosine"
     drop_after_epochs: int = 10
@@ -103,6 +115,7 @@ class Recipe:
     mixed_turn: float = 0.1
     mixed_lift: float = 1.0
     terms: tuple[str, ...] = TERMS
+    inertia_form: str = "equation_5"
     material: str = "stvk"
     bending: str = "length_area"
     pretraining: int = 0
@@ -113,6 +126,8 @@ class Recipe:
         for option, allowed in (
             ("pose_input", ("six", "axis_angle")),
             ("velocity_frame", ("root", "world")),
+            ("initialisation", INITIALISATIONS),
+            ("inertia_form", INERTIA_FORMS),
             ("schedule", ("cosine", "epochs", "constant")),
             ("contact_samples", ("all", "vertices")),
             ("material", ("stvk", "springs", "pbns")),
@@ -139,7 +154,7 @@ class Recipe:
         for option in ("mixed_lift", "shape_share"):
             if getattr(self, option) > 1.0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: a share, so at most 1")
-        for option in ("learning_rate", "output_scale", "gradient_limit", "spike"):
+        for option in ("learning_rate", "adam_epsilon", "output_scale", "gradient_limit", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
 

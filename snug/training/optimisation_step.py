@@ -83,7 +83,11 @@ class Trainer:
         if how.closed_form:
             network.closed_form = self.kernels
         self.optimiser = torch.optim.AdamW(
-            self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay, fused=True
+            self.network.parameters(),
+            lr=recipe.learning_rate,
+            eps=recipe.adam_epsilon,
+            weight_decay=recipe.weight_decay,
+            fused=True,
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
@@ -199,9 +203,10 @@ class Trainer:
                 posed = self.contact.posed(batch)
                 planes = self.contact.planes(batch, posed, x)
         with self.clock.part("energies"):
-            terms = self.loss(x, batch.ahead, planes)
+            terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
             if self.contact and posed and self._searched_for_high(number, frames, posed, x, terms):
-                terms = self.loss(x, batch.ahead, self.contact.planes(batch, posed))
+                planes = self.contact.planes(batch, posed)
+                terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
             if self.past:
                 terms |= self.past.terms(x, batch)
         means, trusted = self._update(number, windows, terms)

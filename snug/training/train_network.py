@@ -94,8 +94,8 @@ def untrained_model(
     """Return a network before any step, a row of the benchmark's tables.
 
     The default recipe starts at a zero last layer, where the untrained network is skinning alone. So this one
-    keeps PyTorch's own random last layer: the answer of a network that has learned nothing. Input statistics
-    are those of the training motions.
+    keeps the random last layer of the recipe's rules: the answer of a network that has learned nothing. Input
+    statistics are those of the training motions.
     """
     kind = find_kind(model_kind)
     recipe = replace(recipe, zero_last_layer=False)

@@ -35,6 +35,7 @@ class Batch:
     rest: Tensor  # (N, 1, V, 3) or (V, 3) [m], the unposed garment
     transforms: Tensor  # (N, T, 24, 3, 4)
     ahead: Tensor  # (N, T, 3) [m]
+    behind: Tensor  # (N, T, 3) [m]
     betas: Tensor | None = None  # (N, S) shape numbers, None on the mean body
 
 
@@ -82,7 +83,9 @@ class TrainingSet:
         inputs = [dressed.features(motion, recipe, betas, feature_set=features) for motion, betas in worn]
         self.features = torch.cat(inputs).to(device)
         self.transforms = torch.cat([dressed.transforms(m.poses, betas) for m, betas in worn]).to(device)
-        self.ahead = torch.cat([_ahead(dressed.pelvis(m)) for m in motions]).to(device)
+        pelvises = [dressed.pelvis(motion) for motion in motions]
+        self.ahead = torch.cat([_ahead(pelvis) for pelvis in pelvises]).to(device)
+        self.behind = torch.cat([_behind(pelvis) for pelvis in pelvises]).to(device)
         self.rest = dressed.rest().to(device)
         self._rest_directions: Tensor | None = None
         self.window = recipe.window if sequences else 1
@@ -126,7 +129,9 @@ class TrainingSet:
     def at(self, frames: np.ndarray) -> Batch:
         """Return rows (N, T), those of a line from one motion, as tensors; each motion on its own body."""
         rows = torch.as_tensor(frames, device=self.device)
-        batch = Batch(frames, self.features[rows], self.rest, self.transforms[rows], self.ahead[rows])
+        batch = Batch(
+            frames, self.features[rows], self.rest, self.transforms[rows], self.ahead[rows], self.behind[rows]
+        )
         if self.shapes is None:
             return batch
         return self._dressed(batch, self.shapes[self.motion_of(frames[:, 0])])
@@ -174,3 +179,8 @@ def _ahead(pelvis: np.ndarray) -> Tensor:
     ahead = np.zeros_like(pelvis)
     ahead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
     return torch.as_tensor(ahead, dtype=torch.float32)
+
+
+def _behind(pelvis: np.ndarray) -> Tensor:
+    """Return p_{t-1} - p_t of each frame, (T, 3) [m]; zero in the first."""
+    return torch.as_tensor(-np.diff(pelvis, axis=0, prepend=pelvis[:1]), dtype=torch.float32)

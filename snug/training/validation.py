@@ -91,4 +91,4 @@ class Validator:
             posed = self.contact.posed(batch)
             self.contact.search(np.arange(batch.frames.size), batch.frames, posed, x, exact=True)
             planes = self.contact.planes(batch, posed)
-        return trainer.loss(x, batch.ahead, planes)
+        return trainer.loss(x, batch.ahead, planes, behind=batch.behind)

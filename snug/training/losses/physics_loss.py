@@ -2,10 +2,11 @@
 
 For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
 
-    [ sum_t  strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)  +  sum_{t >= 3} inertia(x_t) ] / T
+    sum_t [strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)] / T + sum_{t >= 3} inertia(x_t) / (T - 2)
 
-in joules a frame: a frame without two frames before it in the window has no inertia term, so a window of
-three holds three static terms and one inertia, whose gradient reaches all three frames.
+in joules a frame: the mean of each term over the frames that have it. A frame has inertia where two frames
+before it are in the window; its gradient reaches all three. So the terms of a frame weigh as in equation 5,
+however long the window is. The recipe names two other forms of inertia (Recipe.inertia_form).
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (those that a term declares as "training_batch", or its own gradient) give the same values and
@@ -80,7 +81,7 @@ def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
     if recipe.contact_margin is not None:
         options["margin"] = recipe.contact_margin
     if recipe.contact_stiffness is not None:
-        options["per_sample_stiffness"] = recipe.contact_stiffness
+        options["stiffness"] = recipe.contact_stiffness
     return ContactPenalty(cloth, **options)
 
 
@@ -173,7 +174,7 @@ class PhysicsLoss:
     def __init__(
         self, cloth: Cloth, recipe: Recipe, *, dt: float, device: torch.device = CPU, kernels: bool = True
     ) -> None:
-        self.terms, self.kernels = recipe.terms, kernels
+        self.terms, self.kernels, self.inertia_form = recipe.terms, kernels, recipe.inertia_form
         self.contact = make_contact(cloth, recipe)
         self.inertia = Inertia(cloth, dt)
         self.static = static_terms(cloth, recipe)
@@ -192,13 +193,18 @@ class PhysicsLoss:
                 instead = "frames are evaluated one after the other, or by torch (docs/extend.md, An energy)"
                 warn_slow_path("training", "batch kernel", slow, instead)
 
-    def __call__(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, Tensor]:
-        """Return the energy of each window and frame, term -> (N, T) [J].
+    def __call__(
+        self, x: Tensor, ahead: Tensor, planes: Planes | None, *, behind: Tensor | None = None
+    ) -> dict[str, Tensor]:
+        """Return the energy of each window and frame, term -> (N, T) [J], whose mean over frames is the loss.
+
+        Where only some frames of a window have inertia, theirs is scaled up by the share of these frames.
 
         Args:
             x: (N, T, V, 3) [m], each frame relative to its own pelvis p.
             ahead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m]: where the pelvis would be if it kept its
                 velocity, relative to where it is.
+            behind: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs it.
             planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors;
                 or a kernel in lanes that knows its planes; None leaves contact out.
         """
@@ -211,7 +217,7 @@ class PhysicsLoss:
             kernels_too = self.kernels and has_closed_form(energy)
             terms[name] = closed[name] if name in closed else evaluate(energy, x, kernels=kernels_too)
         if "inertia" in self.terms and x.shape[1] >= 3:
-            terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead)
+            terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead, behind)
         if "collision" in self.terms and planes is not None:
             if "collision" in closed:
                 terms["collision"] = closed["collision"]
@@ -223,13 +229,22 @@ class PhysicsLoss:
     def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:
         """Return the kernels in lanes of the terms that have one, by name of the term."""
         kernels = dict(self._batches)
-        if "inertia" in self.terms and x.shape[1] >= 3 and len(x) % TRAINING_LANES == 0:
-            kernels["inertia"] = batch_of_windows(self.inertia, to_lanes(ahead), len(x))
+        in_lanes = self.inertia_form == "equation_5" and len(x) % TRAINING_LANES == 0
+        if "inertia" in self.terms and x.shape[1] >= 3 and in_lanes:
+            weight = x.shape[1] / (x.shape[1] - 2)
+            kernels["inertia"] = batch_of_windows(self.inertia, to_lanes(ahead), len(x), weight)
         if "collision" in self.terms and callable(planes):
             kernels["collision"] = planes
         return kernels
 
-    def _inertia(self, x: Tensor, ahead: Tensor) -> Tensor:
+    def _inertia(self, x: Tensor, ahead: Tensor, behind: Tensor | None) -> Tensor:
+        """Return the recipe's form of inertia (N, T) [J], scaled as `__call__` has it."""
         x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
-        inertia = self.inertia.energy(x[:, 2:], x_hat).sum(-1)
-        return torch.nn.functional.pad(inertia, (2, 0))
+        if self.inertia_form == "two_transitions":
+            assert behind is not None
+            x_hat = torch.cat([x[:, :1] + behind[:, 1:2, None], x_hat], 1)  # no velocity before the first
+        elif self.inertia_form == "detached_past":
+            x_hat = x_hat.detach()
+        frames, judged = x.shape[1], x_hat.shape[1]
+        inertia = self.inertia.energy(x[:, -judged:], x_hat).sum(-1) * (frames / judged)
+        return torch.nn.functional.pad(inertia, (frames - judged, 0))

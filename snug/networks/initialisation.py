@@ -1,0 +1,50 @@
+"""Random weights that a network starts from, by the rules of torch or of Keras.
+
+The rules differ by orders of magnitude in the joules of the first frames: the offsets of a network begin as
+noise, and noise of centimetres between neighbouring vertices is a great strain. SNUG's authors train in
+Keras.
+"""
+
+from __future__ import annotations
+
+import math
+
+from torch import nn
+
+
+def initialise(network: nn.Module, rules: str) -> None:
+    """Give a network's linear layers and gated recurrent units the weights that they start from.
+
+    Torch's rules are those by which its layers are made: uniform within 1 / sqrt(inputs), biases too, where a
+    recurrent layer takes its units for inputs. Keras' rules: input weights uniform within sqrt(6 / (inputs + outputs)) (Glorot and Bengio 2010), where a
+    recurrent layer of H units counts 3 H outputs, one for each of its gates; recurrent weights (3H, H) with
+    orthonormal columns; biases zero. They are drawn from torch's global generator.
+
+    Args:
+        network: newly made; changed in place by Keras' rules.
+        rules: "keras" or "torch".
+
+    Raises:
+        ValueError: for other rules.
+    """
+    if rules not in ("keras", "torch"):
+        raise ValueError(f"unknown rules of initialisation {rules!r}: use keras or torch")
+    if rules == "torch":
+        return
+    for layer in network.modules():
+        named = layer.named_parameters() if isinstance(layer, (nn.Linear, nn.GRU)) else ()
+        for name, parameter in named:
+            if "bias" in name:
+                nn.init.zeros_(parameter)
+            elif name.startswith("weight_hh"):
+                nn.init.orthogonal_(parameter)
+            else:
+                limit = math.sqrt(6 / sum(parameter.shape))
+                nn.init.uniform_(parameter, -limit, limit)
+
+
+def zero(*layers: nn.Linear) -> None:
+    """Set weights and biases of the layers to zero, so that training starts at the skinned garment."""
+    for layer in layers:
+        for parameter in layer.parameters():
+            nn.init.zeros_(parameter)
