@@ -84,7 +84,8 @@ def batch_of_windows(term: Inertia, ahead: np.ndarray, windows: int, weight: flo
     """Return the kernel of training on a CPU (kernels.training_lanes), of windows that fill whole blocks.
 
     E = weight m / (2 dt^2) |a|^2 with a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t, zero for the first two frames.
-    ahead (C, 3, TRAINING_LANES) [m]: where the frame before would be if nothing pulled, seen from where it is.
+    ahead (C, 3, TRAINING_LANES) [m]: where the frame before would be if nothing pulled, seen from where it
+    is.
     """
     stiffness = (weight * term.masses / term.dt**2).astype(np.float32)[:, None, None]
     one = windows // TRAINING_LANES  # blocks a frame

@@ -16,9 +16,10 @@ def initialise(network: nn.Module, rules: str) -> None:
     """Give a network's linear layers and gated recurrent units the weights that they start from.
 
     Torch's rules are those by which its layers are made: uniform within 1 / sqrt(inputs), biases too, where a
-    recurrent layer takes its units for inputs. Keras' rules: input weights uniform within sqrt(6 / (inputs + outputs)) (Glorot and Bengio 2010), where a
-    recurrent layer of H units counts 3 H outputs, one for each of its gates; recurrent weights (3H, H) with
-    orthonormal columns; biases zero. They are drawn from torch's global generator.
+    recurrent layer takes its units for inputs. Keras' rules: input weights uniform within
+    sqrt(6 / (inputs + outputs)) (Glorot and Bengio 2010), where a recurrent layer of H units counts 3 H
+    outputs, one for each of its gates; recurrent weights (3H, H) with orthonormal columns; biases zero. They
+    are drawn from torch's global generator.
 
     Args:
         network: newly made; changed in place by Keras' rules.

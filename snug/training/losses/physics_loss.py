@@ -2,7 +2,8 @@
 
 For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
 
-    sum_t [strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)] / T + sum_{t >= 3} inertia(x_t) / (T - 2)
+    sum_t [strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)] / T
+        + sum_{t >= 3} inertia(x_t) / (T - 2)
 
 in joules a frame: the mean of each term over the frames that have it. A frame has inertia where two frames
 before it are in the window; its gradient reaches all three. So the terms of a frame weigh as in equation 5,
@@ -241,7 +242,8 @@ class PhysicsLoss:
         """Return the recipe's form of inertia (N, T) [J], scaled as `__call__` has it."""
         x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
         if self.inertia_form == "two_transitions":
-            assert behind is not None
+            if behind is None:
+                raise ValueError("inertia_form 'two_transitions' needs behind, the motion of the pelvis")
             x_hat = torch.cat([x[:, :1] + behind[:, 1:2, None], x_hat], 1)  # no velocity before the first
         elif self.inertia_form == "detached_past":
             x_hat = x_hat.detach()

@@ -64,15 +64,6 @@ def test_inputs_are_normalised_inside(kind):
     assert torch.allclose(network(features)[0], expected, atol=1e-6)
 
 
-def test_zero_last_layer_starts_at_the_template():
-    for kind in ("snug", "pbns"):
-        network = make_network(kind, 12, 5, DEFAULT, seed=1)
-        offsets, _ = network(torch.randn(3, 4, 12))
-        assert offsets.shape == (3, 4, 5, 3) and (offsets == 0).all()
-        random, _ = make_network(kind, 12, 5, PAPER, seed=1)(torch.randn(3, 4, 12))
-        assert random.abs().max() > 1e-3
-
-
 def test_seed_alone_decides_the_start():
     torch.manual_seed(5)
     a = make_network("snug", 12, 5, PAPER, seed=3)

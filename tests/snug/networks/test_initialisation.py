@@ -1,0 +1,77 @@
+"""Networks start from the weights that the rules of their recipe say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from snug.garments import tailor_tshirt
+from snug.networks.architectures import ARCHITECTURES, make_network
+from snug.networks.dressed_body import DressedBody
+from snug.networks.initialisation import initialise
+from snug.networks.regressor import Regressor
+from snug.recipes.named import PAPER, RECIPE_OF_KIND
+from snug.recipes.recipe import DEFAULT
+from snug.training.optimisation_step import Trainer
+from tests.snug.training.dressing import swaying
+
+
+def fills(values: torch.Tensor, limit: float) -> bool:
+    """Whether values look uniform within +-limit: none beyond, some near, the spread of such numbers."""
+    values = values.detach()
+    spread = float(values.std()) / (limit / np.sqrt(3))
+    return 0.99 * limit < float(values.abs().max()) < 1.000001 * limit and abs(spread - 1) < 0.02
+
+
+def test_keras_rules_of_the_papers_network():
+    network, inputs, vertices = make_network("snug", 85, 4424, PAPER, seed=0), 85, 4424
+    assert fills(network.gru.weight_ih_l0, np.sqrt(6 / (inputs + 768)))
+    for layer in range(4):
+        recurrent = getattr(network.gru, f"weight_hh_l{layer}")
+        assert recurrent.shape == (768, 256)
+        assert torch.allclose(recurrent.T @ recurrent, torch.eye(256), atol=1e-5)
+        if layer:
+            assert fills(getattr(network.gru, f"weight_ih_l{layer}"), np.sqrt(6 / (256 + 768)))
+    assert fills(network.offsets.weight, np.sqrt(6 / (256 + 3 * vertices)))
+    assert not any(p.any() for name, p in network.named_parameters() if "bias" in name)
+
+
+@pytest.mark.parametrize("kind", ARCHITECTURES)
+def test_every_kind_follows_the_rules_of_its_recipe(kind):
+    recipe = replace(RECIPE_OF_KIND[kind], zero_last_layer=False, initialisation="keras")
+    keras, again = (make_network(kind, 151, 5, recipe, seed=3) for _ in range(2))
+    torchs = make_network(kind, 151, 5, replace(recipe, initialisation="torch"), seed=3)
+    biases = [(name, p) for name, p in keras.named_parameters() if "bias" in name]
+    assert biases and not any(p.any() for _, p in biases)
+    assert all(torch.equal(a, b) for a, b in zip(keras.parameters(), again.parameters()))
+    for name, weight in keras.named_parameters():
+        other = dict(torchs.named_parameters())[name]
+        assert not torch.equal(weight, other)
+        if "bias" not in name and not name.startswith("gru.weight_hh"):
+            assert fills(weight, np.sqrt(6 / sum(weight.shape))) or weight.numel() < 2000
+
+
+@pytest.mark.parametrize("kind", ARCHITECTURES)
+def test_a_last_layer_of_zero_starts_at_the_template(kind):
+    network = make_network(kind, 151, 5, replace(DEFAULT, initialisation="keras"), seed=1)
+    offsets, _ = network(torch.randn(3, 4, 151))
+    assert offsets.shape == (3, 4, 5, 3) and not offsets.any()
+    assert all(not p.any() for layer in network.last_layers() for p in layer.parameters())
+
+
+def test_unknown_rules_are_refused():
+    with pytest.raises(ValueError, match="'jax'"):
+        initialise(Regressor(4, 5), "jax")
+
+
+def test_initial_strain_at_the_papers_size_is_of_the_authors_order(body):
+    """Hundreds of joules, as the authors report of their own training (391); by torch's rules 70,000."""
+    shirt, strains = DressedBody(body, tailor_tshirt(body, vertices=4400)), {}
+    for rules in ("keras", "torch"):
+        recipe = replace(PAPER, initialisation=rules, terms=("strain",))
+        trainer = Trainer("snug", shirt, [swaying(60)], steps=1, seed=0, recipe=recipe)
+        strains[rules] = trainer.step(0)["strain"]
+    assert 100 < strains["keras"] < 400 and strains["torch"] > 30_000
