@@ -15,6 +15,8 @@ _LABELS = {
     "window6": "windows of 6",
     "window12": "windows of 12",
     "shapes": "trained on body shapes",
+    "detached-past": "inertia about a detached past",
+    "two-transitions": "inertia of two transitions",
     "springs": "springs instead of StVK",
 }
 
