@@ -37,6 +37,7 @@ def test_they_run_when_named_and_not_otherwise(tmp_path):
         "snug-no-bending",
         "snug-no-strain",
         "snug-no-gravity",
+        "snug-no-collision",
         "snug-no-inertia",
         "snug-no-noise",
     }

@@ -108,7 +108,7 @@ def loss_of(recipe: Recipe, *, copies: int, kernels: bool, frames: int) -> tuple
     terms = loss(given, next(steps), planes, behind=next(steps))
     total = sum(energy.mean() for energy in terms.values())
     total.backward()
-    return float(total), given.grad * copies
+    return total.item(), given.grad * copies
 
 
 @pytest.mark.parametrize("frames", [3, 6])
