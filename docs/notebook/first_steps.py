@@ -1,0 +1,51 @@
+"""Loss of the recipe `paper` in its first steps, from random weights by the rules of Keras and of torch.
+
+    python docs/notebook/first_steps.py --vertices 4400 --steps 2000 --rules keras torch
+
+prints one line for each step of the table in training.md#the-start-of-the-papers-recipe: rules, step, loss and
+its terms [J a frame].
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+from snug.body.parametric_body import Body
+from snug.garments import tailor_tshirt
+from snug.motion.library import TRAIN, make_motion
+from snug.networks.dressed_body import DressedBody
+from snug.recipes.named import PAPER
+from snug.training.optimisation_step import Trainer
+
+SHOWN = (1, 20, 100, 280, 300, 1000, 2000, 3000, 4000, 5000, 5300)
+SETTLED = 200  # steps after which a jump of the loss is counted
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--vertices", type=int, default=4400)
+    parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--rules", nargs="+", default=["keras", "torch"])
+    options = parser.parse_args()
+    body = Body.load()
+    dressed = DressedBody(body, tailor_tshirt(body, vertices=options.vertices))
+    motions = [make_motion(name) for name in TRAIN]
+    frames = sum(motion.frames for motion in motions)
+    print(f"{dressed.vertices} vertices, {len(motions)} motions, {frames} frames, seed {options.seed}")
+    for rules in options.rules:
+        recipe = replace(PAPER, initialisation=rules)
+        trainer = Trainer("snug", dressed, motions, steps=options.steps, seed=options.seed, recipe=recipe)
+        largest = 0.0
+        for step in range(1, options.steps + 1):
+            terms = trainer.step(step - 1)
+            if step > SETTLED:
+                largest = max(largest, terms["loss"])
+            if step in SHOWN:
+                print(rules, step, *(f"{name} {value:.4g}" for name, value in terms.items()), flush=True)
+        print(f"{rules}: largest loss after step {SETTLED}: {largest:.4g} J", flush=True)
+
+
+if __name__ == "__main__":
+    main()
