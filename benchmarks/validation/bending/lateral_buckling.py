@@ -12,6 +12,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from benchmarks.meshes import ROW, in_space, rectangle
+from benchmarks.validation.bending.plates import NU
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
 from reference_sim.cloth import Cloth
@@ -44,7 +45,7 @@ def _ratio(rows: int) -> float:
     points, faces = rectangle("equilateral", columns, rows, columns * h, width)
     points -= [h / 2, width / 2]
     cloth = Cloth(in_space(points), faces, MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h))
-    D, nu = K / 4, -1 / 3
+    D, nu = K / 4, NU
     exact = MICHELL * width * D * np.sqrt((1 - nu**2) * 2 * (1 - nu))
     tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
     forces = np.zeros((len(points), 3))

@@ -7,6 +7,10 @@ direction t, summed over the three directions of an equilateral mesh of spacing 
 C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)), there
 1/(2 3^0.5), C11 = k/4.
 
+No other family is isotropic: their stiffness depends on the direction of the fold by up to a factor of 3, see
+the table in docs/method.md. So a plate that can be compared with one of another program has equilateral
+triangles.
+
 Squares with both diagonals, w = x^2/2 at the corners and d above that at the centres: per cell the hinges
 of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy over
 k/2 is 1 - 8 d + 64 d^2, at least 3/4; scaled by l^2/(4 (A1 + A2)) it is 3/8 - 2 d + 24 d^2, at least 1/3.
@@ -15,6 +19,8 @@ Alternating diagonals are the same tiling turned by 45 degrees: 3/4 again, and 5
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
@@ -22,36 +28,56 @@ import scipy.sparse.linalg as spla
 from benchmarks.meshes import ROW, in_space, rectangle
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.energy import Energy
 from reference_sim.material import Material
 from reference_sim.potential import Potential
 
 STIFFNESS = 1.0  # [J] k; every result is divided by it
+NU = -1 / 3  # Poisson's ratio of hinges on equilateral triangles
+CYLINDER = np.diag([1.0, 0.0])  # [1/m] curvature of a plate rolled up along x
+
+Terms = Callable[[Cloth], Sequence[Energy]]
 
 
 def plate_stiffness(family: str, scaling: str) -> float:
-    """Return C11/k of a patch bent to a cylinder at its border, everything else at rest.
+    """Return C11/k: twice the energy per area of a patch bent to a cylinder."""
+    return 2 * patch_energy(family, CYLINDER, hinges(scaling))
+
+
+def hinges(scaling: str) -> Terms:
+    """Return the terms of a plate of hinges alone."""
+    return lambda cloth: [BendHinge(cloth, scaling=scaling)]
+
+
+def patch_energy(family: str, curvature: np.ndarray, terms: Terms) -> float:
+    """Return the energy per area and k of a patch with a constant curvature at its border, inside at rest.
 
     Energy of an n x n patch = a n^2 + b n + c with the border in b and c; three sizes give a. The
     unstructured family has no cell that repeats, so there one larger patch is divided by its area.
+
+    Args:
+        family: of meshes.FAMILIES.
+        curvature: (2,2) [1/m]; the two outer rings of vertices have w = x . curvature x / 2.
+        terms: energies of the plate, where a cloth has k = 1 J.
     """
     height = ROW if family == "equilateral" else 1.0
     if family == "delaunay":
-        energy, area = _bent(family, scaling, 48, 1.0)
-        return 2 * energy / area
-    small, middle, large = (_bent(family, scaling, n, height)[0] for n in (16, 24, 32))
-    return 2 * (small - 2 * middle + large) / 128 / height
+        energy, area = _bent(family, 48, 1.0, curvature, terms)
+        return energy / area
+    small, middle, large = (_bent(family, n, height, curvature, terms)[0] for n in (16, 24, 32))
+    return (small - 2 * middle + large) / 128 / height
 
 
-def _bent(family: str, scaling: str, cells: int, height: float) -> tuple[float, float]:
-    """Return the energy over k of a patch with w = x^2/2 on two outer rings, and the area of its hinges."""
+def _bent(family: str, cells: int, height: float, curvature: np.ndarray, terms: Terms) -> tuple[float, float]:
+    """Return the energy over k of a patch in equilibrium, and the area of its hinges."""
     size = np.array([cells, cells * height])
     points, faces = rectangle(family, cells, cells, *size)
-    bend, K = _stiffness(points, faces, scaling)
+    cloth, K = _stiffness(points, faces, terms)
     ring = ((points < 1.01) | (points > size - 1.01)).any(axis=1)
-    w = 0.5 * points[:, 0] ** 2
+    w = 0.5 * np.einsum("vi,ij,vj->v", points, curvature, points)
     inside = np.flatnonzero(~ring)
     w[inside] = spla.spsolve(K[inside][:, inside], -(K[inside][:, ring] @ w[ring]))
-    return 0.5 * float(w @ (K @ w)) / STIFFNESS, float(bend.cloth.hinge_areas.sum() / 3)
+    return 0.5 * float(w @ (K @ w)) / STIFFNESS, float(cloth.hinge_areas.sum() / 3)
 
 
 def supported_plate(family: str, scaling: str) -> float:
@@ -64,10 +90,10 @@ def supported_plate(family: str, scaling: str) -> float:
     rows = round(columns / ROW) if family == "equilateral" else columns
     width = rows * ROW / columns if family == "equilateral" else 1.0
     points, faces = rectangle(family, columns, rows, 1.0, width)
-    bend, K = _stiffness(points, faces, scaling)
+    cloth, K = _stiffness(points, faces, hinges(scaling))
     border = (points < 1e-9).any(axis=1) | (points > np.array([1.0, width]) - 1e-9).any(axis=1)
     inside = np.flatnonzero(~border)
-    areas = bend.cloth.vertex_areas
+    areas = cloth.vertex_areas
     w = np.zeros(len(points))
     w[inside] = spla.spsolve(K[inside][:, inside], areas[inside])
     return morley_deflection(width) / (float(areas @ w) / width) / STIFFNESS
@@ -103,9 +129,8 @@ def _morley(width: float, cells: int) -> float:
     return float(f @ w) / width
 
 
-def _stiffness(points: np.ndarray, faces: np.ndarray, scaling: str) -> tuple[BendHinge, sp.csr_matrix]:
-    """Return the bending term of a flat mesh (V,2) and its Hessian out of the plane (V,V)."""
+def _stiffness(points: np.ndarray, faces: np.ndarray, terms: Terms) -> tuple[Cloth, sp.csr_matrix]:
+    """Return the cloth of a flat mesh (V,2) and the Hessian (V,V) of its terms out of the plane."""
     cloth = Cloth(in_space(points), faces, Material(bending_stiffness=STIFFNESS))
-    bend = BendHinge(cloth, scaling=scaling)
-    hessian = Potential([bend]).hessian(cloth.rest_positions).tocsr()
-    return bend, hessian[2::3][:, 2::3]
+    hessian = Potential(list(terms(cloth))).hessian(cloth.rest_positions).tocsr()
+    return cloth, hessian[2::3][:, 2::3]

@@ -1,0 +1,102 @@
+"""Patches of a plate, bent in all ways: which energies they have beside Kirchhoff's plate."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.meshes import rectangle
+from benchmarks.validation.bending.gaussian_curvature import GaussianCurvature
+from benchmarks.validation.bending.plates import NU, hinges, patch_energy
+from benchmarks.validation.bending.slit_annulus import INNER, OUTER, annulus
+from reference_sim.cloth import Cloth
+from reference_sim.geometry.topology import corner_angles
+from reference_sim.material import Material
+
+D = 1 / 4  # over k, of scaled hinges on equilateral triangles
+CORNERS = 3e-4  # relative: what the corners of three patches leave
+
+
+def cylinder(degrees):
+    direction = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    return np.outer(direction, direction)
+
+
+SHAPES = {
+    **{f"cylinder at {degrees} degrees": cylinder(degrees) for degrees in (0, 20, 45, 90, 130)},
+    "sphere": np.eye(2),
+    "twist": np.array([[0.0, 1.0], [1.0, 0.0]]),
+    "saddle": np.diag([1.0, -1.0]),
+    "saddle of two curvatures": np.array([[1.0, 0.3], [0.3, -0.4]]),
+}
+
+
+def kirchhoff(curvature, nu):
+    return D / 2 * (np.trace(curvature) ** 2 - 2 * (1 - nu) * np.linalg.det(curvature))
+
+
+def hinges_without_poisson_effect(cloth):
+    return [*hinges("length_area")(cloth), GaussianCurvature.without_poisson_effect(cloth, D)]
+
+
+@pytest.mark.parametrize(
+    ("terms", "nu"),
+    [(hinges("length_area"), NU), (hinges_without_poisson_effect, 0.0)],
+    ids=["hinges", "with Gaussian curvature"],
+)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_equilateral_triangles_are_a_plate_of_kirchhoff(shape, terms, nu):
+    energy = patch_energy("equilateral", SHAPES[shape], terms)
+    assert energy == pytest.approx(kirchhoff(SHAPES[shape], nu), rel=CORNERS)
+
+
+# Energies over k of folds about y and about a diagonal, and of a twist: no isotropic plate has such.
+@pytest.mark.parametrize(
+    ("family", "fold", "diagonal_fold", "twist"),
+    [
+        ("right", 1 / 8, 3 / 8, 3 / 4),
+        ("cross", 1 / 6, 5 / 48, 1 / 4),
+        ("union_jack", 5 / 48, 1 / 6, 1 / 2),
+    ],
+)
+def test_other_triangles_are_stiffer_in_some_directions(family, fold, diagonal_fold, twist):
+    found = [
+        patch_energy(family, curvature, hinges("length_area"))
+        for curvature in (cylinder(0), cylinder(45), SHAPES["twist"])
+    ]
+    assert found == pytest.approx([fold, diagonal_fold, twist], rel=CORNERS)
+
+
+def test_gaussian_curvature_of_a_pyramid_is_its_angle_defect():
+    rest = np.array([[1.0, 0, 0], [0, 0, -1], [-1, 0, 0], [0, 0, 1], [0, 0, 0]])
+    faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    term = GaussianCurvature(Cloth(rest, faces, Material()), 0.7)
+    height = 0.6
+    lifted = rest + np.array([0, height, 0]) * (np.arange(5) == 4)[:, None]
+    apex = np.arccos(
+        height**2 / (1 + height**2)
+    )  # angle of each face: the edges are (1, -height), (0, -height)
+    assert term.value_and_gradient(rest)[0] == pytest.approx(0.0, abs=1e-15)
+    assert term.value_and_gradient(lifted)[0] == pytest.approx(0.7 * (2 * np.pi - 4 * apex), rel=1e-12)
+
+
+def test_rolling_up_a_sheet_is_no_gaussian_curvature():
+    points, faces = rectangle("right", 6, 3, 1.0, 0.5)
+    term = GaussianCurvature(Cloth(points[:, [0, 1, 1]] * [1, 0, 1], faces[:, ::-1], Material()), 1.0)
+    cell, turn = 1 / 6, 0.5
+    ends = np.concatenate([[0], np.cumsum(np.exp(1j * turn * np.arange(6)))]) * cell
+    rolled = ends[np.rint(points[:, 0] / cell).astype(int)]
+    x = np.stack([rolled.real, rolled.imag, points[:, 1]], axis=1)
+    assert np.ptp(x[:, 1]) > 0.3
+    assert term.value_and_gradient(x)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_slit_annulus_is_made_of_equilateral_triangles():
+    cloth, turn, radius = annulus(16)
+    assert (radius.min(), radius.max()) == pytest.approx((INNER, OUTER))
+    assert turn.max() == pytest.approx(2 * np.pi)
+    angles = np.degrees(corner_angles(cloth.rest_positions, cloth.faces))
+    inside = (radius > radius.min() * 1.04)[cloth.faces].all(axis=1)
+    inside &= (radius < radius.max() / 1.04)[cloth.faces].all(axis=1)
+    assert inside.mean() > 0.8
+    assert np.abs(angles[inside] - 60).max() < 2.0
