@@ -98,5 +98,5 @@ def test_the_slit_annulus_is_made_of_equilateral_triangles():
     angles = np.degrees(corner_angles(cloth.rest_positions, cloth.faces))
     inside = (radius > radius.min() * 1.04)[cloth.faces].all(axis=1)
     inside &= (radius < radius.max() / 1.04)[cloth.faces].all(axis=1)
-    assert inside.mean() > 0.8
+    assert inside.mean() > 0.7
     assert np.abs(angles[inside] - 60).max() < 2.0
