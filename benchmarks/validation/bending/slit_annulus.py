@@ -11,6 +11,8 @@ limit is another plate, which the load lifts less.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -33,6 +35,9 @@ D = YOUNG * THICKNESS**3 / 12  # [J] of the plate, nu = 0
 C11 = 1 / 4  # of scaled hinges on equilateral triangles, over k
 ROWS = (8, 16)  # of triangles between the radii
 STAGES = 12
+MATERIAL = Material(
+    young_modulus=YOUNG, poisson_ratio=0.0, thickness=THICKNESS, density=1.0, bending_stiffness=D / C11
+)
 
 
 def corner(which: str, poisson_ratio: str = "zero") -> float:
@@ -51,38 +56,50 @@ def corner(which: str, poisson_ratio: str = "zero") -> float:
 @cache
 def lifted(rows: int, poisson_ratio: str = "zero") -> np.ndarray:
     """Return the lifts [m] of the inner and the outer corner, with so many rows of triangles."""
-    cloth, turn, radius = annulus(rows)
+    plate = annulus(rows)
+    terms: list[Energy] = [StretchStVK(plate.cloth), BendHinge(plate.cloth)]
+    if poisson_ratio == "zero":
+        terms.append(GaussianCurvature.without_poisson_effect(plate.cloth, D))
+    return lift(plate, terms)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """Flat annulus, clamped at one lip: angle from the clamp (V,) [rad] and radius (V,) [m]."""
+
+    cloth: Cloth
+    turn: np.ndarray
+    radius: np.ndarray
+
+
+def annulus(rows: int, material: Material = MATERIAL, family: str = "equilateral") -> Plate:
+    """Return the plate with so many rows of triangles of a family, see meshes.FAMILIES."""
+    width = np.log(OUTER / INNER)
+    columns = round(2 * np.pi / width * rows * (ROW if family == "equilateral" else 1.0))
+    flat, faces = rectangle(family, columns, rows, 2 * np.pi, width)
+    h = 2 * np.pi / (columns - 0.5)
+    turn = flat[:, 0] * columns / (columns - 0.5) - h / 2  # the clamp: half-way between two pinned columns
+    radius = INNER * np.exp(flat[:, 1])
+    rest = np.stack([radius * np.cos(turn), 0.0 * turn, -radius * np.sin(turn)], axis=1)
+    return Plate(Cloth(rest, faces, material, pins=np.flatnonzero(turn < 0.6 * h)), turn, radius)
+
+
+def lift(plate: Plate, terms: Sequence[Energy]) -> np.ndarray:
+    """Return the lifts [m] of the free lip's inner and outer corner under the whole load.
+
+    Raises RuntimeError where a stage of the load does not converge.
+    """
+    cloth, turn, radius = plate.cloth, plate.turn, plate.radius
     lip = np.flatnonzero(turn > 2 * np.pi - 1e-6)
     lip = lip[np.argsort(radius[lip])]
-    terms: list[Energy] = [StretchStVK(cloth), BendHinge(cloth)]
-    if poisson_ratio == "zero":
-        terms.append(GaussianCurvature.without_poisson_effect(cloth, D))
-    rest = cloth.rest_positions
-    x = rest.copy()
-    x[:, 1] = 1e-3 * turn**2
-    x[cloth.pins] = rest[cloth.pins]
     share = np.gradient(radius[lip])
     share[[0, -1]] /= 2
-    forces = np.zeros_like(rest)
+    forces = np.zeros_like(cloth.rest_positions)
+    x = cloth.rest_positions.copy()
+    x[:, 1] = 1e-3 * turn**2
+    x[cloth.pins] = cloth.rest_positions[cloth.pins]
     for stage in range(1, STAGES + 1):
         forces[lip, 1] = LOAD * share * (stage / STAGES) ** 2
         result = minimise(Potential([*terms, DeadLoad(cloth, forces)]), x, tolerance=1e-4)
         x = demand_converged(result, f"the plate at stage {stage}").positions
     return x[lip[[0, -1]], 1]
-
-
-def annulus(rows: int) -> tuple[Cloth, np.ndarray, np.ndarray]:
-    """Return the flat plate, clamped, and its vertices' angles from the clamp [rad] and radii [m]."""
-    width = np.log(OUTER / INNER)
-    columns = round(2 * np.pi / width * rows * ROW)
-    flat, faces = rectangle("equilateral", columns, rows, 2 * np.pi, width)
-    h = 2 * np.pi / (columns - 0.5)
-    turn = (
-        flat[:, 0] * columns / (columns - 0.5) - h / 2
-    )  # the clamp lies half-way between two pinned columns
-    radius = INNER * np.exp(flat[:, 1])
-    rest = np.stack([radius * np.cos(turn), 0.0 * turn, -radius * np.sin(turn)], axis=1)
-    material = Material(
-        young_modulus=YOUNG, poisson_ratio=0.0, thickness=THICKNESS, density=1.0, bending_stiffness=D / C11
-    )
-    return Cloth(rest, faces, material, pins=np.flatnonzero(turn < 0.6 * h)), turn, radius

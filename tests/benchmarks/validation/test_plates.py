@@ -92,7 +92,8 @@ def test_rolling_up_a_sheet_is_no_gaussian_curvature():
 
 
 def test_the_slit_annulus_is_made_of_equilateral_triangles():
-    cloth, turn, radius = annulus(16)
+    plate = annulus(16)
+    cloth, turn, radius = plate.cloth, plate.turn, plate.radius
     assert (radius.min(), radius.max()) == pytest.approx((INNER, OUTER))
     assert turn.max() == pytest.approx(2 * np.pi)
     angles = np.degrees(corner_angles(cloth.rest_positions, cloth.faces))

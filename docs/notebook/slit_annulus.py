@@ -1,0 +1,56 @@
+"""Lifts of the slit annular plate on other meshes, with other stiffness: the tables of simulator.md.
+
+    OMP_NUM_THREADS=1 python docs/notebook/slit_annulus.py
+
+It takes three minutes and prints the inner and the outer lift [m] and how far they are from Sze's [%].
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.validation.bending.cases import SZE
+from benchmarks.validation.bending.gaussian_curvature import GaussianCurvature
+from benchmarks.validation.bending.plates import plate_stiffness
+from benchmarks.validation.bending.slit_annulus import MATERIAL, D, annulus, lift
+from benchmarks.validation.case import slow_paths_allowed
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+
+EXACT = np.array([lift for _, lift in SZE])
+
+
+def measure(rows: int, *, zero: bool, family: str = "equilateral", bend: float = 1.0, stretch: float = 1.0):
+    """Print the lifts: nu = 0 if `zero`, else that of hinges; factors on bending and membrane stiffness."""
+    stiffness = bend * D / plate_stiffness(family, "length_area")
+    young = stretch * MATERIAL.young_modulus
+    material = replace(MATERIAL, young_modulus=young, bending_stiffness=stiffness)
+    plate = annulus(rows, material, family)
+    terms: list[Energy] = [StretchStVK(plate.cloth), BendHinge(plate.cloth)]
+    if zero:
+        terms.append(GaussianCurvature.without_poisson_effect(plate.cloth, bend * D))
+    lifts = lift(plate, terms)
+    print(
+        f"{family:12} {rows:4} {zero!s:6} {bend:5} {stretch:5}", lifts, 100 * (lifts / EXACT - 1), flush=True
+    )
+
+
+if __name__ == "__main__":
+    np.set_printoptions(precision=4, suppress=True)
+    print("triangles  rows  nu = 0  bending  membrane  lifts  distance [%]")
+    with slow_paths_allowed():
+        for zero in (True, False):
+            for rows in (4, 8, 16, 32):
+                measure(rows, zero=zero)
+        for family in ("right", "cross", "union_jack", "delaunay"):
+            for rows in (8, 16):
+                measure(rows, zero=False, family=family)
+        for stretch in (0.1, 10.0):
+            for rows in (4, 8, 16):
+                measure(rows, zero=True, stretch=stretch)
+        for bend in (0.97, 1.03):
+            for rows in (8, 16):
+                measure(rows, zero=True, bend=bend)
