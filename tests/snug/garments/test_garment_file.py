@@ -312,7 +312,7 @@ def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, t
     worn = {scene.garment for scene in plan.scenes if scene.dressed}
     assert worn == {"mine"} and {network.garment for network in plan.networks} == {"mine"}
     names = {scene.name for scene in plan.scenes}
-    assert {"mine/push_recovery", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
+    assert {"mine/01_01_a", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
     with pytest.raises(PlanError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
         planned("--garment", str(path), "--scenes", "dependence/mesh/500", "-o", out)
     usual = planned("--preset", "smoke", "-o", out)
