@@ -2,8 +2,8 @@
 
     python docs/notebook/first_steps.py --vertices 4400 --steps 2000 --rules keras torch
 
-prints one line for each step of the table in training.md#the-start-of-the-papers-recipe: rules, step, loss and
-its terms [J a frame].
+prints one line for each step of the table in training.md#the-start-of-the-papers-recipe: rules, step, loss
+and its terms [J a frame].
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ SETTLED = 200  # steps after which a jump of the loss is counted
 
 
 def main() -> None:
+    """Train by each of the rules named and print as it goes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--vertices", type=int, default=4400)
     parser.add_argument("--steps", type=int, default=2000)
