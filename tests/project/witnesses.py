@@ -26,6 +26,8 @@ WITNESSES = {
         "plate_stiffness_equilateral_scaled",
         "plate_morley_equilateral_unscaled",
         "plate_morley_equilateral_scaled",
+        "slit_annulus_inner",
+        "slit_annulus_outer",
         "end_loaded_cantilever_1",
         "end_loaded_cantilever_3",
         "end_loaded_cantilever_10",
