@@ -11,6 +11,8 @@ import math
 
 from torch import nn
 
+from snug.recipes.recipe import INITIALISATIONS
+
 
 def initialise(network: nn.Module, rules: str) -> None:
     """Give a network's linear layers and gated recurrent units the weights that they start from.
@@ -23,13 +25,13 @@ def initialise(network: nn.Module, rules: str) -> None:
 
     Args:
         network: newly made; changed in place by Keras' rules.
-        rules: "keras" or "torch".
+        rules: one of INITIALISATIONS.
 
     Raises:
         ValueError: for other rules.
     """
-    if rules not in ("keras", "torch"):
-        raise ValueError(f"unknown rules of initialisation {rules!r}: use keras or torch")
+    if rules not in INITIALISATIONS:
+        raise ValueError(f"unknown rules of initialisation {rules!r}: use one of {INITIALISATIONS}")
     if rules == "torch":
         return
     for layer in network.modules():
