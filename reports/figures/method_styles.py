@@ -43,6 +43,7 @@ KNOWN = {
     "untrained": Style("", "#56B4E9", "v", ":"),
     "pbns": Style("", "#009E73", "^", "-."),
     "pbns-springs": Style("", "#117733", "^", ":"),
+    "pbns-paper": Style("", "#00725A", "^", "--"),
     "tailornet": Style("", "#661100", "H", ":"),
     "santesteban2019": Style("", "#AA4499", "d", (0.0, (1.0, 1.0))),
     "supervised": Style("", "#E69F00", "s", (0.0, (6.0, 1.5))),

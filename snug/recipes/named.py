@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from snug.recipes.recipe import DEFAULT, TERMS, Recipe, RecipeError
 
-# Four things are not the text's: d(x) is taken to cached points of the skin, which walk with the cloth
+# Five things are not the text's: d(x) is taken to cached points of the skin, which walk with the cloth
 # and of which `contact_refresh` searches a few anew in a step (the text computes it anew; searching all 48
 # frames would take several times as long as the rest of a step); only to skin that the rule of regions
 # allows; the garment that the offsets are added to follows the shape of the body; and hinges are scaled, as

@@ -55,6 +55,8 @@ def post_processed(entry: MethodEntry) -> MethodEntry:
 
 NETWORKS = (
     network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
+    network("pbns-paper", "PBNS, paper's text", "PBNS with StVK, trained as SNUG by the paper's text",
+            base="pbns", pairing_group="pbns"),
     network("santesteban2019", "Santesteban 2019",
             "fit by shape and one GRU of 1500, trained on simulated vertices"),
     network("tailornet", "TailorNet",

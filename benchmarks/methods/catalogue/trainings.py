@@ -14,6 +14,7 @@ from snug.recipes.recipe import DEFAULT
 TRAININGS = {
     "snug": Training("snug", DEFAULT),
     "pbns": Training("pbns", DEFAULT),
+    "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
     "supervised": Training("supervised", SUPERVISED, Simulated()),
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
