@@ -130,8 +130,8 @@ PRESETS = (
     ),
     Preset(
         name="paper",
-        description="garments of 4400 vertices, all frames of all motions, 30,000 steps of SNUG, 136,000 by the "
-        "paper's text: hours",
+        description="garments of 4400 vertices, all frames of all motions, 30,000 steps of SNUG, 136,000 by "
+        "the paper's text: hours",
         garment_vertices=4400,
         train_motions=None,
         test_motions=None,
