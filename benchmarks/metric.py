@@ -96,6 +96,9 @@ class Metric:
         for what in ("name", "unit", "title", "definition", "table"):
             if not isinstance(word := getattr(self, what), str):
                 raise ValueError(f"metric '{self.name}': {what}={word!r}: give a string")
+        for what in ("name", "unit"):  # heads of columns: no formula to programs that open CSV files
+            if getattr(self, what).startswith(("=", "+", "-", "@")):
+                raise ValueError(f"metric '{self.name}': {what} begins with one of = + - @: take another")
         if not self.unit:
             raise ValueError(f"metric '{self.name}' has no unit: say '1' where it has no dimension")
         if self.of not in NUMBERS_OF:

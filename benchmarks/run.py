@@ -16,6 +16,7 @@ from benchmarks.plan.options import PROGRAM, make_parser, request_of_run
 from benchmarks.plan.plan import Plan
 from benchmarks.process.timing import one_thread
 from benchmarks.tasks.task import RunStopped
+from reference_sim.command.command_line import heeded_interrupts
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,6 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)
+        return 130
     return carry_out(plan, dry_run=options.dry_run)
 
 
@@ -51,7 +55,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
         from benchmarks.runner.execute_plan import check_roll_outs, execute
 
         assets = check_roll_outs(plan)
-        with held(plan.folder):
+        with held(plan.folder), heeded_interrupts():
             return execute(plan, assets)
     except (HeldError, DeclarationError, RollOutError) as error:
         print(f"{program}: {error}", file=sys.stderr)
@@ -59,8 +63,8 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
     except (RunStopped, OSError) as error:
         from reference_sim.files.atomic_files import disk_full
 
-        line = str(error) if isinstance(error, RunStopped) else disk_full(error)
-        if not line:
+        line = str(error) if isinstance(error, RunStopped) or error.filename else ""
+        if not (line := disk_full(error) or line):
             raise
         print(f"{program}: {line}; the same command goes on from there", file=sys.stderr)
         return 1

@@ -78,6 +78,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as error:  # as in benchmarks.run
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)
+        return 130
     with contextlib.redirect_stdout(sys.stderr):
         status = carry_out(plan, program=PROGRAM)
     if status in (0, 1):

@@ -50,8 +50,11 @@ class RollOutOption:
     role: str = "external"
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(rf"[{CHARACTERS}]+", self.name):
-            raise RollOutError(f"{self.path}: the name '{self.name}' has other than letters, digits and _-+.")
+        if not re.fullmatch(rf"\w[{CHARACTERS}]*", self.name):
+            raise RollOutError(
+                f"{self.path}: the name '{self.name}' has other than letters, digits and _-+., or "
+                "begins with one of -+."
+            )
 
     @property
     def places(self) -> bool:

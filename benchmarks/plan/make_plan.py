@@ -107,7 +107,7 @@ def check_garment_name(file: GarmentFile) -> None:
     taken = {scene.split("/")[0] for scene in all_scenes((), ())} | {
         scenes.garment for scenes in GARMENT_SCENES
     }
-    if file.name in taken or not re.fullmatch(r"[\w.+-]+", file.name):
+    if file.name in taken or not re.fullmatch(r"\w[\w.+-]*", file.name):
         raise PlanError(
             f"--garment {file.path}: '{file.name}' cannot name its scenes: give the file another name, of "
             "letters, digits and '_'"

@@ -37,7 +37,7 @@ def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:
     """
     stated = FileConventions(options.units, options.up, options.fps, options.match_vertices)
     stem = Path(options.roll_out.rstrip("/").replace(PLACE, "")).stem
-    name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-.") or "roll-out"
+    name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out"
     option = RollOutOption(name, options.roll_out, stated, check_declared_ms(options.declared_ms))
     fields, scenes = scene_fields(options), split([options.scene or ""])
     if options.rest_mesh:

@@ -165,7 +165,7 @@ def import_file(home: str) -> ModuleType:
         module = load(home)
     except DeclarationError:
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:  # whatever a user's file raises, also what usually ends a program
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in code]
         where = f"{frames[-1].filename}: line {frames[-1].lineno}" if frames else home
         raise DeclarationError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from None

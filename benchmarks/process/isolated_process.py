@@ -17,6 +17,8 @@ from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.process.errors import one_line
+
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
@@ -185,7 +187,11 @@ def _serve(pipe: Connection, begin: Callable[..., None] | None, arguments: tuple
             return
         try:
             answer = (True, function(*arguments))
+        except SystemExit:
+            raise
         except Exception as error:
             answer = (False, error)
+        except BaseException as error:  # a user's code raised it: interrupts are ignored here
+            answer = (False, WorkerDied(one_line(error)))
         sys.stderr.flush()
         pipe.send(answer)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -105,6 +106,18 @@ _WHOLE_NUMBERS = ("seed", "threads")
 _TRUTHS = {"true": True, "false": False}
 _NAMES = ("suite", "scene", "method", "metric", "garment", "motion", "part", "family", "role", "base")
 LONGEST_NAME = 150  # bytes: files are named after it
+_NO_FORMULA = re.compile(r"-|[+-]?[0-9.]+(e[+-]?[0-9]+)?")  # a dash, or a number
+
+
+def cell_text(text: str) -> str:
+    """Return a text for a cell of a CSV file, which no program that opens it takes for a formula.
+
+    >>> cell_text("=1+1"), cell_text("-"), cell_text("-0.5")
+    ("'=1+1", '-', '-0.5')
+    """
+    if text.startswith(("=", "@")) or (text.startswith(("+", "-")) and not _NO_FORMULA.fullmatch(text)):
+        return f"'{text}"
+    return text
 
 
 def row_to_cells(row: Row) -> dict[str, str]:
@@ -121,7 +134,7 @@ def row_to_cells(row: Row) -> dict[str, str]:
         elif name == "moved":
             cells[name] = json.dumps(dict(value)) if value else ""
         else:
-            cells[name] = " ".join(str(value).split())
+            cells[name] = cell_text(" ".join(str(value).split()))
     return cells
 
 

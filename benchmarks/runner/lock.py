@@ -24,6 +24,8 @@ def held(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         raise HeldError(f"--out {folder}: there is a file in the way; name another folder") from None
+    except OSError as error:
+        raise HeldError(f"--out {folder}: cannot be made ({error.strerror}); name another folder") from None
     with ExitStack() as closing:
         try:
             import fcntl

@@ -60,7 +60,7 @@ def read_arrays(
 
     Raises:
         ArrayFileError: no such file, no archive, encrypted, packed in an unknown way, damaged, an array that
-            is not plain or not as long as it declares, more than `limit` bytes together.
+            is not plain or not as long as it declares, two of one name, more than `limit` bytes together.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -76,6 +76,8 @@ def read_arrays(
                 name = info.filename.removesuffix(".npy")
                 if name == info.filename or (names is not None and name not in names):
                     continue
+                if name in arrays:
+                    raise ValueError("is there twice")
                 _check_member(info)
                 with archive.open(info) as member:
                     arrays[name] = _array(member, info.file_size, limit)

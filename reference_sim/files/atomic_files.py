@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +23,8 @@ def replacing(path: Path) -> Iterator[Path]:
         OSError: names `path` where there is no room for it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    # A name that nobody can foresee: a link that lay there would be followed.
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.part{path.suffix}")
     try:
         yield temporary
         with temporary.open("rb+") as file:
@@ -47,12 +49,17 @@ def new_folder(folder: Path) -> Iterator[Path]:
     """Give a folder to fill: under its name once the block ends well, gone when it does not.
 
     Raises:
-        ValueError: something exists under that name.
+        ValueError: something exists under that name, or no folder can be made there.
     """
     demand_new(folder)
     whole = folder.resolve()
     part = whole.with_name(f".{whole.name}.{os.getpid()}.part")
-    part.mkdir(parents=True)
+    try:
+        part.mkdir(parents=True)
+    except OSError as error:
+        if error.errno in NO_ROOM_ERRORS:
+            raise
+        raise ValueError(f"{folder}: cannot be made ({error.strerror}); name another folder") from None
     try:
         yield part
         if whole.is_dir():  # and empty; not every system replaces it
@@ -71,6 +78,16 @@ def disk_full(error: BaseException) -> str:
     free = shutil.disk_usage(folder).free / 1e6
     name = error.filename or "a file"
     return f"{name}: {error.strerror} ({free:.3g} MB are free there); what was finished is kept"
+
+
+def create(path: Path) -> None:
+    """Create an empty file in place of what lies there; a link is removed, not followed.
+
+    Raises:
+        OSError: it cannot be made; or another program made one in this moment.
+    """
+    path.unlink(missing_ok=True)
+    path.open("xb").close()
 
 
 def reserve(path: Path, size: int) -> None:

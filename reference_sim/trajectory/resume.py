@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from reference_sim.files.atomic_files import create
 from reference_sim.trajectory.trajectory import UNREADABLE_ERRORS, Trajectory, TrajectoryError, read_frames
 from reference_sim.trajectory.writer import BEFORE_LAST_STEP, END_OF_FILE, FIRST_FAILURE, UNFINISHED
 
@@ -89,6 +90,7 @@ def _opened(path: Path) -> Iterator[h5py.File]:
         return
     copy = path.with_name(path.name + ".recovered")
     try:
+        create(copy)
         shutil.copyfile(path, copy)
         os.truncate(copy, path.stat().st_size + missing)
         with h5py.File(copy, "r") as file:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.files.atomic_files import reserve
+from reference_sim.files.atomic_files import create, reserve
 
 if TYPE_CHECKING:
     import h5py
@@ -67,7 +67,7 @@ class TrajectoryWriter:
         """Make the file, with room for its faces; where there is no room it is gone again."""
         import h5py
 
-        path.write_bytes(b"")
+        create(path)
         try:
             reserve(path, 16 * numbers + ROOM_FOR_HDF5)
             self._file = h5py.File(path, "w")

@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.results.row import cell_text
 from reference_sim.files.atomic_files import replacing
 from reports.run.finished_run import Metric
 from reports.statistics.means_and_spreads import Mean
@@ -109,7 +110,7 @@ def _csv_text(cell: Cell) -> str:
     if isinstance(cell, Effect):
         return csv_number(cell.shown)
     if isinstance(cell, str):
-        return cell or CSV_DASH
+        return cell_text(cell) or CSV_DASH
     return str(cell) if isinstance(cell, int) or cell == math.inf else csv_number(cell)
 
 

@@ -68,10 +68,13 @@ class _File:
             raise BodyError(f"{error}; {remedy}") from error
         if not isinstance(content, dict):
             raise self.error(f"holds a {type(content).__name__}; expected a dict of arrays")
-        self.arrays: dict[str, Any] = {}  # of numpy, or sparse matrices
+        self.arrays: dict[str, Any] = {}  # of numpy; J_regressor may be a sparse matrix
         for key, synonyms in SYNONYMS.items():
             if present := [content[name] for name in synonyms if name in content]:
-                self.arrays[key] = present[0] if scipy.sparse.issparse(present[0]) else np.asarray(present[0])
+                sparse = scipy.sparse.issparse(present[0])
+                if sparse and key != "J_regressor":
+                    raise self.error(f"{key} is a sparse matrix; give a plain array, as toarray() makes")
+                self.arrays[key] = present[0] if sparse else np.asarray(present[0])
 
     def error(self, problem: str) -> BodyError:
         """Return the error that names the file."""

@@ -19,6 +19,7 @@ HAND_DAMPING = 0.1
 HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand")]
 
 MAX_NAME_BYTES = 100  # bytes of a motion's name
+FORMULA = ("=", "+", "-", "@")  # what begins with one of these is a formula to programs that open CSV files
 
 
 def load_motions(
@@ -65,10 +66,11 @@ def load_motions(
 
 def read_motion(file: Path, options: MotionFileOptions) -> Motion:
     """Read one clip as recorded, at its rate, y up and without recording errors. Raises MotionError."""
-    if not file.stem.isprintable() or len(file.stem.encode(errors="replace")) > MAX_NAME_BYTES:
+    printable = file.stem.isprintable() and not file.stem.startswith(FORMULA)
+    if not printable or len(file.stem.encode(errors="replace")) > MAX_NAME_BYTES:
         raise MotionError(
             f"{str(file)[:200]!a}: files are named after a motion; give this one a name of at most "
-            f"{MAX_NAME_BYTES} printable bytes"
+            f"{MAX_NAME_BYTES} printable bytes that begins with none of {' '.join(FORMULA)}"
         )
     reader = READERS.get(file.suffix.lower())
     if reader is None:

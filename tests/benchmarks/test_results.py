@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import subprocess
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -14,6 +16,7 @@ from benchmarks.results.json_file import ResultsError
 from benchmarks.results.row import COLUMNS, Row, with_provenance
 from benchmarks.results.run_config import FORMAT
 from benchmarks.results.run_folder import RunFolder
+from reference_sim import Trajectory
 from reference_sim.files.atomic_files import replacing
 
 ROWS = [
@@ -170,6 +173,27 @@ def test_replacing_keeps_the_suffix_for_writers_that_look_at_it(tmp_path):
         assert temporary.suffix == ".vtkhdf" and temporary.parent == tmp_path
         temporary.write_text("x")
     assert (tmp_path / "a.vtkhdf").read_text() == "x"
+
+
+def test_what_lies_under_a_part_files_name_is_not_followed(tmp_path):
+    """Links under the names of part files, as somebody else may leave them in a folder that all can write."""
+    other = tmp_path / "other"
+    other.write_text("precious")
+    sheet = Trajectory(np.zeros((2, 3, 3)), np.array([[0, 1, 2]]), np.array([0.0, 0.1]))
+    (tmp_path / f".results.{os.getpid()}.part.csv").symlink_to(other)
+    (tmp_path / "a.vtkhdf.part").symlink_to(other)
+    RunFolder(tmp_path).write_rows(ROWS)
+    sheet.save(tmp_path / "a.vtkhdf")
+    assert other.read_text() == "precious"
+    assert len(RunFolder(tmp_path).read_rows()) == len(ROWS)
+    assert (Trajectory.load(tmp_path / "a.vtkhdf").positions == sheet.positions).all()
+
+
+def test_no_text_of_a_row_is_a_formula(tmp_path):
+    row = dataclasses.replace(ROWS[0], status="failed", value=None, reason="=HYPERLINK(1)")
+    RunFolder(tmp_path).write_rows([row])
+    assert "'=HYPERLINK(1)" in RunFolder(tmp_path).rows_path.read_text()
+    assert RunFolder(tmp_path).read_rows()[0].reason == "'=HYPERLINK(1)"
 
 
 def test_trajectory_paths_are_flat_and_told_apart(tmp_path):

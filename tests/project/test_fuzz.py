@@ -31,7 +31,7 @@ def test_mutated_files_are_refused_in_one_line(count, tmp_path):
     assert found["refused"] > 0.7 * count and found["peak"] < 2000.0 and found["slowest"] < 10.0
 
 
-@pytest.mark.parametrize("name", [b"a" * 246, b"walk\xff", b"two\nlines"])
+@pytest.mark.parametrize("name", [b"a" * 246, b"walk\xff", b"two\nlines", b"=1+1", b"@walk"])
 def test_a_motion_that_no_file_can_be_named_after_is_refused(name, tmp_path):
     path = tmp_path / os.fsdecode(name + b".npz")
     path.write_bytes(b"")

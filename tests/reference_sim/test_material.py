@@ -83,6 +83,14 @@ def test_other_impossible_values_are_refused_by_name(wrong):
         Material(**wrong)
 
 
+@pytest.mark.parametrize(
+    "tiny", [{"thickness": 1e-300}, {"young_modulus": 1e-300}, {"density": 1e-300}, {"young_modulus": 1e300}]
+)
+def test_a_cloth_whose_stiffness_or_mass_is_lost_in_round_off_is_refused(tiny):
+    with pytest.raises(ValueError, match=rf"{next(iter(tiny))} = .*beyond what can be computed with"):
+        Material(**tiny)
+
+
 def test_a_material_is_frozen():
     with pytest.raises(FrozenInstanceError):
         Material().density = 1.0

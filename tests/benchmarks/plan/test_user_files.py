@@ -157,6 +157,7 @@ PLAIN = 'name="a", description="b"'
         ("METHODS = ()\n", "bad.py: METHODS is empty"),
         ("def f():\n    return 1 / 0\nf()\n", "bad.py: line 2: ZeroDivisionError: division by zero"),
         ("import sys\nsys.exit(3)\n", "bad.py: line 2: SystemExit: 3"),
+        ("\nraise KeyboardInterrupt\n", "bad.py: line 2: KeyboardInterrupt"),
         ("import nothing_there\n", "bad.py: line 1: ModuleNotFoundError"),
         (HEAD + ENTRY.format('name="a", lable="b"'), "bad.py: line 2: TypeError"),
         (HEAD + ENTRY.format(PLAIN), "bad.py: has no function make"),

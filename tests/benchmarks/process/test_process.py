@@ -26,6 +26,17 @@ def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():
         assert process.call(operator.mul, 2, 5, seconds=60) == 10
 
 
+def interrupt():
+    raise KeyboardInterrupt("by the work itself")
+
+
+def test_an_interrupt_that_the_work_raises_is_a_failure_of_the_work():
+    with IsolatedProcess() as process:
+        with pytest.raises(WorkerDied, match="KeyboardInterrupt: by the work itself"):
+            process.call(interrupt, seconds=60)
+        assert process.call(operator.mul, 2, 4, seconds=60) == 8
+
+
 def test_a_process_that_cannot_start_is_none_at_all():
     with IsolatedProcess(lambda: None) as process:  # cannot be sent to it
         for _ in range(2):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import errno
 import importlib
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -44,6 +47,43 @@ def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, message, 
     assert main() == status
     error = capsys.readouterr().err
     assert error.startswith("some.command: ") and message in error and error.count("\n") == 1
+
+
+class Swallows:
+    """An object whose end interrupts, as a Ctrl-C that comes while h5py's weak references are called back."""
+
+    def __del__(self) -> None:
+        raise KeyboardInterrupt
+
+
+def test_an_interrupt_within_a_callback_is_not_lost(capsys):
+    @command("some.command")
+    def main() -> int:
+        Swallows()
+        for _ in range(1000):
+            time.sleep(0.005)
+        return 0
+
+    before = sys.unraisablehook
+    assert main() == 130
+    assert "interrupted" in capsys.readouterr().err and sys.unraisablehook is before
+
+
+NOWHERE = "/proc/nowhere/out"  # nobody makes a folder there, not even who may do everything
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a place where nothing can be written")
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("benchmarks.run", ["--preset", "smoke", "--scenes", "free_fall", "--methods", "simulation"]),
+        ("benchmarks.export", ["hanging_sheet"]),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_one_line(name, words, capsys):
+    assert importlib.import_module(name).main([*words, "-o", NOWHERE]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and f"{NOWHERE}: cannot be made" in error
 
 
 def test_a_fault_of_the_program_is_raised():

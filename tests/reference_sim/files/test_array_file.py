@@ -86,6 +86,16 @@ def test_a_declaration_that_the_file_does_not_bear_out_is_refused(tmp_path, shap
         assert str(tmp_path / name) in str(refusal.value) and "\n" not in str(refusal.value)
 
 
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_two_arrays_of_one_name_are_refused(tmp_path):
+    """Readers differ in which of the two they take."""
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        for value in (b"1", b"2"):
+            archive.writestr("poses.npy", npy("(2,)", data=8 * value + bytes(8)))
+    with pytest.raises(ArrayFileError, match="array 'poses': is there twice"):
+        read_arrays(tmp_path / "a.npz")
+
+
 def test_a_small_file_of_a_large_array_takes_no_memory(tmp_path):
     """Five gigabytes of zeros, in 5 MB: refused by the limit, and by what deflate can pack."""
     data = npz(npy("(625000000,)", data=bytes(50_000_000)))

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_matrix
+from scipy.sparse import coo_matrix, csc_matrix
 from scipy.spatial.transform import Rotation
 
 from snug.body.bake import merge_weights, to_t_pose
@@ -364,6 +364,15 @@ def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
         read_body(path)
     message = str(caught.value)
     assert says in message and str(path) in message and "\n" not in message
+
+
+@pytest.mark.parametrize("name", ["kintree_table", "f", "weights", "v_template"])
+def test_what_need_not_be_sparse_is_refused_in_one_line(name, layouts, tmp_path):
+    arrays = layouts["SMPL"]
+    path = tmp_path / "sparse.pkl"
+    path.write_bytes(pickle.dumps(arrays | {name: coo_matrix(arrays[name])}))
+    with pytest.raises(BodyError, match=f"{name} is a sparse matrix; give a plain array"):
+        read_body(path)
 
 
 @pytest.mark.parametrize(
