@@ -3,8 +3,8 @@
 | folder | metrics |
 | --- | --- |
 | energies | energy/*, excess/*, gap/*, step/*, gradient/norm |
-| surface | curvature/*, distance/*, penetration/*, drift/hem, deformation/*, dihedral/mean, body/*, mesh/* |
-| motion | dynamics/*, conservation/*, exact/distance, time_error/*, motion/*, roll_out/* |
+| surface | curvature/*, wrinkles/*, distance/*, penetration/*, drift/hem, deformation/*, stretch/*, dihedral/mean, intersections/*, body/*, mesh/* |
+| motion | velocity/error, acceleration/error, dynamics/*, conservation/*, exact/distance, time_error/*, motion/*, roll_out/* |
 | cost | cost/*, solver/*, training_distance/*, performance/* |
 
 >>> find_metric("curvature/mean").unit
@@ -27,12 +27,16 @@ MODULES = {
     "printed_bending": "benchmarks.metrics.energies.printed_bending",
     "excess": "benchmarks.metrics.energies.excess",
     "curvature": "benchmarks.metrics.surface.curvature",
+    "wrinkles": "benchmarks.metrics.surface.wrinkle_spectrum",
     "shape": "benchmarks.metrics.surface.rest_shape",
+    "swept": "benchmarks.metrics.surface.swept_crossings",
+    "stretch": "benchmarks.metrics.surface.principal_stretches",
     "geometry": "benchmarks.metrics.surface.penetration_and_distances",
     "body": "benchmarks.metrics.surface.body_intersections",
     "optimality": "benchmarks.metrics.energies.energy_gap",
     "solver": "benchmarks.metrics.cost.relaxed_frames",
     "exact": "benchmarks.metrics.motion.exact_distance",
+    "velocity": "benchmarks.metrics.motion.velocity_error",
     "dynamics": "benchmarks.metrics.motion.dynamics",
     "training_distance": "benchmarks.metrics.cost.training_distance",
     "conservation": "benchmarks.metrics.motion.conservation",

@@ -1,4 +1,4 @@
-"""Metrics deformation/*, dihedral/mean, intersections/triangles: a frame against the cloth's rest shape."""
+"""Metrics deformation/*, dihedral/mean, intersections/triangles, /contours: a frame against the rest shape."""
 
 from __future__ import annotations
 
@@ -32,19 +32,26 @@ METRICS = (
         name="intersections/triangles", unit="%", title="Self-cut", table="shape", lower_is_better=True,
         definition="triangles that pass through another one of the same cloth, mean over frames",
     ),
+    Metric(
+        name="intersections/contours", unit="m", title="Contours", table="shape", lower_is_better=True,
+        definition="length of the lines in which triangles of the cloth pass through others of it, mean over "
+        "frames",
+    ),
 )  # fmt: skip
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return changes of edges and areas [%], folds [degrees] and self-intersections [%]."""
-    from benchmarks.metrics.surface.self_intersections import intersecting_share  # loads numba
+    """Return changes of edges and areas [%], folds [degrees] and self-intersections [%], [m]."""
+    from benchmarks.metrics.surface.self_intersections import share_and_contours  # loads numba
 
     cloth, x = roll_out.scene.cloth, roll_out.positions[roll_out.judged]
+    share, contours = share_and_contours(x, cloth.faces)
     return {
         "deformation/edges": 100.0 * float(edge_change(x, cloth.edges, cloth.edge_lengths).mean()),
         "deformation/areas": 100.0 * float(area_change(x, cloth.faces, cloth.areas).mean()),
         "dihedral/mean": float(np.rad2deg(dihedral_angle(x, cloth.hinges).mean())),
-        "intersections/triangles": 100.0 * float(intersecting_share(x, cloth.faces).mean()),
+        "intersections/triangles": 100.0 * float(share.mean()),
+        "intersections/contours": float(contours.mean()),
     }
 
 

@@ -1,7 +1,8 @@
 """Self-intersections of a cloth: triangles that pass through others of the same cloth.
 
 Two triangles without a common vertex intersect where an edge of one crosses the inside of the other. Pairs
-come from a sweep along x over bounding boxes. Triangles that touch in one plane count as apart.
+come from a sweep along x over bounding boxes. Triangles that touch in one plane count as apart. The line in
+which two triangles intersect ends at two such crossings; all lines together are the intersection contours.
 """
 
 from __future__ import annotations
@@ -14,30 +15,35 @@ from reference_sim.kernels.kernel_cache import njit
 Floats = NDArray[np.float64]
 
 
-def intersecting_share(positions: Floats, faces: NDArray[np.int64]) -> Floats:
-    """Return the share of faces (F,3) that pass through another one in each frame, (T,)."""
-    return np.array([intersecting(np.ascontiguousarray(x), faces).mean() for x in positions])
+def share_and_contours(positions: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Return for each frame the share of faces (F,3) that pass through another one, and the contours' length.
+
+    positions: (T,V,3) [m]. Both are (T,), the length in metres.
+    """
+    frames = [self_intersections(np.ascontiguousarray(x), faces) for x in positions]
+    return np.array([hit.mean() for hit, _ in frames]), np.array([length for _, length in frames])
 
 
-def intersecting(x: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which faces (F,3) of positions (V,3) [m] pass through another without a common vertex, (F,).
+def self_intersections(x: Floats, faces: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:
+    """Return which faces (F,3) of positions (V,3) [m] intersect another, (F,), and the contours' length [m].
 
     >>> import numpy as np
-    >>> flat, upright = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[1, 1, -1], [1, 1, 1], [9, 9, 0]]
-    >>> intersecting(np.array(flat + upright, dtype=float), np.array([[0, 1, 2], [3, 4, 5]]))
-    array([ True,  True])
+    >>> flat, upright = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[1, 1, -1], [1, 1, 1], [3, 1, 0]]
+    >>> self_intersections(np.array(flat + upright, dtype=float), np.array([[0, 1, 2], [3, 4, 5]]))[1]
+    2.0
     """
     corners = x[faces]
     low, high = corners.min(1), corners.max(1)
     order = np.argsort(low[:, 0], kind="stable")
     hit = np.zeros(len(faces), dtype=np.bool_)
-    _sweep(x, np.ascontiguousarray(faces, dtype=np.int64), low, high, order, hit)
-    return hit
+    length = _sweep(x, np.ascontiguousarray(faces, dtype=np.int64), low, high, order, hit)
+    return hit, float(length)
 
 
 @njit(cache=True)
 def _sweep(x, faces, low, high, order, hit):
-    count = len(order)
+    count, length = len(order), 0.0
+    ends = np.empty((6, 3))  # where edges of two triangles cross the other one
     for at in range(count):
         e = order[at]
         for other in range(at + 1, count):
@@ -48,11 +54,16 @@ def _sweep(x, faces, low, high, order, hit):
                 continue
             if low[f, 2] > high[e, 2] or low[e, 2] > high[f, 2]:
                 continue
-            if (hit[e] and hit[f]) or _neighbours(faces[e], faces[f]):
+            if _neighbours(faces[e], faces[f]):
                 continue
-            if _crosses(x, faces[e], faces[f]) or _crosses(x, faces[f], faces[e]):
+            found = _crossings(x, faces[e], faces[f], ends, 0)
+            found = _crossings(x, faces[f], faces[e], ends, found)
+            if found > 0:
                 hit[e] = True
                 hit[f] = True
+            if found > 1:
+                length += np.sqrt(((ends[0] - ends[1]) ** 2).sum())
+    return length
 
 
 @njit(cache=True, inline="always")
@@ -74,14 +85,18 @@ def _volume(x, a, b, c, d):
 
 
 @njit(cache=True)
-def _crosses(x, edges_of, face):
-    """Return whether an edge of one triangle passes through the inside of the other."""
+def _crossings(x, edges_of, face, ends, found):
+    """Append to ends[:found] where edges of one triangle cross the inside of the other; return their number."""
     a, b, c = face[0], face[1], face[2]
     for i in range(3):
         p, q = edges_of[i], edges_of[(i + 1) % 3]
-        if _volume(x, a, b, c, p) * _volume(x, a, b, c, q) >= 0.0:
+        before, behind = _volume(x, a, b, c, p), _volume(x, a, b, c, q)
+        if before * behind >= 0.0:
             continue
         first, second, third = _volume(x, p, q, a, b), _volume(x, p, q, b, c), _volume(x, p, q, c, a)
         if (first > 0.0 and second > 0.0 and third > 0.0) or (first < 0.0 and second < 0.0 and third < 0.0):
-            return True
-    return False
+            share = before / (before - behind)
+            for axis in range(3):
+                ends[found, axis] = (1.0 - share) * x[p, axis] + share * x[q, axis]
+            found += 1
+    return found

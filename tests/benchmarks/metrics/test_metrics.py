@@ -33,7 +33,7 @@ from benchmarks.metrics.surface.penetration_and_distances import (
     penetration,
 )
 from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
-from benchmarks.metrics.surface.self_intersections import intersecting, intersecting_share
+from benchmarks.metrics.surface.self_intersections import self_intersections, share_and_contours
 from benchmarks.results.row import Row
 from benchmarks.runner.rows import remarked
 from reference_sim import Obstacle, Trajectory, simulate
@@ -296,15 +296,19 @@ def test_intersections_are_those_of_two_crossing_strips():
     both = np.concatenate([faces, faces + len(flat)])
     above = np.concatenate([flat, flat + np.array([0.0, 0.0, 0.01])])
     same = np.concatenate([flat, flat])
-    assert intersecting_share(np.array([above, same]), both) == pytest.approx([0.0, 0.0])
+    assert np.array(share_and_contours(np.array([above, same]), both)) == pytest.approx(np.zeros((2, 2)))
     crossing = np.concatenate([flat, upright])
     corners = flat[faces]
     through = (corners[:, :, 0].min(1) < 0.47) & (corners[:, :, 0].max(1) > 0.47)
-    hit = intersecting(crossing, both)
+    hit, length = self_intersections(crossing, both)
     assert np.array_equal(hit[: len(faces)], through) and hit[len(faces) :].sum() == through.sum()
-    assert intersecting_share(crossing[None], both) == pytest.approx([hit.mean()])
+    # The plate that stands cuts the flat one from y = 0.013 to its edge.
+    assert length == pytest.approx(1.0 - 0.013, rel=1e-12)
+    assert np.array(share_and_contours(crossing[None], both)) == pytest.approx(
+        np.array([[hit.mean()], [length]])
+    )
     tent = flat + np.abs(flat[:, [0]] - 0.5) * [0.0, 0.0, 2.0]  # folded, and nowhere through itself
-    assert not intersecting(tent, faces).any()
+    assert not self_intersections(tent, faces)[0].any()
 
 
 def two_spheres(apart):

@@ -1,0 +1,98 @@
+"""Metric intersections/swept: cloth that passes through itself between two frames.
+
+A frame without intersections may follow another one though a layer went through the other between them. On
+the straight way of every vertex from one frame to the next a vertex meets a triangle, or an edge an edge,
+where the four points are in one plane and their primitives touch (Provot 1997). Broad phase and test are
+those of the package ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
+Without the package nothing is measured.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Metric
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+Floats = NDArray[np.float64]
+
+SAMPLED_STEPS = 12  # pairs of consecutive frames that are looked at, evenly spread
+
+METRICS = (
+    Metric(
+        name="intersections/swept", unit="1", title="Swept", table="shape", lower_is_better=True,
+        definition="pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each "
+        "other between two frames on straight ways; mean over 12 evaluated pairs of frames, needs ipctk",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the crossings of a step; empty without ipctk, or where the scene leaves out frames."""
+    x, scene = roll_out.positions[roll_out.judged], roll_out.scene
+    if len(x) < 2 or scene.kept is not None or find_spec("ipctk") is None:
+        return {}
+    steps = np.unique(np.linspace(0, len(x) - 2, SAMPLED_STEPS).round().astype(int))
+    counts = [swept_crossings(x[step], x[step + 1], scene.cloth.faces) for step in steps]
+    return {"intersections/swept": float(np.mean(counts))}
+
+
+def swept_crossings(before: Floats, after: Floats, faces: NDArray[np.int64]) -> int:
+    """Return how many pairs of primitives meet on the straight way from `before` to `after`.
+
+    A pair without a common vertex counts once. A motion of all vertices together changes nothing.
+
+    Args:
+        before: (V,3) [m].
+        after: (V,3) [m].
+        faces: (F,3).
+    """
+    import ipctk
+
+    ipctk.set_logger_level(ipctk.error)  # its warnings go to standard output
+    ipctk.set_num_threads(1)
+    after = after - (after - before).mean(axis=0)  # shorter ways: fewer pairs to be tested
+    triangles = np.asfortranarray(faces, dtype=np.int32)
+    mesh = ipctk.CollisionMesh(np.asfortranarray(before), ipctk.edges(triangles), triangles)
+    pairs = ipctk.Candidates()
+    pairs.build(mesh, np.asfortranarray(before), np.asfortranarray(after), 0.0)
+    # A rescaling of 1 asks for contact; less than that asks for a part of the first distance already.
+    test, edges = ipctk.TightInclusionCCD(conservative_rescaling=1.0), np.asarray(mesh.edges)
+    points = [(pair.vertex_id, *faces[pair.face_id]) for pair in pairs.fv_candidates]
+    sides = [(*edges[pair.edge0_id], *edges[pair.edge1_id]) for pair in pairs.ee_candidates]
+    return _meeting(test.point_triangle_ccd, before, after, points) + _meeting(
+        test.edge_edge_ccd, before, after, sides
+    )
+
+
+def _meeting(test: Any, before: Floats, after: Floats, quadruples: list[tuple[int, ...]]) -> int:
+    """Return how many of the quadruples of vertices meet, by ipctk's test."""
+    chosen = np.array(quadruples, dtype=np.int64).reshape(-1, 4)
+    chosen = chosen[coplanar_on_the_way(before[chosen], after[chosen])]
+    return sum(test(*a, *b)[0] for a, b in zip(before[chosen], after[chosen]))
+
+
+def coplanar_on_the_way(before: Floats, after: Floats) -> NDArray[np.bool_]:
+    """Return for which of N quadruples of points (N,4,3) [m] a plane may hold all four at once, (N,).
+
+    Their volume is cubic in time: where its four Bernstein coefficients have one sign, it has no root.
+    """
+    u, v = before[:, 1:] - before[:, :1], after[:, 1:] - after[:, :1]
+
+    def volumes(*ends: Floats) -> Floats:
+        return np.linalg.det(np.stack([end[:, row] for row, end in enumerate(ends)], axis=1))
+
+    coefficients = np.stack([
+        volumes(u, u, u),
+        volumes(v, u, u) + volumes(u, v, u) + volumes(u, u, v),
+        volumes(v, v, u) + volumes(v, u, v) + volumes(u, v, v),
+        volumes(v, v, v),
+    ])  # fmt: skip
+    low, high = coefficients.min(axis=0), coefficients.max(axis=0)
+    return (low <= 0.0) & (high >= 0.0)
