@@ -3,8 +3,10 @@
 | folder | metrics |
 | --- | --- |
 | energies | energy/*, excess/*, gap/*, step/*, gradient/norm |
-| surface | curvature/*, wrinkles/*, distance/*, penetration/*, drift/hem, deformation/*, stretch/*, dihedral/mean, intersections/*, body/*, mesh/* |
-| motion | velocity/error, acceleration/error, dynamics/*, conservation/*, exact/distance, time_error/*, motion/*, roll_out/* |
+| surface | curvature/*, wrinkles/*, deformation/*, stretch/*, dihedral/mean, intersections/* |
+| surface | distance/*, penetration/*, drift/hem, body/*, mesh/* |
+| motion | velocity/error, acceleration/error, dynamics/*, conservation/*, exact/distance |
+| motion | time_error/*, motion/*, roll_out/* |
 | cost | cost/*, solver/*, training_distance/*, performance/* |
 
 >>> find_metric("curvature/mean").unit

@@ -12,6 +12,13 @@ ENERGY_GAP, STEP, ENERGY, CURVATURE, DISTANCES, BODY, HEM, DYNAMICS, EXCESS, CON
         "energies/excess", "motion/conservation",
     )
 )  # fmt: skip
+SELF, STRETCHES, VELOCITY, SWEPT, WRINKLES = (
+    f"benchmarks/metrics/{name}.py"
+    for name in (
+        "surface/self_intersections", "surface/principal_stretches", "motion/velocity_error",
+        "surface/swept_crossings", "surface/wrinkle_spectrum",
+    )
+)  # fmt: skip
 FRICTION = "reference_sim/energies/contact_friction.py"
 
 METRIC_FAULTS = {
@@ -54,6 +61,40 @@ METRIC_FAULTS = {
         Fault("depth outside too", DISTANCES, "share=(depth > 0.0).mean(1)", "share=(depth >= 0.0).mean(1)"),
         Fault("histogram of equal weights", CURVATURE, "area / area.sum(), -area_ref / area_ref.sum()",
               "area / area.sum(), -np.full(len(area_ref), 1 / len(area_ref))"),
+        Fault("contours from one side", SELF, "faces[f], faces[e], ends, found)",
+              "faces[f], faces[e], ends, 0)"),
+        Fault("crossings at the end of an edge", SELF, "before / (before - behind)", "1.0"),
+    ),
+    "benchmarks/metrics/test_principal_stretches": (
+        Fault("tension for compression", STRETCHES, "[np.maximum(mean - radius, 0.0), mean + radius]",
+              "[mean + radius, np.maximum(mean - radius, 0.0)]"),
+        Fault("no shear", STRETCHES, "np.hypot(half, (along * across).sum(-1))", "np.abs(half)"),
+        Fault("areas of other triangles", STRETCHES, "np.cumsum(weights.ravel()[order])",
+              "np.cumsum(weights.ravel())"),
+        Fault("stretches of the warm-up", STRETCHES, "positions[roll_out.judged]", "positions"),
+    ),
+    "benchmarks/metrics/test_velocity_error": (
+        Fault("reference one frame late", VELOCITY, "- reference.positions[frames]",
+              "- np.roll(reference.positions, 1, axis=0)[frames]"),
+        Fault("reference reversed", VELOCITY, "- reference.positions[frames]",
+              "+ reference.positions[frames]"),
+        Fault("acceleration over one step", VELOCITY, "axis=0) / dt**order", "axis=0) / dt"),
+    ),
+    "benchmarks/metrics/test_swept_crossings": (
+        Fault("near is through", SWEPT, "conservative_rescaling=1.0", "conservative_rescaling=0.8"),
+        Fault("planes at the ends alone", SWEPT, "coefficients.min(axis=0), coefficients.max(axis=0)",
+              "coefficients[[0, 3]].min(axis=0), coefficients[[0, 3]].max(axis=0)"),
+        Fault("one frame twice", SWEPT, "swept_crossings(x[step], x[step + 1]",
+              "swept_crossings(x[step + 1], x[step + 1]"),
+    ),
+    "benchmarks/metrics/test_wrinkle_spectrum": (
+        Fault("curvature without its sign", WRINKLES, "along = (laplacian * normals).sum(axis=-1)",
+              "along = np.linalg.norm(laplacian, axis=-1)"),
+        Fault("half waves", WRINKLES, "lengths = 2.0 * np.pi /", "lengths = np.pi /"),
+        Fault("spectrum one frame late", WRINKLES, "- theirs[frames])",
+              "- np.roll(theirs, 1, axis=0)[frames])"),
+        Fault("spectrum at the boundary", WRINKLES, "interior[cloth.faces].all(axis=1)",
+              "interior[cloth.faces].any(axis=1)"),
     ),
     "benchmarks/metrics/test_uncertainty": (
         Fault("least change of the reference", "benchmarks/tasks/metric_task.py", "Estimate(value, max(",

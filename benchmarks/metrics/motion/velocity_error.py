@@ -33,7 +33,7 @@ METRICS = (
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """Return the errors of velocity [m/s] and acceleration [m/s^2]; none where the scene leaves out frames."""
+    """Return the errors of velocity [m/s] and acceleration [m/s^2]; none where frames are left out."""
     scene, frames = roll_out.scene, roll_out.judged_beside(reference.positions)
     if scene.kept is not None:
         return {}

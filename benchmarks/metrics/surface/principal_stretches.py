@@ -27,9 +27,9 @@ SIDES = {"compression": "smaller", "tension": "larger"}  # in the order of `prin
 METRICS = tuple(
     Metric(
         name=f"stretch/{side}_p{percent:02}", unit="%", title=f"{side.capitalize()}, {percent} %",
-        table="stretch",
-        definition=f"{SIDES[side]} principal stretch of a triangle less 1: {percent} % of the rest area, over "
-        "evaluated frames, have less",
+        table="stretch" if percent != 50 else "",
+        definition=f"{SIDES[side]} principal stretch of a triangle less 1: {percent} % of the rest area have "
+        "less, over all evaluated frames",
     )
     for side in ("tension", "compression")
     for percent in PERCENTILES

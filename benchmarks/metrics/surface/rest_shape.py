@@ -1,4 +1,4 @@
-"""Metrics deformation/*, dihedral/mean, intersections/triangles, /contours: a frame against the rest shape."""
+"""Metrics deformation/*, dihedral/mean, intersections/*: changes of shape, and a cloth through itself."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ METRICS = (
         definition="triangles that pass through another one of the same cloth, mean over frames",
     ),
     Metric(
-        name="intersections/contours", unit="m", title="Contours", table="shape", lower_is_better=True,
+        name="intersections/contours", unit="m", title="Contours", table="intersections",
+        lower_is_better=True,
         definition="length of the lines in which triangles of the cloth pass through others of it, mean over "
         "frames",
     ),

@@ -26,7 +26,7 @@ SAMPLED_STEPS = 12  # pairs of consecutive frames that are looked at, evenly spr
 
 METRICS = (
     Metric(
-        name="intersections/swept", unit="1", title="Swept", table="shape", lower_is_better=True,
+        name="intersections/swept", unit="1", title="Swept", table="intersections", lower_is_better=True,
         definition="pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each "
         "other between two frames on straight ways; mean over 12 evaluated pairs of frames, needs ipctk",
     ),

@@ -6,8 +6,8 @@ Eigenvectors of the cotangent Laplacian of the rest shape are its waves,
 
 with K the stiffness of linear elements and M their areas, a third of each triangle at its corners (Vallet and
 Lévy 2008, "Spectral geometry processing with manifold harmonics"). The signed mean curvature H of a frame
-(curvature.py, along the vertex normal) has the coefficients c_k = sum_i M_i H_i phi_k(i), and the amplitude of
-a band is
+(curvature.py, along the vertex normal) has the coefficients c_k = sum_i M_i H_i phi_k(i), and the amplitude
+of a band is
 
     a = sqrt( sum over the band of c_k^2 / sum_i M_i )                                        [1/m]
 
@@ -51,7 +51,7 @@ METRICS = (
     ),
     *(
         Metric(
-            name=f"wrinkles/error_{band}", unit="1/m", title=f"Error {words}", table="wrinkles",
+            name=f"wrinkles/error_{band}", unit="1/m", title=f"Error {words}", table="wrinkle_errors",
             lower_is_better=True,
             definition=f"|a - a_ref|, a that root mean square at the same frame, wavelengths {words}, mean "
             "over frames; wherever the wrinkles sit",
@@ -62,7 +62,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return the amplitude of each band [1/m]; empty for a cloth without a triangle between inner vertices."""
+    """Return the amplitude of each band [1/m]; empty for a cloth without a triangle inside."""
     amplitudes = roll_out.kept(amplitudes_of)
     if amplitudes is None:
         return {}
@@ -115,7 +115,8 @@ def waves_of_rest_shape(cloth: Cloth) -> Waves | None:
         return None
     vertices, places = np.unique(cloth.faces[inner], return_inverse=True)
     corners, count = places.reshape(-1, 3), len(vertices)
-    areas = np.bincount(corners.ravel(), np.repeat(cloth.areas[inner] / 3, 3), count)
+    thirds = np.repeat(cloth.areas[inner] / 3, 3)
+    areas = np.asarray(np.bincount(corners.ravel(), thirds, count), dtype=np.float64)
     values, vectors = _longest(_stiffness(cloth, inner, corners, count), areas)
     lengths = 2.0 * np.pi / np.sqrt(np.maximum(values, 1e-300))
     return Waves(vertices, areas, vectors, np.where(values < 1e-9 * values[-1], np.inf, lengths))
@@ -149,7 +150,7 @@ def _longest(stiffness, areas: Floats) -> tuple[Floats, Floats]:
             break
         count *= 2
     else:
-        values, vectors = eigh(scaled.toarray())
+        values, vectors = eigh(scaled.toarray(), subset_by_value=(-np.inf, limit))
     order = np.argsort(values)
     order = order[values[order] <= limit]
     return values[order], vectors[:, order] / root[:, None]

@@ -405,7 +405,8 @@ def test_families_hold_every_level_from_coarse_to_fine():
 def test_every_metric_has_a_unit_a_title_and_a_definition_and_a_pattern_serves_a_new_term():
     units = {metric.unit for metric in declared().values()}
     known = {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1", "deg", "frames"}
-    assert known <= units <= known | {"N m", "% of weight", "weights", "vertex weights", "us", "h", "kB"}
+    rare = {"N m", "% of weight", "weights", "vertex weights", "us", "h", "kB", "m/s", "m/s^2"}
+    assert known <= units <= known | rare
     assert all(metric.title and metric.definition for metric in declared().values())
     own = find_metric("energy/my_term")
     assert (own.name, own.unit, own.title, own.table) == ("energy/my_term", "J", "My term", "energies")
