@@ -28,7 +28,7 @@ def self_intersections(x: Floats, faces: NDArray[np.int64]) -> tuple[NDArray[np.
     """Return which faces (F,3) of positions (V,3) [m] intersect another, (F,), and the contours' length [m].
 
     >>> import numpy as np
-    >>> flat, upright = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[1, 1, -1], [1, 1, 1], [3, 1, 0]]
+    >>> flat, upright = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[1, 1, -1], [1, 1, 1], [9, 1, 0]]
     >>> self_intersections(np.array(flat + upright, dtype=float), np.array([[0, 1, 2], [3, 4, 5]]))[1]
     2.0
     """
