@@ -39,6 +39,8 @@ def test_what_only_comes_near_or_moves_as_one_does_not_cross():
     before = np.concatenate([LARGE, SMALL])
     near = np.concatenate([LARGE, SMALL - [0.0, 0.0, 0.099]])
     assert swept_crossings(before, near, FACES) == 0
+    beside = SMALL * [1.0, -1.0, 1.0] - [0.0, 1.001, 0.0]  # a millimetre outside the large one's edge
+    assert swept_crossings(*(np.concatenate([LARGE, beside + way]) for way in (0.0, DOWN)), FACES) == 0
     plane, faces = right_grid(6, 6, 1.0, 1.0)
     sheet = in_space(plane)
     rolled = np.stack([np.sin(sheet[:, 0]), sheet[:, 1], np.cos(sheet[:, 0])], axis=1)
