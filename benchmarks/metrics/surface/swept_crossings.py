@@ -62,7 +62,7 @@ def swept_crossings(before: Floats, after: Floats, faces: NDArray[np.int64]) -> 
     mesh = ipctk.CollisionMesh(np.asfortranarray(before), ipctk.edges(triangles), triangles)
     pairs = ipctk.Candidates()
     pairs.build(mesh, np.asfortranarray(before), np.asfortranarray(after), 0.0)
-    # A rescaling of 1 asks for contact; less than that asks for a part of the first distance already.
+    # A rescaling of 1 asks for contact; with less, what comes within 0.1 mm counts already.
     test, edges = ipctk.TightInclusionCCD(conservative_rescaling=1.0), np.asarray(mesh.edges)
     points = [(pair.vertex_id, *faces[pair.face_id]) for pair in pairs.fv_candidates]
     sides = [(*edges[pair.edge0_id], *edges[pair.edge1_id]) for pair in pairs.ee_candidates]
