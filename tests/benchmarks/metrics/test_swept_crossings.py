@@ -39,7 +39,7 @@ def test_what_only_comes_near_or_moves_as_one_does_not_cross():
     before = np.concatenate([LARGE, SMALL])
     near = np.concatenate([LARGE, SMALL - [0.0, 0.0, 0.099]])
     assert swept_crossings(before, near, FACES) == 0
-    beside = SMALL + [1.00002, 1.00002, 0.0]  # 0.03 mm outside the large one's long edge
+    beside = SMALL + np.array([1.00002, 1.00002, 0.0])  # 0.03 mm outside the large one's long edge
     assert swept_crossings(*(np.concatenate([LARGE, beside + way]) for way in (0.0, DOWN)), FACES) == 0
     plane, faces = right_grid(6, 6, 1.0, 1.0)
     sheet = in_space(plane)
