@@ -114,6 +114,7 @@ class MethodEntry:
         timed: whether its costs are measured where those of the scene are.
         declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance of a
             trajectory may say it as well.
+        other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are compared.
         static_known: whether its quasi-static solution is what quasi_static() returns.
         left_out: why it is not run, where somebody wants it so.
         role: one of benchmarks.results.row.ROLES.
@@ -143,6 +144,7 @@ class MethodEntry:
     conserving: bool = False
     timed: bool = True
     declared_ms: float | None = None
+    other_mesh: bool = False
     static_known: bool = True
     left_out: str = ""
     role: str = "baseline"

@@ -58,6 +58,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--up", default="y", metavar="y|z", help="its up axis (default y)")
     add("--fps", type=float, metavar="N", help="its frames per second; other than the scene's are re-timed")
     add("--match-vertices", action="store_true", help="its vertices are the scene's in another order")
+    add("--other-mesh", action="store_true", help="its mesh is another one: surfaces are compared alone")
     add("--declared-ms", type=float, metavar="X",
         help="milliseconds a frame, as its author says: marked so, nothing is timed here")  # fmt: skip
     reference = parser.add_mutually_exclusive_group()
@@ -98,6 +99,8 @@ SUMMARY_METRICS = (
     ("curvature/error", "curvature error", "1/m"),
     ("penetration/vertices", "penetration", "%"),
     ("distance/rms", "distance", "mm"),
+    ("surface/chamfer", "Chamfer distance", "mm"),
+    ("surface/normals", "angle of normals", "deg"),
 )
 
 

@@ -12,7 +12,7 @@ MODULE = "benchmarks.methods.outside.stored_roll_out"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
 HELP = (
     "a roll-out of another program as a method; the path may have {scene}, the scene's name with hyphens for "
-    "slashes; after it units=cm, up=z, fps=60, match-vertices, ms=2.2 (a frame, as its author says)"
+    "slashes; after it units=cm, up=z, fps=60, match-vertices or other-mesh, ms=2.2 (a frame, as its author says)"
 )
 
 
@@ -22,12 +22,16 @@ class RollOutError(ValueError):
 
 @dataclass(frozen=True)
 class FileConventions:
-    """Unit, up axis and frames per second of a roll-out's file, and whether to match its vertices."""
+    """Unit, up axis and frames per second of a roll-out's file, and what its vertices are.
+
+    match_vertices: the scene's in another order. other_mesh: those of another mesh of the same garment.
+    """
 
     units: str = "m"
     up: str = "y"
     fps: float | None = None
     match_vertices: bool = False
+    other_mesh: bool = False
 
     def __post_init__(self) -> None:
         from reference_sim.files.mesh_files import METRES, UP_AXES
@@ -37,6 +41,10 @@ class FileConventions:
                 raise RollOutError(f"--{what} {value}: choose from {', '.join(known)}")
         if self.fps is not None and not 0.0 < self.fps < 1e6:
             raise RollOutError(f"--fps {self.fps}: give a positive number of frames per second")
+        if self.match_vertices and self.other_mesh:
+            raise RollOutError(
+                "--match-vertices and --other-mesh: another mesh has no vertex to match, give one"
+            )
 
 
 @dataclass(frozen=True)
@@ -102,5 +110,6 @@ _WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {
     "up": ("up", str),
     "fps": ("fps", float),
     "match-vertices": ("match_vertices", lambda value: True),
+    "other-mesh": ("other_mesh", lambda value: True),
     "ms": ("declared_ms", float),
 }

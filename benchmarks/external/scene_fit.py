@@ -41,7 +41,7 @@ def fit_to_scene(
     Args:
         stored: the roll-out as read.
         scene: the scene that it is said to belong to.
-        stated: unit, axis and rate of the file, and whether to match vertices.
+        stated: unit, axis and rate of the file, and whether its vertices are matched or those of another mesh.
 
     Returns:
         The roll-out, and each change that was made, in words.
@@ -52,10 +52,15 @@ def fit_to_scene(
     >>> stored, changes = fit_to_scene(read_roll_out("mine.npz"), scene, FileConventions())  # doctest: +SKIP
     """
     count, cloth = stored.positions.shape[1], scene.cloth
-    if count != cloth.vertex_count:
+    if stated.other_mesh and stored.faces is None:
+        raise RollOutError(
+            "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"
+        )
+    if count != cloth.vertex_count and not stated.other_mesh:
         raise RollOutError(
             f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for "
-            "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex"
+            "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex; or "
+            "give --other-mesh, to have surfaces compared alone"
         )
     if not np.isfinite(stored.positions[0]).all():
         raise RollOutError("its first frame, the scene's start, is not finite")
@@ -65,7 +70,9 @@ def fit_to_scene(
     if stored.quasi_static is not None:
         held = to_metres_y_up(stored.quasi_static, units=stated.units, up=stated.up)
         in_metres = replace(in_metres, quasi_static=held)
-    order, change = _order(in_metres, scene, expected[0], stated)
+    order, change = (None, "") if stated.other_mesh else _order(in_metres, scene, expected[0], stated)
+    if stated.other_mesh:
+        changes.append(f"another mesh of {count} vertices: surfaces are compared alone")
     if order is not None:
         in_metres = _reordered(in_metres, order)
         changes.append(change)

@@ -4,7 +4,7 @@
 | --- | --- |
 | energies | energy/*, excess/*, gap/*, step/*, gradient/norm |
 | surface | curvature/*, wrinkles/*, deformation/*, stretch/*, dihedral/mean, intersections/* |
-| surface | distance/*, penetration/*, drift/hem, body/*, mesh/* |
+| surface | distance/*, surface/*, penetration/*, drift/hem, body/*, mesh/* |
 | motion | velocity/error, acceleration/error, dynamics/*, conservation/*, exact/distance |
 | motion | time_error/*, motion/*, roll_out/* |
 | cost | cost/*, solver/*, training_distance/*, performance/* |
@@ -34,6 +34,7 @@ MODULES = {
     "swept": "benchmarks.metrics.surface.swept_crossings",
     "stretch": "benchmarks.metrics.surface.principal_stretches",
     "geometry": "benchmarks.metrics.surface.penetration_and_distances",
+    "surface": "benchmarks.metrics.surface.surface_distance",
     "body": "benchmarks.metrics.surface.body_intersections",
     "optimality": "benchmarks.metrics.energies.energy_gap",
     "solver": "benchmarks.metrics.cost.relaxed_frames",
@@ -52,6 +53,7 @@ WHERE_NAMED = {
     "body_shape": "benchmarks.metrics.surface.body_shape",
 }  # measured only in scenes that name them
 MODULE_OF = MODULES | WHERE_NAMED
+OF_OTHER_MESHES = ("surface",)  # all that is measured of a roll-out on another mesh than the scene's
 
 
 def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:

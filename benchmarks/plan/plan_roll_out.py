@@ -35,7 +35,9 @@ def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:
     Raises:
         ValueError: one line for the first thing that cannot be met.
     """
-    stated = FileConventions(options.units, options.up, options.fps, options.match_vertices)
+    stated = FileConventions(
+        options.units, options.up, options.fps, options.match_vertices, options.other_mesh
+    )
     stem = Path(options.roll_out.rstrip("/").replace(PLACE, "")).stem
     name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out"
     option = RollOutOption(name, options.roll_out, stated, check_declared_ms(options.declared_ms))

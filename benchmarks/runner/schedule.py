@@ -245,6 +245,7 @@ class Schedule:
                 entry.reporting.level,
                 entry.conserving,
                 entry.static_known,
+                entry.other_mesh,
             ],
             "metrics": scene.metrics,
         }

@@ -178,7 +178,9 @@ class RunCell(CellTask):
             inputs = clocked_inputs(method, scene, least=INPUTS * self.least)
             result |= self.times(reading, frames) | {"inputs": inputs.seconds}
             reading = replace(reading, complaint=reading.complaint or inputs.complaint)
-        status, reason = judge(trajectory, reading, scene, truncated=cell.entry.truncated)
+        status, reason = judge(
+            trajectory, reading, scene, truncated=cell.entry.truncated, other_mesh=cell.entry.other_mesh
+        )
         if status == "failed":
             return Outcome(status, reason, failed=True, result={"peak": peak})
         paths = [cell.trajectory(folder)]
@@ -272,12 +274,14 @@ def clocked_inputs(method: Method, scene: BuiltScene, *, least: float) -> Readin
     return replace(reading, runs=tuple(seconds / frames for seconds in reading.runs))
 
 
-def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, truncated: bool) -> tuple[str, str]:
+def judge(
+    trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, truncated: bool, other_mesh: bool = False
+) -> tuple[str, str]:
     """Status and reason of a row, from what the trajectory says of itself, what is in it, and the clock."""
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())
-    if wrong := misshapen(trajectory.positions, scene):
+    if wrong := misshapen(trajectory.positions, scene, other_mesh=other_mesh):
         return "failed", f"run() {wrong}"
     if reading.complaint:
         return "failed", UNBELIEVABLE + reading.complaint
@@ -297,11 +301,15 @@ def judge(trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, trunca
     return status, reason
 
 
-def misshapen(positions: np.ndarray, scene: BuiltScene) -> str:
-    """Why these are no positions (T,V,3) of the scene, or empty. There may be fewer frames, and no more."""
+def misshapen(positions: np.ndarray, scene: BuiltScene, *, other_mesh: bool = False) -> str:
+    """Why these are no positions (T,V,3) of the scene, or empty. There may be fewer frames, and no more.
+
+    other_mesh: whether there may be another number of vertices.
+    """
     import numpy as np
 
-    x, shape = np.asarray(positions), (scene.frames, scene.cloth.vertex_count, 3)
+    x = np.asarray(positions)
+    shape = (scene.frames, x.shape[1] if other_mesh else scene.cloth.vertex_count, 3)
     if x.dtype.kind == "f" and x.shape[1:] == shape[1:] and len(x) <= shape[0]:
         return ""
     return f"gives positions {x.dtype} {x.shape}: floats {shape} are due, the start included"

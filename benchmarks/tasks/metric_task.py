@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.cell import Cell, TaskId
 from benchmarks.declarations import load
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.metrics import find_metric, modules, names_of
+from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
 from benchmarks.process.errors import one_line
 from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.row import USABLE
@@ -88,7 +88,8 @@ class MeasureCell(Task):
                     suites=cell.suites,
                     quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
                 )  # fmt: skip
-                group.roll_outs.append(roll_outs[cell])
+                if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
+                    group.roll_outs.append(roll_outs[cell])
         return roll_outs
 
 
@@ -108,7 +109,8 @@ def measured(
     curves: dict[str, np.ndarray] = {}
     ended = ("ok", "")
     judged = len(roll_out.positions) > roll_out.scene.warm_up
-    for name in (*names_of(chosen), *outside) if judged else ():
+    names = OF_OTHER_MESHES if roll_out.entry.other_mesh else (*names_of(chosen), *outside)
+    for name in names if judged else ():
         try:
             module = load(name) if name in outside else modules()[name]
             suites = getattr(module, "SUITES", roll_out.suites)

@@ -38,7 +38,7 @@ class Stored(Method):
 
     def quasi_static(self) -> Trajectory | None:
         """Return the quasi-static solutions of the file; None where it has none."""
-        held = self.stored.quasi_static
+        held = None if self.stated.other_mesh else self.stored.quasi_static
         return None if held is None else self._trajectory(held, self.stored)
 
     def _trajectory(self, positions: np.ndarray, stored: StoredRollOut) -> Trajectory:
@@ -47,7 +47,7 @@ class Stored(Method):
         claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
         return Trajectory(
             positions=positions,
-            faces=np.asarray(self.scene.cloth.faces),
+            faces=np.asarray(stored.faces if self.stated.other_mesh else self.scene.cloth.faces),
             times=np.arange(len(positions)) * self.scene.dt,
             status="ok" if finite else "diverged",
             reason=changes if finite else f"{self.path}: holds a position that is not finite",
@@ -76,9 +76,10 @@ def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
         options={"path": path, "digest": digest(stored), **asdict(option.stated)},
         dtype=stored.dtype,
         gives_first_frame=True,
-        conserving=True,
+        conserving=not option.stated.other_mesh,
         timed=False,
         declared_ms=option.declared_ms,
+        other_mesh=option.stated.other_mesh,
         static_known=False,
         role=option.role,
     )

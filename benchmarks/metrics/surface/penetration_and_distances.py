@@ -71,18 +71,23 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     if scene.obstacle is None:
         return {}
     part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
-    inside = inside_of(roll_out)
-    depth = inside.depth[judged]
-    values = {
-        "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
-        "penetration/deep": 100.0 * float((depth > DEEP).mean()),
-        "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
+    values = penetration_values(inside_of(roll_out), judged) | {
         "penetration/own_part_p999": MM * float(np.percentile(part_depth, 99.9)),
     }
     if scene.dressed is not None and scene.origin_heights is not None:
         heights = scene.origin_heights[: len(x)][judged]
         values["drift/hem"] = MM * hem_drift(x[judged], scene.dressed.garment.hem, heights)
     return values
+
+
+def penetration_values(inside: Penetration, judged: slice) -> dict[str, float]:
+    """Return shares [%] and depth [mm] of the vertices inside an obstacle over the evaluated frames."""
+    depth = inside.depth[judged]
+    return {
+        "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
+        "penetration/deep": 100.0 * float((depth > DEEP).mean()),
+        "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
+    }
 
 
 def inside_of(roll_out: RollOut) -> Penetration:

@@ -1,0 +1,111 @@
+"""Metrics surface/*: a roll-out against the reference as surfaces, whatever their vertices and triangles.
+
+With d the distance from a vertex to the nearest point of the other surface, and theta the angle between the
+normals there, both weighted by a third of the triangles around the vertex,
+
+    Chamfer distance   (mean of d from A to B + mean of d from B to A) / 2                        [mm]
+    angle of normals   the same of theta                                                          [degrees]
+
+(Cignoni, Rocchini and Scopigno 1998 for distances from samples to a surface, taken both ways.) They are blind
+to cloth that slides along itself. What moves on another mesh than the scene's has these numbers and its
+penetration alone: energies, curvature errors and distances are of the same vertices.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Metric
+from benchmarks.metrics.surface.penetration_and_distances import MM, penetration, penetration_values
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+SAMPLED_FRAMES = 24  # frames that are looked at, evenly spread
+
+METRICS = (
+    Metric(
+        name="surface/chamfer", unit="mm", title="Chamfer", table="surface", lower_is_better=True,
+        definition="mean distance from vertices to the nearest point of the reference's surface and from its "
+        "vertices back, by area, mean of both ways and of 24 evaluated frames",
+    ),
+    Metric(
+        name="surface/normals", unit="deg", title="Normals", table="surface", lower_is_better=True,
+        definition="angle between the normals of the two surfaces at these nearest points, mean as above",
+    ),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return penetration into the obstacle for a roll-out of another mesh; others have it elsewhere."""
+    obstacle = roll_out.scene.obstacle
+    if obstacle is None or not roll_out.entry.other_mesh:
+        return {}
+    return penetration_values(penetration([roll_out.positions], obstacle)[0], roll_out.judged)
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """Return Chamfer distance [mm] and angle of normals [degrees] between the two surfaces."""
+    common = roll_out.judged_beside(reference.positions)
+    x, y = roll_out.positions[common], reference.positions[common]
+    if not len(x):
+        return {}
+    faces, others = roll_out.trajectory.faces, reference.trajectory.faces
+    sampled = np.unique(np.linspace(0, len(x) - 1, SAMPLED_FRAMES).round().astype(int))
+    found = [chamfer_and_angle(x[frame], faces, y[frame], others) for frame in sampled]
+    distance, angle = np.mean(found, axis=0)
+    return {"surface/chamfer": MM * float(distance), "surface/normals": float(np.rad2deg(angle))}
+
+
+def chamfer_and_angle(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[float, float]:
+    """Return Chamfer distance [m] and mean angle of normals [rad] between two surfaces.
+
+    Args:
+        x: (V,3) [m].
+        faces: (F,3), outward.
+        y: (W,3) [m].
+        others: (G,3), outward.
+
+    >>> from benchmarks.meshes import icosphere
+    >>> inner, outer = icosphere(3, 1.0), icosphere(4, 1.2)
+    >>> distance, angle = chamfer_and_angle(*inner, *outer)
+    >>> round(distance, 2), round(angle, 2)
+    (0.2, 0.0)
+    """
+    forth, back = _one_way(x, faces, y, others), _one_way(y, others, x, faces)
+    return (forth[0] + back[0]) / 2.0, (forth[1] + back[1]) / 2.0
+
+
+def _one_way(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[float, float]:
+    """Return mean distance [m] and angle [rad] from the vertices x to the surface of y."""
+    import igl
+
+    from reference_sim.geometry.surface import vertex_normals  # loads numba
+
+    squared, nearest, points = igl.point_mesh_squared_distance(x, y, others)
+    corners = others[nearest]
+    shares = _barycentric(points, y[corners])
+    there = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
+    here = vertex_normals(np.ascontiguousarray(x), faces)
+    angles = np.arctan2(np.linalg.norm(np.cross(here, there), axis=1), (here * there).sum(axis=1))
+    sides = x[faces[:, 1:]] - x[faces[:, :1]]
+    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    weights = np.bincount(faces.ravel(), np.repeat(doubled, 3), len(x))
+    means = np.average(np.stack([np.sqrt(squared), angles]), axis=1, weights=weights)
+    return float(means[0]), float(means[1])
+
+
+def _barycentric(points: Floats, corners: Floats) -> Floats:
+    """Return the weights (N,3) [1] by which points (N,3) lie between the corners (N,3,3) of triangles."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normals, away = np.cross(first, second), points - corners[:, 0]
+    whole = np.maximum((normals**2).sum(axis=1), np.finfo(float).tiny)
+    beside = (np.cross(away, second) * normals).sum(axis=1) / whole
+    beyond = (np.cross(first, away) * normals).sum(axis=1) / whole
+    return np.stack([1.0 - beside - beyond, beside, beyond], axis=1)
