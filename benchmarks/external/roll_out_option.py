@@ -12,7 +12,8 @@ MODULE = "benchmarks.methods.outside.stored_roll_out"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
 HELP = (
     "a roll-out of another program as a method; the path may have {scene}, the scene's name with hyphens for "
-    "slashes; after it units=cm, up=z, fps=60, match-vertices or other-mesh, ms=2.2 (a frame, as its author says)"
+    "slashes; after it units=cm, up=z, fps=60, match-vertices or other-mesh, ms=2.2 (a frame, as its author "
+    "says)"
 )
 
 

@@ -41,7 +41,7 @@ def fit_to_scene(
     Args:
         stored: the roll-out as read.
         scene: the scene that it is said to belong to.
-        stated: unit, axis and rate of the file, and whether its vertices are matched or those of another mesh.
+        stated: unit, axis and rate of the file, and whether its vertices are matched or of another mesh.
 
     Returns:
         The roll-out, and each change that was made, in words.
@@ -52,6 +52,19 @@ def fit_to_scene(
     >>> stored, changes = fit_to_scene(read_roll_out("mine.npz"), scene, FileConventions())  # doctest: +SKIP
     """
     count, cloth = stored.positions.shape[1], scene.cloth
+    if (
+        stated.other_mesh
+        and stored.faces is not None
+        and (count, len(stored.faces))
+        == (
+            cloth.vertex_count,
+            len(cloth.faces),
+        )
+    ):
+        raise RollOutError(
+            f"has {count} vertices and {len(stored.faces)} triangles as the scene's mesh: leave out --other-mesh, "
+            "or give --match-vertices where they are in another order"
+        )
     if stated.other_mesh and stored.faces is None:
         raise RollOutError(
             "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"

@@ -42,6 +42,8 @@ def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:
     name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out"
     option = RollOutOption(name, options.roll_out, stated, check_declared_ms(options.declared_ms))
     fields, scenes = scene_fields(options), split([options.scene or ""])
+    if options.rest_mesh and options.other_mesh:
+        raise RollOutError("--other-mesh compares with a scene: give --scene, not --rest-mesh")
     if options.rest_mesh:
         from benchmarks.scenes.from_roll_out import declared  # loads the simulator
 

@@ -53,7 +53,7 @@ def scales(roll_outs: SceneRollOuts, methods: Sequence[str], frame: int, referen
         known["step"] = Scale(
             "one-step error [mm]", {m: c.frame_fields[STEP][frame] for m, c in cloths.items()}
         )
-    if reference in at and len({x.shape for x in at.values()}) == 1:
+    if reference in at and all(np.array_equal(c.faces, cloths[reference].faces) for c in cloths.values()):
         away = {m: distance(x[None], at[reference][None])[0] for m, x in at.items()}
         known["distance"] = Scale("from the simulation [mm]", away)
     if roll_outs.rest is not None and all(len(c.faces) == len(roll_outs.rest) for c in cloths.values()):

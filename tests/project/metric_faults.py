@@ -12,11 +12,11 @@ ENERGY_GAP, STEP, ENERGY, CURVATURE, DISTANCES, BODY, HEM, DYNAMICS, EXCESS, CON
         "energies/excess", "motion/conservation",
     )
 )  # fmt: skip
-SELF, STRETCHES, VELOCITY, SWEPT, WRINKLES = (
+SELF, STRETCHES, VELOCITY, SWEPT, WRINKLES, SURFACES = (
     f"benchmarks/metrics/{name}.py"
     for name in (
         "surface/self_intersections", "surface/principal_stretches", "motion/velocity_error",
-        "surface/swept_crossings", "surface/wrinkle_spectrum",
+        "surface/swept_crossings", "surface/wrinkle_spectrum", "surface/surface_distance",
     )
 )  # fmt: skip
 FRICTION = "reference_sim/energies/contact_friction.py"
@@ -95,6 +95,14 @@ METRIC_FAULTS = {
               "- np.roll(theirs, 1, axis=0)[frames])"),
         Fault("spectrum at the boundary", WRINKLES, "interior[cloth.faces].all(axis=1)",
               "interior[cloth.faces].any(axis=1)"),
+    ),
+    "benchmarks/metrics/test_surface_distance": (
+        Fault("one way", SURFACES, "(forth[0] + back[0]) / 2.0", "forth[0]"),
+        Fault("every vertex alike", SURFACES, "np.repeat(doubled, 3), len(x))", "minlength=len(x))"),
+        Fault("squared distances", SURFACES, "np.stack([np.sqrt(squared), angles])",
+              "np.stack([squared, angles])"),
+        Fault("other surface one frame late", SURFACES, "y[frame], others)", "y[frame - 1], others)"),
+        Fault("normals without a side", SURFACES, "(here * there).sum(axis=1)", "np.abs((here * there).sum(axis=1))"),
     ),
     "benchmarks/metrics/test_uncertainty": (
         Fault("least change of the reference", "benchmarks/tasks/metric_task.py", "Estimate(value, max(",

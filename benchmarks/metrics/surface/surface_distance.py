@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-SAMPLED_FRAMES = 24  # frames that are looked at, evenly spread
+SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
 
 METRICS = (
     Metric(
         name="surface/chamfer", unit="mm", title="Chamfer", table="surface", lower_is_better=True,
         definition="mean distance from vertices to the nearest point of the reference's surface and from its "
-        "vertices back, by area, mean of both ways and of 24 evaluated frames",
+        "vertices back, by area, mean of both ways and of 12 evaluated frames",
     ),
     Metric(
         name="surface/normals", unit="deg", title="Normals", table="surface", lower_is_better=True,

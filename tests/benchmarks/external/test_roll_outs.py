@@ -17,7 +17,9 @@ from benchmarks.meshes import torus
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.process.timing import Reading
 from benchmarks.scenes.from_roll_out import declared
+from benchmarks.tasks.cell_task import judge
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.trajectory.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
@@ -183,6 +185,46 @@ def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
         np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-12)
 
 
+CENTRES = np.concatenate([X, X[:, FACES].mean(axis=2)], axis=1)  # each triangle in three, by its centre
+MIDDLE = 49 + np.arange(len(FACES))
+THREE = np.concatenate([np.column_stack([np.delete(FACES, k, 1), MIDDLE]) for k in (2, 0)])
+THREE = np.concatenate([THREE, np.column_stack([FACES[:, [2, 0]], MIDDLE])])
+
+
+def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_path):
+    np.savez(tmp_path / "mine.npz", positions=100.0 * CENTRES, faces=THREE, quasi_static=CENTRES)
+    option = RollOutOption("mine", str(tmp_path / "mine.npz"), FileConventions("cm", other_mesh=True))
+    entry = entry_of(option, SCENE.name)
+    method = entry.make(models=Path(), seed=0)
+    method.prepare(SCENE)
+    trajectory = method.run()
+    assert "another mesh of 121 vertices" in trajectory.reason and method.quasi_static() is None
+    state = judge(trajectory, Reading(0.0), SCENE, truncated=False, other_mesh=True)
+    assert state[0] == "ok" and judge(trajectory, Reading(0.0), SCENE, truncated=False)[0] == "failed"
+    group = SceneRollOuts(SCENE, gap_samples=2)
+    times = np.arange(SCENE.frames) * SCENE.dt
+    simulated = RollOut(group, find_method("simulation"), Trajectory(X, FACES, times), suites=("speed",))
+    group.roll_outs.append(simulated)
+    found = measured(RollOut(group, entry, trajectory, suites=("speed",)))[0]
+    assert set(found) == {"surface/chamfer", "surface/normals"} and found["surface/chamfer"] < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("given", "remedy"),
+    [({"positions": CENTRES}, "has no triangles: add those of its own mesh"),
+     ({"positions": X[:, ORDER], "faces": PLACE[FACES]}, "give --match-vertices"),
+     ({"positions": 100.0 * CENTRES, "faces": THREE}, "give --units cm"),
+     ({"positions": CENTRES + 1.0, "faces": THREE}, "world coordinates"),
+     ({"positions": CENTRES[1:], "faces": THREE}, "has 7 frames")],
+)  # fmt: skip
+def test_another_mesh_has_to_be_in_the_scenes_place_and_time(given, remedy, tmp_path):
+    np.savez(tmp_path / "mine.npz", **given)
+    with pytest.raises(RollOutError, match=remedy):
+        rows(str(tmp_path / "mine.npz"), other_mesh=True)
+    with pytest.raises(RollOutError, match="give one"):
+        FileConventions(match_vertices=True, other_mesh=True)
+
+
 def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
     halves = np.stack([X[:-1], (X[:-1] + X[1:]) / 2], axis=1).reshape(-1, 49, 3)
     fine = np.concatenate([halves, X[-1:]])
@@ -289,6 +331,7 @@ def test_a_pickle_that_would_run_code_does_not(tmp_path):
 
 
 def test_an_option_says_everything_of_a_roll_out():
+    assert parse_roll_out("mine=a.npz,other-mesh").stated.other_mesh
     option = parse_roll_out("mine=out/{scene}.pc2,units=cm,up=z,fps=60,match-vertices,ms=2.2")
     assert option == RollOutOption("mine", "out/{scene}.pc2", FileConventions("cm", "z", 60.0, True), 2.2)
     assert option.path_for("tshirt/kick") == "out/tshirt-kick.pc2"
