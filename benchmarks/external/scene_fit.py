@@ -62,8 +62,8 @@ def fit_to_scene(
         )
     ):
         raise RollOutError(
-            f"has {count} vertices and {len(stored.faces)} triangles as the scene's mesh: leave out --other-mesh, "
-            "or give --match-vertices where they are in another order"
+            f"has {count} vertices and {len(stored.faces)} triangles as the scene's mesh: leave out "
+            "--other-mesh, or give --match-vertices where they are in another order"
         )
     if stated.other_mesh and stored.faces is None:
         raise RollOutError(

@@ -102,7 +102,8 @@ METRIC_FAULTS = {
         Fault("squared distances", SURFACES, "np.stack([np.sqrt(squared), angles])",
               "np.stack([squared, angles])"),
         Fault("other surface one frame late", SURFACES, "y[frame], others)", "y[frame - 1], others)"),
-        Fault("normals without a side", SURFACES, "(here * there).sum(axis=1)", "np.abs((here * there).sum(axis=1))"),
+        Fault("normals without a side", SURFACES, "(here * there).sum(axis=1)",
+              "np.abs((here * there).sum(axis=1))"),
     ),
     "benchmarks/metrics/test_uncertainty": (
         Fault("least change of the reference", "benchmarks/tasks/metric_task.py", "Estimate(value, max(",

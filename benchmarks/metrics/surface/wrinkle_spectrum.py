@@ -13,8 +13,8 @@ of a band is
 
 the root mean square of what the band contributes to H: squares of all bands add up to the mean square of H.
 A wave of height h and wavelength w has a = h (2 pi / w)^2 / (2 sqrt 2). H means nothing at a boundary, so
-only triangles between interior vertices take part. The shortest band is what is left of the mean square: its
-waves need no eigenvectors.
+only triangles between interior vertices take part. The shortest band is what the longer ones leave of H: its waves
+need no eigenvectors.
 """
 
 from __future__ import annotations
@@ -162,14 +162,13 @@ def band_amplitudes(positions: Floats, faces: Indices, waves: Waves) -> Floats:
         signed_curvature(positions[first : first + BLOCK_FRAMES], faces)[:, waves.vertices]
         for first in range(0, len(positions), BLOCK_FRAMES)
     ])  # fmt: skip
-    weighted = curvature * waves.areas
-    squares = (weighted @ waves.vectors) ** 2
+    coefficients = (curvature * waves.areas) @ waves.vectors
     bands = [
-        squares[:, (waves.wavelengths <= high) & (waves.wavelengths > low)].sum(axis=1)
+        (coefficients**2)[:, (waves.wavelengths <= high) & (waves.wavelengths > low)].sum(axis=1)
         for high, low in list(pairwise(LIMITS))[:-1]
     ]
-    left = (weighted * curvature).sum(axis=1) - squares.sum(axis=1)
-    return np.sqrt(np.stack([*bands, np.maximum(left, 0.0)], axis=1) / waves.areas.sum())
+    shorter = (curvature - coefficients @ waves.vectors.T) ** 2 @ waves.areas
+    return np.sqrt(np.stack([*bands, shorter], axis=1) / waves.areas.sum())
 
 
 def signed_curvature(positions: Floats, faces: Indices) -> Floats:

@@ -17,7 +17,7 @@ COARSE, FINE = right_grid(3, 4, 1.0, 1.0), right_grid(7, 5, 1.0, 1.0)
 
 
 def test_parallel_sheets_of_other_triangles_are_their_gap_apart():
-    above = in_space(FINE[0]) + [0.0, 0.0, 0.03]
+    above = in_space(FINE[0]) + np.array([0.0, 0.0, 0.03])
     distance, angle = chamfer_and_angle(in_space(COARSE[0]), COARSE[1], above, FINE[1])
     assert (distance, angle) == pytest.approx((0.03, 0.0), abs=1e-12)
     turn = random_rotation(1)
