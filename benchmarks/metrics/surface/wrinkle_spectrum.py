@@ -13,8 +13,8 @@ of a band is
 
 the root mean square of what the band contributes to H: squares of all bands add up to the mean square of H.
 A wave of height h and wavelength w has a = h (2 pi / w)^2 / (2 sqrt 2). H means nothing at a boundary, so
-only triangles between interior vertices take part. The shortest band is what the longer ones leave of H: its waves
-need no eigenvectors.
+only triangles between interior vertices take part. The shortest band is what the longer ones leave of H: its
+waves need no eigenvectors.
 """
 
 from __future__ import annotations
