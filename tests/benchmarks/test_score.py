@@ -34,7 +34,7 @@ from reference_sim.files.mesh_files import read_mesh
 from snug.motion.files import read_motion
 from snug.motion.options import MotionFileOptions
 from snug.networks.dressed_body import DressedBody
-from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, dressed_scene, small_scene
+from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, dressed_scene, small_scene, thirds
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMOKE = find_preset("smoke")
@@ -89,6 +89,31 @@ def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path,
     assert scored.read_config()["methods"]["mine"]["label"] == "mine (declared time)"
     assert numbers(scored, "reference")["energy/total"] == numbers(made, "simulation")["energy/total"]
     assert (tmp_path / "out" / "report.pdf").stat().st_size > 1000
+
+
+def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_path, capsys):
+    simulated = str(made.trajectory_path("hanging_sheet", "simulation"))
+    cloth = Trajectory.load(simulated)
+    positions, faces = thirds(cloth.positions, cloth.faces)
+    np.savez(tmp_path / "fine.npz", positions=positions + np.array([0.0, 0.0, 2e-3]), faces=faces)
+    words = [
+        "--scene",
+        "hanging_sheet",
+        "--preset",
+        "smoke",
+        "--reference",
+        simulated,
+        "-o",
+        str(tmp_path / "out"),
+    ]
+    assert score.main([str(tmp_path / "fine.npz"), *words]) == 2
+    assert "give --other-mesh" in capsys.readouterr().err
+    assert score.main([str(tmp_path / "fine.npz"), *words, "--other-mesh"]) == 0
+    assert "Chamfer distance" in capsys.readouterr().out
+    found = numbers(RunFolder(tmp_path / "out"), "fine")
+    assert set(found) == {"surface/chamfer", "surface/normals"}
+    assert 0.0 < found["surface/chamfer"] <= 2.0  # mm: it is shifted along itself too
+    assert "energy/total" in numbers(RunFolder(tmp_path / "out"), "reference")
 
 
 def test_without_a_reference_the_reason_is_said(made, tmp_path):

@@ -23,7 +23,7 @@ from benchmarks.tasks.cell_task import judge
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.trajectory.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
-from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.benchmarks.runner.tasks_by_hand import small_scene, thirds
 
 SCENE = small_scene("hanging_sheet", cells=6, frames=8)
 FACES = SCENE.cloth.faces
@@ -185,14 +185,11 @@ def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
         np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-12)
 
 
-CENTRES = np.concatenate([X, X[:, FACES].mean(axis=2)], axis=1)  # each triangle in three, by its centre
-MIDDLE = 49 + np.arange(len(FACES))
-THREE = np.concatenate([np.column_stack([np.delete(FACES, k, 1), MIDDLE]) for k in (2, 0)])
-THREE = np.concatenate([THREE, np.column_stack([FACES[:, [2, 0]], MIDDLE])])
+CENTRES, THIRDS = thirds(X, FACES)
 
 
 def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_path):
-    np.savez(tmp_path / "mine.npz", positions=100.0 * CENTRES, faces=THREE, quasi_static=CENTRES)
+    np.savez(tmp_path / "mine.npz", positions=100.0 * CENTRES, faces=THIRDS, quasi_static=CENTRES)
     option = RollOutOption("mine", str(tmp_path / "mine.npz"), FileConventions("cm", other_mesh=True))
     entry = entry_of(option, SCENE.name)
     method = entry.make(models=Path(), seed=0)
@@ -213,9 +210,9 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
     ("given", "remedy"),
     [({"positions": CENTRES}, "has no triangles: add those of its own mesh"),
      ({"positions": X[:, ORDER], "faces": PLACE[FACES]}, "give --match-vertices"),
-     ({"positions": 100.0 * CENTRES, "faces": THREE}, "give --units cm"),
-     ({"positions": CENTRES + 1.0, "faces": THREE}, "world coordinates"),
-     ({"positions": CENTRES[1:], "faces": THREE}, "has 7 frames")],
+     ({"positions": 100.0 * CENTRES, "faces": THIRDS}, "give --units cm"),
+     ({"positions": CENTRES + 1.0, "faces": THIRDS}, "world coordinates"),
+     ({"positions": CENTRES[1:], "faces": THIRDS}, "has 7 frames")],
 )  # fmt: skip
 def test_another_mesh_has_to_be_in_the_scenes_place_and_time(given, remedy, tmp_path):
     np.savez(tmp_path / "mine.npz", **given)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import time
 
+import numpy as np
+
 from benchmarks.assets.assets import Assets
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset, find_preset
@@ -20,6 +22,13 @@ def small_scene(name: str, *, cells: int = 6, frames: int = 10) -> BuiltScene:
     scene = next(scene for scene in SCENES if scene.name == name)
     sizes = {"sheet_cells": cells, "sheet_frames": frames}
     return dataclasses.replace(scene, sizes=(), options=sizes).build()
+
+
+def thirds(positions: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same surface in other triangles, each split at its centre: positions (T,V+F,3), faces (3F,3)."""
+    centres = positions.shape[1] + np.arange(len(faces))
+    split = [np.column_stack([faces[:, [k, (k + 1) % 3]], centres]) for k in range(3)]
+    return np.concatenate([positions, positions[:, faces].mean(axis=2)], axis=1), np.concatenate(split)
 
 
 def dressed_scene(motion: str, garment: str = "tshirt", *, part: str = "whole", preset: Preset | None = None):
