@@ -9,8 +9,8 @@ and where numbers compare a roll-out with the reference simulation
 
     compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]     name -> value
 
-which is called with the reference, and with each simulation that is as right as the reference: how far a
-number moves with them is its uncertainty. And where it wants curves beside the trajectory
+which is called with the reference, and with each member of its ensemble (benchmarks.results.ensemble): the
+standard deviation of a number over them is its uncertainty. And where it wants curves beside the trajectory
 
     series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,), or (T,V) of every vertex
 
@@ -31,7 +31,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from benchmarks.results.row import USABLE, as_right
+from benchmarks.results.ensemble import is_member
+from benchmarks.results.row import USABLE
 
 if TYPE_CHECKING:
     from benchmarks.method import MethodEntry
@@ -209,12 +210,12 @@ class SceneRollOuts(Kept):
         return self.find(role="reference")
 
     @property
-    def as_right(self) -> list[RollOut]:
-        """Equally valid simulations, which could stand in the reference's place."""
+    def ensemble(self) -> list[RollOut]:
+        """Members of the reference's ensemble that converged in every frame."""
         return [
             roll_out
             for roll_out in self.roll_outs
-            if as_right(roll_out.entry.reporting.family, roll_out.entry.reporting.level)
+            if is_member(roll_out.entry.reporting.family, roll_out.entry.reporting.level)
             and roll_out.status == "ok"
         ]
 

@@ -17,9 +17,11 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reports.run.finished_run import SUITES, Metric, Run
 from reports.run.reading import read_run
+from reports.statistics.effects import DIFFERENCE, LEVEL, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means
 from reports.statistics.pareto import MOST_SLACK, REPEATS, TIME, WHOLE
-from reports.statistics.significance import OPEN, TIED, Effect, effect_on, holm, standing
+from reports.statistics.relative_excess import relative_metric, with_relative_excess
+from reports.statistics.verdicts import effect_of, holm
 from reports.tables.number_texts import number, with_spread
 
 CELL = ["scene", "method", "seed", "metric"]
@@ -154,11 +156,10 @@ def _worst(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
     """Return changes of means beyond noise, how many were compared, and how many of one seed differ."""
-    first, second = (means(frame, *GROUP) for frame in _over_the_same(*frames))
-    cells = run.cells(*SUITES)
+    first, second = (means(frame, *GROUP) for frame in _over_the_same(*_with_known_zero(run, *frames)))
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
     judged = [
-        (place, method, metric := run.metrics[name], mean, new, effect_on(metric, new, mean, run, cells))
+        (place, method, metric := _metric(run, name), mean, new, _effect(metric, new, mean))
         for (place, method, name), (mean, new) in differ.items()
         if not mean.seeded or mean.seeds > 1
     ]
@@ -167,11 +168,46 @@ def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
     changes = []
     for (place, method, metric, mean, new, far), alone in zip(judged, p_values):
         p = None if alone is None else next(corrected)
-        noise = standing(new, mean, far, p) in (TIED, OPEN) or far.equal()
-        if not noise and not (metric.of == "machine" and _machine(mean, far)):
+        if _beyond_noise(far, p) and not (metric.of == "machine" and _machine(mean, far)):
             verdict = _side(metric, far)
             changes.append(Change(verdict, place, method, metric.name, _size(metric, mean, new, far, p)))
     return changes, len(first), len(differ) - len(judged)
+
+
+def _with_known_zero(run: Run, *frames: pd.DataFrame) -> list[pd.DataFrame]:
+    """Return the frames with relative excesses by the first one's references in place of energies.
+
+    Of energies whose zero is a choice, in scenes whose reference and skinning the first frame has.
+    """
+    made = []
+    for frame in frames:
+        for metric in (metric for metric in run.metrics.values() if metric.arbitrary_zero):
+            frame = with_relative_excess(run, frame, metric.name, basis=frames[0])
+            excess = frame[frame["metric"] == relative_metric(metric.name).name]
+            covered = frame.set_index(CELL[:3]).index.isin(excess.set_index(CELL[:3]).index)
+            frame = frame[~(covered & (frame["metric"] == metric.name))]
+        made.append(frame)
+    return made
+
+
+def _metric(run: Run, name: str) -> Metric:
+    """Return the metric of that name, with that of each energy's relative excess among them."""
+    relative = (relative_metric(metric.name) for metric in run.metrics.values() if metric.arbitrary_zero)
+    return {**{metric.name: metric for metric in relative}, **run.metrics}[name]
+
+
+def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
+    """Compute the effect of a change; of relative excess in points, of which 100 are skinning's excess."""
+    if metric.name.startswith("relative_excess/"):
+        return effect(new, before, DIFFERENCE, unit=100.0)
+    return effect(new, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, new, before)
+
+
+def _beyond_noise(far: Effect, p: float | None) -> bool:
+    """Return whether a change is neither within the margin nor what another draw of seeds would do."""
+    if far.equal() or abs(far.above()) <= (far.margin if p is None else far.uncertainty):
+        return False
+    return p is None or p < LEVEL
 
 
 def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
@@ -189,10 +225,10 @@ def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]
 
 def _machine(mean: Mean, far: Effect) -> bool:
     """Return whether a change of time or memory may be the machine's: not repeated, or within MOST_SLACK."""
-    if mean.uncertainty is None and "seeds" not in far.covers:
+    if mean.uncertainty is None and mean.seeds < 2:
         return True
     low, high = far.interval or (far.shown, far.shown)
-    return not far.ratio or (low < 1.0 + MOST_SLACK and high > 1.0 / (1.0 + MOST_SLACK))
+    return far.scale != RATIO or (low < 1.0 + MOST_SLACK and high > 1.0 / (1.0 + MOST_SLACK))
 
 
 def _side(metric: Metric, far: Effect) -> str:
@@ -205,7 +241,7 @@ def _size(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -
     """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
     unit = "" if metric.unit in ("", "1") else f" {metric.unit}"
     before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
-    text = f"{before} -> {after}{unit}, {'×' if far.ratio else 'by'} {number(far.shown)}"
+    text = f"{before} -> {after}{unit}, {'×' if far.scale == RATIO else 'by'} {number(far.shown)}"
     if far.interval:
         text += f" ({' to '.join(number(end) for end in far.interval)})"
     return text + ("" if p is None else f", p {number(p, 2)}")

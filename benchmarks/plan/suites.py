@@ -10,6 +10,7 @@ from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS
 from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import Preset
+from benchmarks.results.ensemble import MEMBERS
 from benchmarks.scenes import GARMENT_SCENES
 from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 from benchmarks.scenes.variations import FEW as FEW_OUT_OF_DISTRIBUTION
@@ -65,13 +66,13 @@ def _whole_motions(extent: Extent) -> list[str]:
 SMALL = ("hanging_sheet", "sheet_on_sphere", "flag", "twisted_strip")
 EXACT = ("free_fall",)  # every method has no error there but round-off: only for whoever names it
 
-# The reference from coarse to fine in tolerance and in time; and again, as right as it, from moved starts and
-# with its contact planes searched twice: how far those lie apart is the uncertainty of whatever is compared.
+# The reference from coarse to fine in tolerance and in time; and its ensemble, whose spread is the
+# uncertainty of whatever is compared with it.
+ENSEMBLE = tuple(MEMBERS)
 PERTURBED = tuple(entry.name for entry in METHODS if entry.reporting.family == "simulation-perturbed")
-AGAIN = (*PERTURBED, "simulation-refrozen")
-FEW_AGAIN = (PERTURBED[-1], "simulation-refrozen")
-FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", *FEW_AGAIN)
-REFERENCES = (*FEW_REFERENCES, "simulation-1e-8", "simulation-dt/4", "simulation-dt/8", *AGAIN)
+FEW_REFERENCES = ("simulation", "simulation-1e-2", "simulation-dt/2", "simulation-dt/4", "simulation-dt/8",
+                  *ENSEMBLE)  # fmt: skip
+REFERENCES = (*FEW_REFERENCES, *PERTURBED)
 # Iterations per unit of a preset's budgets. The quick subset has every second budget of what takes longer.
 FAMILIES = (("fast-lbfgs", 5), ("snug+fast-lbfgs", 1))
 SLOWER_FAMILIES = (("newton", 1), ("lbfgs", 5))
@@ -154,10 +155,10 @@ SUITES = (
         description="all methods on unseen motions: energies, curvature, cost",
         scenes=_whole_motions,
         methods=lambda extent: [
-            "simulation", *FEW_AGAIN, "skinning", "untrained", "snug", "supervised", "pbns", *CHEAP,
+            "simulation", *ENSEMBLE, "skinning", "untrained", "snug", "supervised", "pbns", *CHEAP,
         ],
         more_methods=(
-            *(entry.name for entry in FURTHER_METHODS), *AGAIN, "simulation-printed-bending",
+            *(entry.name for entry in FURTHER_METHODS), *PERTURBED, "simulation-printed-bending",
             "lbfgs-5", "lbfgs-10", "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
         named_methods=(
@@ -197,9 +198,9 @@ SUITES = (
         description="a motion on body shapes that no training has drawn: energies against the shape; only "
         "where it is named, or at preset paper",
         scenes=_shapes,
-        methods=lambda extent: ["simulation", "skinning", "snug", SHAPED, "pbns", *CHEAP],
+        methods=lambda extent: ["simulation", *ENSEMBLE, "skinning", "snug", SHAPED, "pbns", *CHEAP],
         more_methods=(
-            *(entry.name for entry in FURTHER_METHODS if entry.batched and entry.name != SHAPED), *AGAIN,
+            *(entry.name for entry in FURTHER_METHODS if entry.batched and entry.name != SHAPED), *PERTURBED,
         ),
     ),
     Suite(

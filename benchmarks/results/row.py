@@ -26,26 +26,15 @@ BEFORE_FRAMES = ("cost/data", *OF_TRAINING)  # [s] all that it costs before its 
 REFERENCE_TOLERANCE = 1e-6  # of the reference's minimisations
 
 
-def as_right(family: str, level: float | None) -> bool:
-    """Return whether simulations of that family and level could stand in the reference's place.
-
-    From a moved start, with contact planes searched twice, or to a tolerance at least as small. Those of
-    another time step could not: they solve another discrete problem; how far off that is is the time error.
-    """
-    if family == "simulation-tolerance":
-        return level is not None and level <= REFERENCE_TOLERANCE
-    return family in ("simulation-perturbed", "simulation-refrozen")
-
-
 @dataclass(frozen=True)
 class Row:
     """One measured number: a (suite, scene, method, seed, metric) and what came out.
 
     `value`, `expected`, `tolerance` and `uncertainty` are None where absent (an empty cell in the file); a
-    skipped row has a reason and no value. `uncertainty`, in the unit of the value: how far it moves where
-    another simulation as right as the reference takes its place, or its standard error as a sample of
-    frames; `moved`: by how much each of those simulations changes it. `terms` names the energies of the
-    scene, joined by "+".
+    skipped row has a reason and no value. `uncertainty`, in the unit of the value: its standard deviation
+    over the ensemble of the reference (benchmarks.results.ensemble), or its standard error as a sample of
+    frames; `moved`: by how much each member of the ensemble, in the reference's place, changes it.
+    `terms` names the energies of the scene, joined by "+".
 
     Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
     Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,

@@ -11,7 +11,8 @@ from typing import Any
 from benchmarks.cell import Cell, TaskId
 from benchmarks.metrics import find_metric
 from benchmarks.plan.plan import Plan
-from benchmarks.results.row import REFERENCE_TOLERANCE, Row, as_right
+from benchmarks.results.ensemble import is_member, spread
+from benchmarks.results.row import REFERENCE_TOLERANCE, Row
 from benchmarks.tasks.task import Outcome, Task
 from benchmarks.tasks.training import TrainNetwork
 
@@ -214,13 +215,13 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:
-    """Return the rows, those of the reference with their differences to simulations that are as right.
+    """Return the rows, those of the reference with their spread over its ensemble.
 
     Of answers, and not of what has an uncertainty of its own. outside: where further metrics are declared.
     """
     others: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:
-        if as_right(row.family, row.level) and row.status == "ok" and row.value is not None:
+        if is_member(row.family, row.level) and row.status == "ok" and row.value is not None:
             others.setdefault((row.scene, row.metric), {})[row.method] = row.value
 
     def with_ensemble(row: Row) -> Row:
@@ -229,7 +230,7 @@ def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list
         if not answer or row.uncertainty is not None or row.value is None or not ensemble:
             return row
         moved = tuple((twin, value - row.value) for twin, value in ensemble.items())
-        return dataclasses.replace(row, uncertainty=max(abs(change) for _, change in moved), moved=moved)
+        return dataclasses.replace(row, uncertainty=spread(change for _, change in moved), moved=moved)
 
     return [with_ensemble(row) for row in rows]
 

@@ -15,6 +15,7 @@ from benchmarks.declarations import load
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
 from benchmarks.process.errors import one_line
+from benchmarks.results.ensemble import spread
 from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
@@ -146,12 +147,13 @@ def compared(
     if roll_out.reference is None:
         return {}
     values = compare(roll_out, roll_out.reference)
-    twins = [other for other in roll_out.group.as_right if other is not roll_out]
+    twins = [other for other in roll_out.group.ensemble if other is not roll_out]
     others = {other.entry.name: compare(roll_out, other) for other in twins}
     estimates: dict[str, float | Estimate] = {}
     for name, value in values.items():
         moved = tuple((twin, beside[name] - value) for twin, beside in others.items() if name in beside)
-        estimates[name] = Estimate(value, max(abs(change) for _, change in moved), moved) if moved else value
+        uncertainty = spread(change for _, change in moved)
+        estimates[name] = value if uncertainty is None else Estimate(value, uncertainty, moved)
     return estimates
 
 

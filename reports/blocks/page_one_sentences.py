@@ -1,4 +1,4 @@
-"""Headline sentences of page one: how near, at what cost, how certain, on other bodies."""
+"""Headline sentences of page one: how near, how it moves, at what cost, how certain, on other bodies."""
 
 from __future__ import annotations
 
@@ -11,98 +11,141 @@ from reports.run.finished_run import Run
 from reports.statistics import paper_claims
 from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
 from reports.statistics.break_even import NETWORK, compared_scenes
-from reports.statistics.means_and_spreads import Mean, mean_of, pair, shared_scenes, value_of
+from reports.statistics.means_and_spreads import pair, value_of
 from reports.statistics.page_one_methods import LEARNED, leads
-from reports.statistics.pareto import Point, beaten_by, fastest, indistinct, points_of, run_time, truncated
-from reports.statistics.significance import OPEN, TIED, effect_on, standing
-from reports.tables.number_texts import number, with_spread
+from reports.statistics.pareto import (
+    SMALLER_STEPS,
+    Point,
+    beaten_by,
+    fastest,
+    indistinct,
+    points_of,
+    run_time,
+    truncated,
+)
+from reports.statistics.relative_excess import TOTAL, Excess, excess_of
+from reports.statistics.verdicts import LESS, MORE, TIED, compare_methods, standing
+from reports.tables.number_texts import duration, number
 
-TOTAL, CURVATURE, DISTANCE, SWING = "energy/total", "curvature/error", "distance/rms", "dynamics/amplitude"
-GAP = "gap/energy"
+CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
+SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/vertices"
 
 
 def headline(run: Run) -> list[tuple[str, str]]:
-    """Say (topic, sentence) how near, at what cost, how certain, and what on other bodies, where known."""
+    """Return (topic, sentence) for each topic of page one that the run can tell."""
     scenes = next(iter(run.garments(run.garment_rows).values()), [])
     worn = run.garment_rows[run.garment_rows["scene"].isin(scenes)]
     cells = run.cells("speed", "garments")
     compared = next(iter(compared_scenes(run, cells).values()), [])
     timed = cells[cells["scene"].isin(compared)] if compared else worn
     sentences = {
-        "How near": _near(run, worn), "At what cost": _cost(run, timed, compared),
-        "How certain": _trust(run, worn, timed), "On other bodies": _on_other_bodies(run),
+        "How near": _near(run, worn), "How it moves": _moves(run, worn),
+        "At what cost": _cost(run, timed, compared), "How certain": _trust(run, timed),
+        "On other bodies": _on_other_bodies(run),
     }  # fmt: skip
     return [(topic, unbroken(sentence)) for topic, sentence in sentences.items() if sentence]
 
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
-    """Compare the network's total energy with the simulation's, over scenes that all of page one have."""
-    rows = worn[(worn["metric"] == TOTAL) | ~worn["usable"]]
-    have = set(rows[rows["usable"]]["method"])
-    names = [name for name in leads(run, worn, by=(TOTAL,)) if name in have]
-    scenes = shared_scenes(rows, names, TOTAL)
-    all_means = {name: mean_of(rows, name, TOTAL, scenes) for name in names}
-    means = {name: mean for name, mean in all_means.items() if mean is not None}
-    network = next((name for name in means if run.methods[name].role in LEARNED), "")
-    if not network or run.reference not in means:
+    """Say which share of skinning's excess energy each network of page one leaves."""
+    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in LEARNED]
+    known = {name: excess for name in names if (excess := excess_of(run, worn, name))}
+    if not known:
         return ""
-    one, other = means.pop(network), means.pop(run.reference)
-    asked = worn[worn["metric"] == TOTAL]["scene"].nunique()
-    count = f"{len(scenes)} of {asked}" if len(scenes) < asked else str(asked)
-    kind = "training" if set(worn["scene"]) <= set(run.trained_on) else "unseen"
-    garments = list(run.garments(run.garment_rows))
-    where = f" in {garments[0]}" if len(garments) > 1 else ""
+    first, *others = known
+    excess = known[first]
+    unseen = "" if set(worn["scene"]) <= set(run.trained_on) else "unseen "
+    count = len(excess.by_motion)
     text = (
-        f"On {count} {kind} motion{'' if asked == 1 else 's'}{where} {run.label(network)}'s total energy is "
+        f"On {count} {unseen}motion{'' if count == 1 else 's'} {run.label(first)} leaves {_share(excess)} of "
+        f"the energy that skinning alone has above the converged simulation ({_stands(excess)})"
     )
-    text += f"{with_spread(one.value, one.spread_or_uncertainty)} J{one.fewer}, the simulation's "
-    text += with_spread(other.value, other.spread_or_uncertainty) + _apart(run, rows, one, other)
-    others = [f"{run.label(name)} has {number(mean.value)}{mean.fewer}" for name, mean in means.items()]
-    return text + (f"; {', '.join(others)}." if others else ".")
+    text += "".join(f"; {run.label(name)} leaves {_share(known[name])}" for name in others)
+    if count > 1:
+        scene, worst = excess.worst
+        low, high = (number(share, 2) for share in excess.without_each_motion)
+        text += (
+            f". {run.label(first)}: mean {number(excess.mean, 2)} %, worst motion {number(worst, 2)} % "
+            f"({scene.partition('/')[2] or scene}), {low} to {high} % when any one motion is left out"
+        )
+    return f"{text}."
 
 
-def _apart(run: Run, rows: pd.DataFrame, one: Mean, other: Mean) -> str:
-    """Say which way, in how many roll-outs, and whether that is inconclusive. The other has no seeds."""
-    far = effect_on(run.metrics[TOTAL], one, other, run, rows)
-    stands = standing(one, other, far, far.p_value())
-    if stands == TIED:
-        return ": a tie"
-    higher, of_other = one.value > other.value, {scene: value for (scene, _), value in other.cells.items()}
-    above = [(value > of_other[scene]) is higher for (scene, _), value in one.cells.items()]
-    text = f": {'higher' if higher else 'lower'} in {sum(above)} of {len(above)} roll-outs"
-    if far.one_seed:
-        return f"{text} of one seed, which judges no network"
-    return f"{text}; of other motions and seeds it cannot be told" if stands == OPEN else text
+def _share(excess: Excess) -> str:
+    """Return a relative excess as "6.1 % (2.3 to 14)"."""
+    ends = f" ({' to '.join(number(end, 2) for end in excess.interval)})" if excess.interval else ""
+    return f"{number(excess.typical, 2)} %{ends}"
+
+
+def _stands(excess: Excess) -> str:
+    """Say how the method stands to the reference."""
+    stands = standing(excess.effect, excess.effect.p_value())
+    words = {TIED: "a tie with it", MORE: "more than it has", LESS: "less than it has"}
+    return words.get(stands, "inconclusive")
+
+
+def _moves(run: Run, worn: pd.DataFrame) -> str:
+    """Say what the network lacks of the simulation's motion, and how much of it lies inside the body."""
+    parts = []
+    swing, alike = (value_of(worn, NETWORK, name) for name in (SWING, ALIKE))
+    if swing is not None:
+        parts.append(f"{run.label(NETWORK)}'s hem has {number(swing, 2)} of the simulation's amplitude")
+        parts[-1] += "" if alike is None else f", correlation {number(alike, 2)}"
+    inside = value_of(worn, NETWORK, INSIDE)
+    if inside is not None:
+        reference = value_of(worn, run.reference, INSIDE)
+        beside = "" if reference is None else f", of the simulation {number(reference, 2)} %"
+        parts.append(f"{number(inside, 2)} % of the vertices lie inside the body{beside}")
+    return f"{'; '.join(parts)}." if parts else ""
 
 
 def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
-    network, reference = pair(timed, NETWORK, run.reference, run_time(timed))
-    if network is None or reference is None or not network.value:
+    metric = run.metrics.get(run_time(timed))
+    compared = compare_methods(run, timed, metric, run.reference, NETWORK) if metric else None
+    if compared is None or compared.effect is None or compared.other is None or not compared.other.value:
         return ""
-    text = f"{run.label(NETWORK)} takes {number(network.value)} ms a frame, the simulation "
-    ratio = number(reference.value / network.value, 2)
-    text += f"{number(reference.value)}: {ratio} times as long{network.fewer}"
+    ends = compared.effect.interval
+    times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
+    own = number(compared.other.value)
+    text = f"{run.label(NETWORK)} takes {own} ms a frame, the simulation {times} times as long"
+    training = value_of(run.garment_rows, NETWORK, "cost/train")
+    text += f"; training takes {duration(training)}" if training else ""
     more = _rivals(run, run.cells("speed", "garments"), scenes) if scenes else ""
     return f"{text}; {more}" if more else f"{text}."
 
 
-def _trust(run: Run, worn: pd.DataFrame, timed: pd.DataFrame) -> str:
-    """Say what the network lacks, and how uncertain the reference itself is."""
+def _trust(run: Run, timed: pd.DataFrame) -> str:
+    """Say how uncertain the reference itself is, what its time step leaves out, and how claims came out."""
     parts = []
-    swing = value_of(worn, NETWORK, SWING)
-    if swing is not None:
-        parts.append(f"the hem's own motion is {number(swing, 2)} of the simulation's")
     apart = [indistinct(run, timed, metric) for metric in (CURVATURE, DISTANCE)]
     if all(apart):
         parts.append(
-            f"right simulations lie up to {number(apart[0])} 1/m and {number(apart[1])} mm apart, and what "
-            "is nearer cannot be told"
+            f"equally valid simulations lie {number(apart[0], 2)} 1/m and {number(apart[1], 2)} mm apart, "
+            "and what is nearer is inconclusive"
+        )
+    finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
+    if finest:
+        count = int(run.methods[finest].level or 0)
+        strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
+        words = [
+            f"{what} is {number(one.value / other.value, 2)} times"
+            for what, (one, other) in (("strain", strain), ("the hem's amplitude", amplitude))
+            if one and other and other.value
+        ]
+        parts.append(
+            f"converged means each time step of 1/30 s; {count} steps a frame have {' and '.join(words)}"
         )
     counted = paper_claims.counts(run)
     if counted:
-        parts.append(f"of the paper's claims tested here: {paper_claims.in_words(counted)}")
+        parts.append(f"the primary claims of the paper: {paper_claims.in_words(counted)}")
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if parts else ""
+
+
+def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
+    """Return the simulations with smaller time steps among these rows."""
+    have = set(rows[rows["usable"]]["method"])
+    return [name for name, method in run.methods.items() if method.family == SMALLER_STEPS and name in have]
 
 
 def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:

@@ -11,9 +11,9 @@ from reports.blocks import BLOCKS
 from reports.blocks.block import Report, SentenceBlock, TableBlock
 from reports.figures.method_styles import style
 from reports.run.finished_run import Run
+from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean, value_of
 from reports.statistics.pareto import ERRORS, error_points, indistinct, run_time, time_label
-from reports.statistics.significance import Effect
 from reports.tables.cell_texts import column_texts, remarks_below
 from reports.tables.outcomes import merged
 from reports.tables.table import Cell, Column, Table

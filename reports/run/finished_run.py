@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row, as_right
+from benchmarks.results.ensemble import is_member
+from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row
 from reports.run.training_histories import History
 
 if TYPE_CHECKING:
@@ -157,8 +158,8 @@ class Run:
 
     @property
     def reference_ensemble(self) -> list[str]:
-        """Perturbed references: simulations as valid as the reference, which show its uncertainty."""
-        return [name for name, method in self.methods.items() if as_right(method.family, method.level)]
+        """Members of the reference's ensemble, whose spread is its uncertainty."""
+        return [name for name, method in self.methods.items() if is_member(method.family, method.level)]
 
     def label(self, method: str) -> str:
         """Return the method's name for people."""

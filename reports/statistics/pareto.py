@@ -119,13 +119,14 @@ def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
 def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     """Return the error [unit of the metric] below which a method is inconclusive from the reference.
 
-    It is the largest of the perturbed references; of the energy gap what the reference leaves on contact
-    planes searched at its end. 0 where none is known.
+    It is the root mean square over the reference's ensemble, the mean of scenes; of the energy gap what the
+    reference leaves on contact planes searched at its end. 0 where none is known.
     """
     ensemble = [run.reference] if metric in PLANES else run.reference_ensemble
     of_ensemble = (rows["metric"] == PLANES.get(metric, metric)) & rows["method"].isin(ensemble)
-    kept = rows[rows["usable"] & of_ensemble]["value"]
-    return float(kept.max()) if len(kept) else 0.0
+    kept = rows[rows["usable"] & of_ensemble]
+    squares = (kept["value"] ** 2).groupby(kept["scene"]).mean()
+    return float((squares**0.5).mean()) if len(kept) else 0.0
 
 
 def beaten_by(points: Sequence[Point], point: Point) -> Point | None:

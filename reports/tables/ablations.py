@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pandas as pd
 
 from reports.run.finished_run import Run
-from reports.statistics.means_and_spreads import mean_of, pair
-from reports.statistics.significance import effect_on
+from reports.statistics.means_and_spreads import mean_of
+from reports.statistics.verdicts import compare_methods
 from reports.tables.table import GARMENT, METHOD, Cell, Table, metric_column, table
 
 SHOWN = (
@@ -40,17 +40,14 @@ def ablation_effects(run: Run) -> list[Table]:
     lines: list[tuple[Cell, ...]] = []
     for garment, base, below, rows in _families(run):
         for method in below:
-            pairs = [pair(rows, method, base, metric.name) for metric in metrics]
-            effects = [
-                effect_on(metric, one, full, run, rows) if one and full else None
-                for metric, (one, full) in zip(metrics, pairs)
-            ]
+            effects = [compare_methods(run, rows, metric, method, base).effect for metric in metrics]
             lines.append((garment, method, *effects))
     caption = (
         "Each variant beside its base, over the scenes that both have: × the variant over the base, of "
-        "geometric means; where a value is not positive or zero is a choice, the variant less the base."
+        "geometric means; of the total, whose zero is a choice, the variant less the base in points of "
+        "skinning's excess; where another value is not positive, the difference in the unit above."
     )
-    note = "Differences in the unit above. Below: 95 % intervals over motions and seeds, each for itself."
+    note = "Below: 95 % intervals over motions and seeds, each for itself."
     columns = (*HEAD, *map(metric_column, metrics))
     return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
 

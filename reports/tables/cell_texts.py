@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 from reports.run.finished_run import Run
+from reports.statistics.effects import RANGE, RATIO, Effect
 from reports.statistics.means_and_spreads import Mean
-from reports.statistics.significance import Effect
 from reports.tables.number_texts import DASH, aligned, duration, number
 from reports.tables.table import Cell, Column, Table
 
@@ -17,6 +17,7 @@ REMARKS = {
     "†": "† The solver left some frames unconverged.",
     "‡": "‡ The interval is over seeds alone: there is one motion, or motions make no difference.",
     "§": "§ The interval is over motions alone: there is no second seed, or seeds make no difference.",
+    "#": "# The range over motions and seeds.",
 }
 SMALL = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
 
@@ -30,7 +31,7 @@ def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
         seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
         kinds.append(f"standard deviation over {' or '.join(map(str, seeds))} seeds")
     if any(mean.uncertainty for mean in means):
-        kinds.append("the change by a perturbed reference, or a sample's error")
+        kinds.append("the spread of the reference's ensemble, or a sample's error")
     if kinds:
         lone = any(m.spread_or_uncertainty is None for m in means)
         without = " Without it: one seed, or nothing random." if lone and len(kinds) == 1 else ""
@@ -51,7 +52,9 @@ def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Seque
             if apart := cell.spread_or_uncertainty:
                 spread = f"± {duration(apart) if column.unit == 's' else number(apart, 1)}"
         elif isinstance(cell, Effect):
-            mark = ("" if cell.complete else "*") + {"seeds": "‡", "motions": "§"}.get(cell.covers, "")
+            mark = ("" if cell.complete else "*") + {"seeds": "‡", "motions": "§", RANGE: "#"}.get(
+                cell.covers, ""
+            )
             spread = " to ".join("∞" if end == math.inf else number(end) for end in cell.interval or ())
         lines.append({"text": text, "spread": spread, "mark": mark})
     return lines
@@ -59,7 +62,7 @@ def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Seque
 
 def _text(run: Run, column: Column, cell: Cell) -> str:
     if isinstance(cell, Effect):
-        sign = "×" if cell.ratio else "+" if cell.value > 0.0 else ""
+        sign = "×" if cell.scale == RATIO else "+" if cell.value > 0.0 else ""
         return sign + number(cell.shown, column.digits)
     value = cell.value if isinstance(cell, Mean) else cell
     if isinstance(value, str):

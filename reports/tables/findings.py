@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from reports.run.finished_run import Run
 from reports.statistics.paper_claims import judged
+from reports.statistics.verdicts import measure_of
 from reports.tables.table import Cell, Column, Table, table
 
 NOTE = (
-    "Effect: × the first over the second, of geometric means over motions and seeds; the first less the "
-    "second where a value is not positive or zero is a choice, as of gravity; of frames, the first's share "
-    "less half. Below it the 95 % interval over motions and seeds, of the line by itself. p: corrected by "
-    "Holm for all lines; a claim holds, or does not hold, where p is below .05. Tie: p is not, and all of "
-    "the interval is within 5 % of equality; or the difference is within the uncertainty of the reference. "
-    "Cannot be told: neither, or a network was trained with one seed. Where nothing was repeated, 5 % decide."
+    "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero is "
+    "a choice, points of skinning's excess between the two; of frames, the first's share less half. Below it "
+    "the 95 % interval over motions and seeds, of costs the range. p: of a primary claim corrected by Holm for "
+    "the whole primary family, of an exploratory one as it is. Tie: all of the interval lies within 5 % of "
+    "equality, or within the spread of the reference's ensemble if that is wider. A claim holds, or does not "
+    "hold, where p is below 0.05 and the difference exceeds that spread; a cost, where its range lies on one "
+    "side. Inconclusive: anything else, fewer than four motions, or a network of one seed."
 )
 
 
@@ -20,23 +22,23 @@ def findings(run: Run) -> list[Table]:
     """List the claims that this run can judge, over scenes of the first garment that both methods share."""
     columns = (
         Column("claim", "Claim", text=True),
+        Column("family", "Family", text=True),
         Column("metric", "Measure", text=True),
         Column("lower", "First", text=True, method=True),
         Column("claimed", "Claim", text=True),
         Column("higher", "Second", text=True, method=True),
         Column("first", "Of the first", mixed=True),
         Column("second", "Of the second", mixed=True),
-        Column("difference", "Difference", mixed=True),
         Column("effect", "Effect", mixed=True),
         Column("p", "p", digits=2, mixed=True),
         Column("verdict", "Here", text=True),
     )
     rows: list[tuple[Cell, ...]] = [
         (
-            line.claim.says, line.metric.heading, line.claim.lower, line.claim.relation,
-            line.claim.higher, line.one, line.other,
-            None if line.one is None or line.other is None else line.one.value - line.other.value,
-            line.effect, line.p, line.verdict + line.remark,
+            line.claim.says, "primary" if line.claim.primary else "exploratory",
+            measure_of(line.compared).heading, line.claim.lower, line.claim.relation, line.claim.higher,
+            line.compared.one, line.compared.other, line.compared.effect, line.p,
+            line.verdict + line.remark,
         )
         for line in judged(run)
     ]  # fmt: skip

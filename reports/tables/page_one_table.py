@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from reports.run.finished_run import Run
 from reports.statistics.break_even import compared_scenes, rivals
+from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.page_one_methods import leads
 from reports.statistics.pareto import run_time
+from reports.statistics.relative_excess import excess_of
+from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, metric_column, table
 
 ROWS = 8
-ENERGIES = ("energy/total", "energy/strain", "curvature/error", "penetration/vertices")
-STEPS = ("gap/energy", "step/distance")
+ANSWERS = ("penetration/vertices", "dynamics/amplitude", "dynamics/correlation")
+GAP = "gap/energy"
 
 
 def overview(run: Run) -> list[Table]:
     """Tabulate reference, baselines and networks of the first garment, and the solvers as good as SNUG.
 
-    Energies and curvature are means over its motions, errors of steps and times over the scenes in which
-    solvers were timed.
+    Relative excess, penetration and dynamics are means over its motions, gaps and times over the scenes in
+    which solvers were timed.
     """
     garment = run.first_garment
     rows_of_garment = run.garment_rows[run.garment_rows["garment"] == garment]
@@ -36,20 +41,37 @@ def overview(run: Run) -> list[Table]:
     why = rivals(run, cells, scenes) if scenes else {}
     solvers = [m for m in why if m not in chosen]
     chosen = run.ordered([*chosen[: ROWS - len(solvers)], *solvers])
-    wanted = [(name, rows_of_garment) for name in ENERGIES] + [
-        (name, timed) for name in (*STEPS, run_time(timed))
-    ]
+    wanted = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
     wanted += [("cost/train", rows_of_garment)]
     asked = [(run.metrics[name], rows) for name, rows in wanted if name in run.metrics]
+    excess = {name: excess_of(run, rows_of_garment, name) for name in chosen if name != run.reference}
+    faster = {name: _times_faster(run, timed, name) for name in chosen}
     lines: list[tuple[Cell, ...]] = [
-        (method, *(mean_of(rows, method, metric.name) for metric, rows in asked)) for method in chosen
-    ]
-    kept = [k for k in range(1, len(asked) + 1) if any(line[k] is not None for line in lines)]
+        (
+            method, known.effect if (known := excess.get(method)) else None,
+            known.worst[1] if known else None,
+            *(mean_of(rows, method, metric.name) for metric, rows in asked), faster[method],
+        )
+        for method in chosen
+    ]  # fmt: skip
+    columns = [
+        Column("relative_excess", "Relative excess", "%"), Column("worst", "Its worst motion", "%"),
+        *(metric_column(metric) for metric, _ in asked), Column("faster", "Times faster"),
+    ]  # fmt: skip
+    kept = [k for k in range(1, len(columns) + 1) if any(line[k] is not None for line in lines)]
     lines = [(line[0], *(line[k] for k in kept)) for line in lines]
-    columns = [metric_column(asked[k - 1][0]) for k in kept]
+    columns = [columns[k - 1] for k in kept]
     if not columns:
         return []
     caption = f"{garment}: means over its motions" if garment else f"Means over {', '.join(scenes)}"
-    caption += f"; gaps, single steps and run times over {', '.join(scenes)}." if garment and scenes else "."
+    caption += f"; gaps and run times over {', '.join(scenes)}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)
+
+
+def _times_faster(run: Run, timed: pd.DataFrame, method: str) -> Effect | None:
+    """Return how many times as long as the method the reference takes, with the range."""
+    metric = run.metrics.get(run_time(timed))
+    if metric is None or method == run.reference:
+        return None
+    return compare_methods(run, timed, metric, run.reference, method).effect

@@ -13,8 +13,8 @@ import pandas as pd
 from benchmarks.results.row import cell_text
 from reference_sim.files.atomic_files import replacing
 from reports.run.finished_run import Metric
+from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean
-from reports.statistics.significance import Effect
 from reports.tables.number_texts import CSV_DASH, csv_number
 
 EFFECT_PARTS = ("kind", "low", "high", "covers")
@@ -119,5 +119,4 @@ def _parts_of_effect(cell: Cell) -> tuple[str, ...]:
     if not isinstance(cell, Effect):
         return (CSV_DASH,) * len(EFFECT_PARTS)
     low, high = cell.interval or (None, None)
-    kind = "ratio" if cell.ratio else "difference"
-    return kind, csv_number(low), csv_number(high), cell.covers or CSV_DASH
+    return cell.scale, csv_number(low), csv_number(high), cell.covers or CSV_DASH

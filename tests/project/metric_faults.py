@@ -108,7 +108,7 @@ METRIC_FAULTS = {
     "benchmarks/metrics/test_uncertainty": (
         Fault("least change of the reference", "benchmarks/tasks/metric_task.py", "Estimate(value, max(",
               "Estimate(value, min("),
-        Fault("smaller steps are as right", "benchmarks/results/row.py", '"simulation-refrozen")',
+        Fault("smaller steps are in the ensemble", "benchmarks/results/ensemble.py", '"simulation-refrozen", None)',
               '"simulation-refrozen", "simulation-dt")'),
         Fault("energies of the warm-up", ENERGY, "series[roll_out.judged].mean()", "series[2:].mean()"),
         Fault("excess with the zero of gravity", EXCESS, 'above["total"] - above.get("gravity", 0.0)',

@@ -7,10 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
-
-from reports.statistics import significance
-from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.statistics.significance import (
     MORE,
     OPEN,
@@ -22,6 +18,10 @@ from reports.statistics.significance import (
     standing,
     within_uncertainty,
 )
+from scipy import stats
+
+from reports.statistics import significance
+from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from tests.reports.report_folder import row, run_of
 
 

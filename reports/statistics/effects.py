@@ -1,0 +1,296 @@
+"""Effect of one method against another on a scale where it is symmetric, with its uncertainty.
+
+Three scales: logarithms of positive numbers; shares of skinning's excess energy, for energies whose zero is a
+choice (reports.statistics.relative_excess); plain differences for what is neither. Costs have no interval but
+a range.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from benchmarks.results.ensemble import spread
+from reports.statistics.means_and_spreads import Mean
+
+RATIO, EXCESS, DIFFERENCE = "ratio", "excess", "difference"  # scales
+RANGE = "range"  # what the limits of a cost are
+LEVEL = 0.05  # of the two-sided tests, and what an interval leaves out
+TIE = 0.05  # share of a number up to which another one counts as equal
+# % of skinning's excess. Shares well above it are compared by their logarithm, those below by their
+# difference: arcsinh(x / SOFTENING) is one and the other, and defined for shares below zero.
+SOFTENING = 1.0
+DRAWS, SEED = 10_000, 20220619  # of the bootstrap; the same draws for every comparison
+
+
+def on_scale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
+    """Return values on a scale where effects add up: logarithm, arcsinh(x / SOFTENING), or as they are.
+
+    >>> on_scale(1.0, RATIO), on_scale(0.0, EXCESS), on_scale(2.0, DIFFERENCE)
+    (0.0, 0.0, 2.0)
+    """
+    if scale == RATIO:
+        return _plain(np.log(values))
+    return _plain(np.arcsinh(np.divide(values, SOFTENING))) if scale == EXCESS else values
+
+
+def off_scale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
+    """Return what `on_scale` makes these values of."""
+    if scale == RATIO:
+        with np.errstate(over="ignore"):  # a few seeds of what broke can leave the upper end open
+            return _plain(np.exp(values))
+    return _plain(SOFTENING * np.sinh(values)) if scale == EXCESS else values
+
+
+def _plain(values: np.ndarray | np.floating) -> np.ndarray | float:
+    return float(values) if np.ndim(values) == 0 else np.asarray(values)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Difference of two methods on a scale, with the uncertainty that motions, seeds and the reference leave.
+
+    Attributes:
+        value: the first less the second on the scale, mean over motions and seeds.
+        scale: RATIO, EXCESS or DIFFERENCE.
+        second: mean of the second on the scale.
+        error: standard error of the value; None where nothing was repeated, and of costs.
+        freedom: degrees of freedom of Student's t.
+        covers: the resampled factors: "motions and seeds", "motions", "seeds" or nothing; RANGE of costs.
+        motions: how many scenes both methods have.
+        limits: of costs, the least and the greatest of what was measured, on the scale.
+        uncertainty: standard deviation of the value over the reference's ensemble; 0 where no member changes
+            it, or none ran.
+        unit: of a plain difference, what 1 is of: TIE of it is no difference; 0 where that is unknown.
+        complete: neither mean lacks a scene or a seed.
+        one_seed: whether a mean is of one seed, and nobody knows how far another would move it.
+    """
+
+    value: float
+    scale: str
+    second: float = 0.0
+    error: float | None = None
+    freedom: float = math.inf
+    covers: str = ""
+    motions: int = 1
+    limits: tuple[float, float] | None = None
+    uncertainty: float = 0.0
+    unit: float = 0.0
+    complete: bool = True
+    one_seed: bool = False
+
+    @property
+    def shown(self) -> float:
+        """Ratio of geometric means; points of skinning's excess; or difference of means."""
+        return self._shown(self.value)
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Interval of 95 % of this comparison alone, or the range of a cost; None where nothing repeats."""
+        ends = self.ends
+        return None if ends is None else (self._shown(ends[0]), self._shown(ends[1]))
+
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """Ends of the interval on the scale."""
+        if self.error is None:
+            return self.limits
+        reach = self._quantile * self.error
+        return self.value - reach, self.value + reach
+
+    @property
+    def margin(self) -> float:
+        """Largest difference on the scale that counts as none: TIE, or the reference's uncertainty if larger."""
+        tie = TIE * self.unit if self.scale == DIFFERENCE else math.log1p(TIE)
+        return max(tie, self.uncertainty)
+
+    def p_value(self, factor: float = 1.0) -> float | None:
+        """Return the two-sided p-value that `factor` times the first is the second.
+
+        It is below LEVEL where the interval excludes it; None where nothing was repeated, and of costs.
+        """
+        from scipy import stats
+
+        if self.error is None:
+            return None
+        distance = abs(self.above(factor))
+        if self.error == 0.0:  # every motion has the same factor between the two
+            return float(distance == 0.0)
+        return float(2.0 * stats.t.sf(distance / self.error, self.freedom))
+
+    def above(self, factor: float = 1.0) -> float:
+        """Return how far `factor` times the first is above the second, on the scale."""
+        return self.value + self.shift(factor)
+
+    def shift(self, factor: float) -> float:
+        """Return by how much `factor` times the first moves it on the scale."""
+        return math.log(factor) if self.scale == RATIO else 0.0
+
+    def equal(self, factor: float = 1.0) -> bool:
+        """Return whether all of the interval lies within the margin; a value without one never does."""
+        ends = self.ends
+        return ends is not None and all(abs(end + self.shift(factor)) <= self.margin for end in ends)
+
+    def _shown(self, value: float) -> float:
+        if self.scale == EXCESS:  # points between typical shares of the two
+            both = (off_scale(end, EXCESS) for end in (self.second + value, self.second))
+            return float(next(both)) - float(next(both))
+        return float(off_scale(value, self.scale))
+
+    @property
+    def _quantile(self) -> float:
+        from scipy import stats
+
+        return float(stats.t.ppf(1.0 - LEVEL / 2.0, self.freedom))
+
+
+def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None) -> Effect:
+    """Compute the effect between two means over the same motions, as means_and_spreads.pair gives them.
+
+    Args:
+        one: the first mean.
+        other: the second mean.
+        scale: RATIO where both are positive, else DIFFERENCE, unless it is given.
+        unit: see Effect; the larger mean where none is given.
+
+    Positive numbers are compared by their logarithms, cell by cell: a violent motion has more of every energy
+    with every method, and what came out a million times as large with one seed is told apart all the same.
+
+    The standard error is that of a bootstrap that draws motions and seeds, each with replacement and of each
+    one fewer than there are: the variance is then that of the mean, not (n - 1) / n of it (Hesterberg 2015).
+    Motions are drawn for both methods at once; so are seeds within a pairing group, others by themselves.
+    Drawn crossed, the variance is on average no smaller than the true one (Owen 2007, "The pigeonhole
+    bootstrap"). The interval is the value and Student's quantile times the error, for percentiles of so few
+    values cover too little; the degrees of freedom are Satterthwaite's (1946), of the parts that motions and
+    seeds have in the variance. A network of one seed is taken to have the scatter of the one beside it; what
+    no seed changes has none. What is the same with every motion, such as the time of a training, is one
+    number and was not repeated; so with seeds.
+    """
+    scale = scale or (RATIO if _positive(one) and _positive(other) else DIFFERENCE)
+    first, second = (np.asarray(on_scale(_grid(mean), scale)) for mean in (one, other))
+    grids = _drawn_alike(one, other, first, second)
+    repeated = {
+        "motions": any((grid != grid[:1]).any() for grid in grids),
+        "seeds": any((grid != grid[:, :1]).any() for grid in grids),
+    }
+    error, freedom = _bootstrap(grids) if any(repeated.values()) else (None, math.inf)
+    return Effect(
+        value=float(first.mean() - second.mean()),
+        scale=scale,
+        second=float(second.mean()),
+        error=error,
+        freedom=freedom,
+        covers=" and ".join(name for name, several in repeated.items() if several),
+        motions=len(first),
+        uncertainty=_over_ensemble(one, other, scale),
+        unit=max(abs(one.value), abs(other.value)) if unit is None else unit,
+        complete=one.complete and other.complete,
+        one_seed=_one_seed(one, other) or _one_seed(other, one),
+    )
+
+
+def cost_effect(one: Mean, other: Mean) -> Effect:
+    """Compute the effect between two costs: the ratio, and its range over motions and seeds, no interval.
+
+    A run time depends on the machine and on the motion, not on chance that another draw would repeat.
+    """
+    scale = RATIO if _positive(one) and _positive(other) else DIFFERENCE
+    apart = [
+        float(on_scale(value, scale)) - float(on_scale(beside, scale))
+        for (scene, _), value in one.cells.items()
+        for (where, _), beside in other.cells.items()
+        if where == scene
+    ]
+    far = effect(one, other, scale)
+    limits = (min(apart), max(apart)) if min(apart) < max(apart) else None
+    return replace(far, error=None, limits=limits, covers=RANGE)
+
+
+def _positive(mean: Mean) -> bool:
+    return all(value > 0.0 for value in mean.cells.values())
+
+
+def _one_seed(mean: Mean, beside: Mean) -> bool:
+    """Return whether the mean is of one seed and the other one does not show how seeds scatter."""
+    return mean.seeded and mean.seeds == 1 and not (beside.seeded and beside.seeds > 1)
+
+
+def _over_ensemble(one: Mean, other: Mean, scale: str) -> float:
+    """Return the standard deviation of the effect's value over the reference and its ensemble, on the scale.
+
+    Each member takes the reference's place in every scene at once. Where single changes are unknown, as
+    between two runs with ensembles of their own, both uncertainties add up as independent ones.
+    """
+    parts = [mean.moved and mean.moved.keys() >= mean.cells.keys() for mean in (one, other)]
+    if not any(parts):
+        slopes = [_slope(mean, scale) for mean in (one, other)]
+        return math.hypot(*(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other))))
+    names = {name for mean in (one, other) for changes in mean.moved.values() for name in changes}
+    changes = [_moved_by(one, name, scale) - _moved_by(other, name, scale) for name in sorted(names)]
+    return spread(changes) or 0.0
+
+
+def _slope(mean: Mean, scale: str) -> float:
+    """Return by how much a change of the mean changes it on the scale."""
+    if scale == EXCESS:
+        return 1.0 / math.hypot(SOFTENING, mean.value)
+    return 1.0 / abs(mean.value) if scale == RATIO else 1.0
+
+
+def _moved_by(mean: Mean, name: str, scale: str) -> float:
+    """Return by how much a member of the ensemble changes the mean on the scale."""
+    changes = []
+    for cell, value in mean.cells.items():
+        moved = value + mean.moved.get(cell, {}).get(name, 0.0)
+        if scale == RATIO and moved <= 0.0:  # no logarithm: to first order
+            changes.append(moved / value - 1.0)
+        else:
+            changes.append(float(on_scale(moved, scale)) - float(on_scale(value, scale)))
+    return float(np.mean(changes))
+
+
+def _grid(mean: Mean) -> np.ndarray:
+    """Return (M,S): value of each motion with each seed, both in order."""
+    scenes, seeds = (sorted(set(names)) for names in zip(*mean.cells))
+    return np.array([[mean.cells[scene, seed] for seed in seeds] for scene in scenes])
+
+
+def _drawn_alike(one: Mean, other: Mean, first: np.ndarray, second: np.ndarray) -> list[np.ndarray]:
+    """Return grids (M,S) whose means add up to the effect, each with seeds of its own."""
+    seeds = [{seed for _, seed in mean.cells} for mean in (one, other)]
+    if one.pairing_group and one.pairing_group == other.pairing_group and seeds[0] == seeds[1]:
+        return [first - second]
+    lone = [mean.seeded and mean.seeds == 1 for mean in (one, other)]
+    several = second if lone[0] else first
+    if any(lone) and several.shape[1] > 1:  # s^2 / S of the one and s^2 of the other
+        mean = several.mean(axis=1, keepdims=True)
+        apart = first.mean(axis=1, keepdims=True) - second.mean(axis=1, keepdims=True)
+        return [apart + math.sqrt(1.0 + several.shape[1]) * (several - mean)]
+    return [first, -second]
+
+
+def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Return the standard error of the sum of the means of the grids (M,S), and its degrees of freedom."""
+    motions = _weights(len(grids[0]), 0)
+    seeds = [_weights(grid.shape[1], stream) for stream, grid in enumerate(grids, 1)]
+    draws = sum(np.einsum("bs,bs->b", motions @ grid, drawn) for grid, drawn in zip(grids, seeds))
+    alone = [motions @ sum(grid.mean(axis=1) for grid in grids)]
+    alone += [drawn @ grid.mean(axis=0) for grid, drawn in zip(grids, seeds)]
+    parts = np.array([part.var() for part in alone])
+    free = np.array([len(grids[0]), *(grid.shape[1] for grid in grids)]) - 1
+    known = parts[free > 0] ** 2 / free[free > 0]
+    freedom = parts.sum() ** 2 / known.sum() if known.sum() > 0.0 else math.inf
+    return float(np.std(draws)), float(freedom)
+
+
+@cache
+def _weights(count: int, stream: int) -> np.ndarray:
+    """Return (DRAWS,count): shares of `count` things in draws of count - 1; a single thing is in each."""
+    if count == 1:
+        return np.ones((DRAWS, 1))
+    generator = np.random.default_rng((SEED, stream, count))
+    return generator.multinomial(count - 1, np.full(count, 1.0 / count), DRAWS) / (count - 1)

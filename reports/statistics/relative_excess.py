@@ -1,0 +1,155 @@
+"""Relative excess: share of skinning's excess energy over the reference that a method leaves, in %.
+
+Of the total energy E of one motion and seed it is
+
+    100 (E(method) - E(reference)) / (E(skinning) - E(reference)),
+
+0 for the reference, 100 for the garment that only follows the skin, and below 0 for less energy than the
+reference has. The zero of potential energy cancels. It is the primary measure of how near a method is. Any
+other energy whose zero is a choice, as gravity, is divided by the same excess of the total.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from reports.run.finished_run import Metric, Run
+from reports.statistics.effects import EXCESS, Effect, effect, off_scale
+from reports.statistics.means_and_spreads import Mean, pair
+
+TOTAL = "energy/total"
+RELATIVE_EXCESS = Metric(
+    "relative_excess/total", "%", "Relative excess",
+    "excess of the total energy over the reference's as a share of skinning's excess", lower_is_better=True,
+)  # fmt: skip
+
+
+def relative_metric(metric: str) -> Metric:
+    """Return the metric of relative excess of an energy such as energy/gravity.
+
+    >>> relative_metric("energy/gravity").name
+    'relative_excess/gravity'
+    """
+    if metric == TOTAL:
+        return RELATIVE_EXCESS
+    term = metric.partition("/")[2]
+    words = f"{term} above the reference's as a share of skinning's excess of total energy"
+    return Metric(f"relative_excess/{term}", "%", f"Relative excess of {term}", words, lower_is_better=True)
+
+
+def with_relative_excess(
+    run: Run, rows: pd.DataFrame, metric: str = TOTAL, *, basis: pd.DataFrame | None = None
+) -> pd.DataFrame:
+    """Return the rows, and a row of the relative excess of each usable row of the metric.
+
+    Scenes without the reference or skinning have none, nor those in which skinning has no excess.
+
+    Args:
+        run: declares the reference, its ensemble and the baseline, whose first one is skinning.
+        rows: of the run, as Run.frame.
+        metric: an energy.
+        basis: rows whose reference and skinning are the basis; those given by default.
+    """
+    basis = rows if basis is None else basis
+    skinning = next(iter(run.with_role("baseline")), "")
+    zeros = _values(basis, metric, [run.reference, *run.reference_ensemble])
+    totals = _values(basis, TOTAL, [run.reference, *run.reference_ensemble, skinning])
+    lines = rows[(rows["metric"] == metric) & rows["usable"]]
+    parts = []
+    for place, row in lines.iterrows():
+        zero, total = zeros.get(row["scene"], {}), totals.get(row["scene"], {})
+        shares = _shares(row["value"], zero, total, skinning)
+        if run.reference in shares:
+            value = shares.pop(run.reference)
+            # The reference is zero by definition, whichever simulation it is.
+            moved = () if row["method"] == run.reference else tuple((k, v - value) for k, v in shares.items())
+            share = 100.0 / (total[skinning] - total[run.reference])
+            parts.append((place, value, share * row["uncertainty"], moved))
+    if not parts:
+        return rows
+    made = lines.loc[[place for place, *_ in parts]].assign(
+        metric=relative_metric(metric).name, unit="%", value=[value for _, value, *_ in parts],
+        uncertainty=[uncertainty for *_, uncertainty, _ in parts], moved=[moved for *_, moved in parts],
+    )  # fmt: skip
+    return pd.concat([rows, made[rows.columns]], ignore_index=True)
+
+
+def _values(rows: pd.DataFrame, metric: str, methods: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return scene -> method -> mean over seeds of the metric."""
+    kept = rows[(rows["metric"] == metric) & rows["usable"] & rows["method"].isin(methods)]
+    values: dict[str, dict[str, float]] = {}
+    for (scene, method), value in kept.groupby(["scene", "method"])["value"].mean().items():
+        values.setdefault(scene, {})[method] = float(value)
+    return values
+
+
+def _shares(
+    value: float, zeros: Mapping[str, float], totals: Mapping[str, float], skinning: str
+) -> dict[str, float]:
+    """Return reference -> relative excess [%] by the reference and by each member of its ensemble."""
+    return {
+        name: 100.0 * (value - zeros[name]) / (totals[skinning] - totals[name])
+        for name in zeros.keys() & totals.keys()
+        if skinning in totals and totals[skinning] > totals[name]
+    }
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Relative excess of a method over motions and seeds [%].
+
+    Attributes:
+        typical: mean on the scale of effects.EXCESS, taken back: about the geometric mean over motions.
+        interval: 95 % of it over motions and seeds; None where nothing was repeated.
+        mean: arithmetic mean over motions.
+        by_motion: scene -> mean over seeds.
+        uncertainty: standard deviation of the typical value over the reference's ensemble.
+        effect: against the reference, from which the verdict comes.
+    """
+
+    typical: float
+    interval: tuple[float, float] | None
+    mean: float
+    by_motion: Mapping[str, float]
+    uncertainty: float
+    effect: Effect
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """Scene with the largest relative excess, and its value."""
+        scene = max(self.by_motion, key=lambda name: self.by_motion[name])
+        return scene, self.by_motion[scene]
+
+    @property
+    def without_each_motion(self) -> tuple[float, float]:
+        """Smallest and largest typical value when one motion is left out."""
+        cells = np.arcsinh(np.array(list(self.by_motion.values())))
+        if len(cells) < 2:
+            return self.typical, self.typical
+        left = (cells.sum() - cells) / (len(cells) - 1)
+        return float(off_scale(left.min(), EXCESS)), float(off_scale(left.max(), EXCESS))
+
+
+def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
+    """Return the relative excess of a method over the scenes of these rows; None where there is none."""
+    one, zero = compared_excess(run, rows, method, run.reference)
+    if one is None or zero is None:
+        return None
+    far = effect(one, zero, EXCESS)
+    cells = pd.Series(dict(one.cells))
+    by_motion = cells.groupby(level=0, sort=False).mean()
+    slope = 1.0 / np.hypot(1.0, np.sinh(far.value))
+    return Excess(
+        far.shown, far.interval, float(by_motion.mean()), by_motion.to_dict(), far.uncertainty / slope, far
+    )
+
+
+def compared_excess(
+    run: Run, rows: pd.DataFrame, one: str, other: str, metric: str = TOTAL
+) -> tuple[Mean | None, Mean | None]:
+    """Return the mean relative excesses of two methods over the scenes that both have."""
+    return pair(with_relative_excess(run, rows, metric), one, other, relative_metric(metric).name)

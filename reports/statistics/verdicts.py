@@ -1,0 +1,123 @@
+"""How one method stands to another in a metric, by one rule: less, more, a tie, or inconclusive.
+
+The rule looks at an effect (reports.statistics.effects) and, of an answer, at its corrected p-value:
+
+    tie            all of the interval lies within the margin: 5 %, or what the reference's ensemble leaves
+                   uncertain if that is more
+    less, more     p is below 0.05, and the difference exceeds the reference's uncertainty
+    inconclusive   anything else; fewer than LEAST_MOTIONS motions; a network of one seed
+
+Costs are not tested: their range over motions and seeds lies on one side, within the margin, or on both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from reports.run.finished_run import Metric, Run
+from reports.statistics.effects import EXCESS, LEVEL, RANGE, Effect, cost_effect, effect
+from reports.statistics.means_and_spreads import Mean, pair
+from reports.statistics.relative_excess import compared_excess, relative_metric
+
+TIED, OPEN, LESS, MORE = "tie", "inconclusive", "less", "more"  # how the first stands to the second
+LEAST_MOTIONS = 4
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two methods in a metric: their means over the scenes that both have, and the effect.
+
+    Means of an energy whose zero is a choice are relative excesses.
+    """
+
+    metric: Metric
+    one: Mean | None
+    other: Mean | None
+    effect: Effect | None
+
+
+def compare_methods(run: Run, rows: pd.DataFrame, metric: Metric, one: str, other: str) -> Comparison:
+    """Compare two methods in a metric over the scenes of these rows that both have.
+
+    Energies whose zero is a choice are compared by their relative excess, costs by their range.
+    """
+    if metric.arbitrary_zero:
+        means = compared_excess(run, rows, one, other, metric.name)
+    else:
+        means = pair(rows[(rows["metric"] == metric.name) | ~rows["usable"]], one, other, metric.name)
+    first, second = means
+    if first is None or second is None:
+        return Comparison(metric, first, second, None)
+    return Comparison(metric, first, second, effect_of(metric, first, second))
+
+
+def measure_of(compared: Comparison) -> Metric:
+    """Return the metric that the two means are of: the relative excess where the metric's zero is a choice."""
+    metric = compared.metric
+    return relative_metric(metric.name) if metric.arbitrary_zero else metric
+
+
+def effect_of(metric: Metric, one: Mean, other: Mean) -> Effect:
+    """Compute the effect between two means of a metric, on the metric's scale."""
+    if metric.of != "answer":
+        return cost_effect(one, other)
+    return effect(one, other, EXCESS if metric.arbitrary_zero else "")
+
+
+def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:
+    """Return how `factor` times the first stands to the second: TIED, OPEN, LESS or MORE.
+
+    Args:
+        far: the effect.
+        p: of far.p_value(factor), corrected where the comparison is one of a family; None for costs.
+        factor: see `Effect.p_value`.
+
+    >>> standing(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=20), p=0.001)
+    'more'
+    >>> standing(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3), p=0.001)
+    'inconclusive'
+    """
+    if far.covers == RANGE:
+        return _standing_of_range(far, factor)
+    if far.one_seed or far.motions < LEAST_MOTIONS:
+        return OPEN
+    if far.equal(factor):
+        return TIED
+    if p is None or p >= LEVEL or abs(far.above(factor)) <= far.uncertainty:
+        return OPEN
+    return LESS if far.above(factor) < 0.0 else MORE
+
+
+def _standing_of_range(far: Effect, factor: float) -> str:
+    ends = [end + far.shift(factor) for end in far.limits or (far.value,)]
+    if all(abs(end) <= far.margin for end in ends):
+        return TIED
+    if max(ends) < 0.0:
+        return LESS
+    return MORE if min(ends) > 0.0 else OPEN
+
+
+def holm(p_values: Sequence[float], family: int = 0) -> list[float]:
+    """Return the p-values of a family corrected for their number, in their order.
+
+    Args:
+        p_values: of the comparisons that were made.
+        family: number of comparisons in the family, where it is larger: those not made count as 1.
+
+    Source: Holm's step-down procedure (1979).
+
+    >>> holm([0.01, 0.04, 0.03])
+    [0.03, 0.06, 0.06]
+    >>> holm([0.01], family=3)
+    [0.03]
+    """
+    count = max(family, len(p_values))
+    corrected, largest = [1.0] * len(p_values), 0.0
+    for rank, place in enumerate(np.argsort(p_values, kind="stable")):
+        largest = max(largest, min(1.0, (count - rank) * p_values[place]))
+        corrected[place] = largest
+    return corrected
