@@ -133,7 +133,8 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
             if one and other and other.value
         ]
         parts.append(
-            f"converged means each time step of 1/30 s; {count} steps a frame have {' and '.join(words)}"
+            "converged means that each time step of 1/30 s is minimised; with "
+            f"{count} steps a frame {' and '.join(words)} as large"
         )
     counted = paper_claims.counts(run)
     if counted:

@@ -104,7 +104,7 @@ class Effect:
 
     @property
     def margin(self) -> float:
-        """Largest difference on the scale that counts as none: TIE, or the reference's uncertainty if larger."""
+        """Largest difference on the scale that counts as none: TIE, or the uncertainty if larger."""
         tie = TIE * self.unit if self.scale == DIFFERENCE else math.log1p(TIE)
         return max(tie, self.uncertainty)
 

@@ -56,7 +56,7 @@ def compare_methods(run: Run, rows: pd.DataFrame, metric: Metric, one: str, othe
 
 
 def measure_of(compared: Comparison) -> Metric:
-    """Return the metric that the two means are of: the relative excess where the metric's zero is a choice."""
+    """Return the metric of the means: relative excess where the compared metric's zero is a choice."""
     metric = compared.metric
     return relative_metric(metric.name) if metric.arbitrary_zero else metric
 

@@ -19,6 +19,7 @@ REMARKS = {
     "§": "§ The interval is over motions alone: there is no second seed, or seeds make no difference.",
     "#": "# The range over motions and seeds.",
 }
+_COVERED = {"seeds": "‡", "motions": "§", RANGE: "#"}
 SMALL = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
 
 
@@ -52,9 +53,7 @@ def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Seque
             if apart := cell.spread_or_uncertainty:
                 spread = f"± {duration(apart) if column.unit == 's' else number(apart, 1)}"
         elif isinstance(cell, Effect):
-            mark = ("" if cell.complete else "*") + {"seeds": "‡", "motions": "§", RANGE: "#"}.get(
-                cell.covers, ""
-            )
+            mark = ("" if cell.complete else "*") + _COVERED.get(cell.covers, "")
             spread = " to ".join("∞" if end == math.inf else number(end) for end in cell.interval or ())
         lines.append({"text": text, "spread": spread, "mark": mark})
     return lines

@@ -8,13 +8,13 @@ from reports.statistics.verdicts import measure_of
 from reports.tables.table import Cell, Column, Table, table
 
 NOTE = (
-    "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero is "
-    "a choice, points of skinning's excess between the two; of frames, the first's share less half. Below it "
-    "the 95 % interval over motions and seeds, of costs the range. p: of a primary claim corrected by Holm for "
-    "the whole primary family, of an exploratory one as it is. Tie: all of the interval lies within 5 % of "
-    "equality, or within the spread of the reference's ensemble if that is wider. A claim holds, or does not "
-    "hold, where p is below 0.05 and the difference exceeds that spread; a cost, where its range lies on one "
-    "side. Inconclusive: anything else, fewer than four motions, or a network of one seed."
+    "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero "
+    "is a choice, points of skinning's excess between the two; of frames, the first's share less half. Below "
+    "it the 95 % interval over motions and seeds, of costs the range. p: of a primary claim by Holm for "
+    "the whole primary family, of an exploratory one as it is. Tie: all of the interval lies within 5 % "
+    "of equality, or within the spread of the reference's ensemble if that is wider. A claim holds, or does "
+    "not hold, where p is below 0.05 and the difference exceeds that spread; a cost, where its range lies on "
+    "one side. Inconclusive: anything else, fewer than four motions, or a network of one seed."
 )
 
 

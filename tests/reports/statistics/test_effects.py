@@ -1,4 +1,4 @@
-"""Effects, their intervals and p-values over motions and seeds, and Holm's correction, by known answers."""
+"""Effects, their intervals and p-values over motions and seeds, by known answers."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reports.statistics.significance import (
-    MORE,
-    OPEN,
-    TIE,
-    TIED,
-    Effect,
-    effect,
-    holm,
-    standing,
-    within_uncertainty,
-)
 from scipy import stats
 
-from reports.statistics import significance
+from reports.statistics import effects
+from reports.statistics.effects import (
+    DIFFERENCE,
+    EXCESS,
+    RANGE,
+    RATIO,
+    cost_effect,
+    effect,
+    off_scale,
+    on_scale,
+)
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from tests.reports.report_folder import row, run_of
 
@@ -52,7 +51,7 @@ def test_of_one_motion_the_interval_is_welchs_over_seeds():
     parts = [values.var(ddof=1) / len(values) for values in (one, other)]
     freedom = sum(parts) ** 2 / sum(part**2 / (len(v) - 1) for part, v in zip(parts, (one, other)))
     found = effect(mean_over(one), mean_over(other, "pbns"))
-    assert not found.ratio and found.covers == "seeds" and found.shown == one.mean() - other.mean()
+    assert found.scale == DIFFERENCE and found.covers == "seeds" and found.shown == one.mean() - other.mean()
     assert found.freedom == pytest.approx(freedom, rel=3 * NOISE)
     low, high = t_interval(found.shown, math.sqrt(sum(parts)), found.freedom)
     assert found.interval == pytest.approx((low, high), abs=NOISE * (high - low))
@@ -121,9 +120,9 @@ def test_of_four_motions_and_three_seeds_95_percent_of_the_intervals_hold_the_tr
     if spread["seeds"] == 1.0:
         return
     # Seeds alone cover too little where motions scatter.
-    weights = significance._weights
+    weights = effects._weights
     monkeypatch.setattr(
-        significance, "_weights", lambda n, s: np.full((10_000, n), 1.0 / n) if s == 0 else weights(n, s)
+        effects, "_weights", lambda n, s: np.full((10_000, n), 1.0 / n) if s == 0 else weights(n, s)
     )
     assert covered(paired, spread) < 0.9
 
@@ -137,9 +136,9 @@ def test_the_same_numbers_give_the_same_interval_and_the_interval_agrees_with_th
         found = effect(one, other)
         low, high = found.interval
         signs.add(found.p_value() < 0.05)
-        assert (found.p_value() < 0.05) == (not low <= float(found.ratio) <= high)
+        assert (found.p_value() < 0.05) == (not low <= float(found.scale == RATIO) <= high)
     assert signs == {True, False}
-    significance._weights.cache_clear()
+    effects._weights.cache_clear()
     assert effect(one, other) == found
 
 
@@ -147,7 +146,7 @@ def test_positive_numbers_are_compared_by_their_factors():
     sound, broken = mean_over((0.36, 0.35, 0.37)), mean_over((1e7, 2e3, 6e6), "pbns")
     found = effect(sound, broken)
     logs = [np.log([*mean.cells.values()]) for mean in (sound, broken)]
-    assert found.ratio and found.shown == pytest.approx(np.exp(logs[0].mean() - logs[1].mean()))
+    assert found.scale == RATIO and found.shown == pytest.approx(np.exp(logs[0].mean() - logs[1].mean()))
     assert found.p_value() < 0.05  # though the spread of what broke is larger than the difference
     low, high = found.interval
     assert 0.0 < low < found.shown < high < 1.0
@@ -156,16 +155,12 @@ def test_positive_numbers_are_compared_by_their_factors():
     # A claimed factor lies on the interval's end where its p-value is the level.
     assert found.p_value(factor=1.0 / high) == pytest.approx(0.05)
     assert found.p_value(factor=1.01 / high) > 0.05 > found.p_value(factor=0.99 / high)
-    assert not effect(mean_over((0.0, 1.0)), mean_over((1.0, 1.0), "pbns")).ratio
+    assert effect(mean_over((0.0, 1.0)), mean_over((1.0, 1.0), "pbns")).scale == DIFFERENCE
 
 
-def test_where_nothing_is_repeated_there_is_no_interval_and_no_p_value():
-    for other, equal in ((1.0 - 1.01 * TIE, False), (1.0 - 0.99 * TIE, True)):
-        found = effect(mean_over(1.0), mean_over(other, "pbns"))
-        assert found.interval is None and found.p_value() is None and found.covers == ""
-        assert found.equal() == equal
-    assert effect(mean_over(0.0), mean_over(0.0, "pbns")).equal()
-    assert not effect(mean_over(0.0), mean_over(1e-9, "pbns")).equal()
+def test_where_nothing_is_repeated_there_is_no_interval_no_p_value_and_no_tie():
+    found = effect(mean_over(1.0), mean_over(1.0, "pbns"))
+    assert (found.interval, found.p_value(), found.covers, found.equal()) == (None, None, "", False)
 
 
 def test_what_is_the_same_with_every_motion_was_not_repeated():
@@ -195,14 +190,6 @@ def test_equal_is_what_lies_in_the_tie_with_all_of_its_interval():
     assert hundredth.equal(factor=100.0) and not hundredth.equal()
 
 
-def test_holm_by_hand():
-    """Four tests: the least times 4, the next times 3 ...; never less than one before it, never above one."""
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([0.6, 0.9]) == [1.0, 1.0] and holm([0.04]) == [0.04] and holm([]) == []
-    # Bonferroni's first step, then larger levels: 11 of 12 at .004 each would all stay, at .0045 none.
-    assert max(holm([0.004] * 12)) < 0.05 < min(holm([0.0045] * 12))
-
-
 def test_over_scenes_and_seeds_that_are_left_in_both():
     """A seed that diverged is in no mean; scenes that one of the two lacks are in neither."""
     rows = [row(f"tshirt/{m}", value=1.0 + m + 0.1 * s, seed=s) for m in range(3) for s in range(3)]
@@ -221,53 +208,64 @@ def test_over_scenes_and_seeds_that_are_left_in_both():
     assert one.complete and not effect(one, other).complete and not effect(other, one).complete
 
 
-def test_a_difference_within_what_another_reference_would_change():
-    rows = [row(method=method, value=v) for method, v in (("snug", 1.0), ("pbns", 1.3))]
+def test_shares_of_excess_are_compared_by_logarithm_above_one_percent_and_by_difference_below():
+    shares = np.array((-0.3, 0.0, 0.01, 60.0, 120.0))
+    assert off_scale(on_scale(shares, EXCESS), EXCESS) == pytest.approx(shares)
+    assert on_scale(120.0, EXCESS) - on_scale(60.0, EXCESS) == pytest.approx(math.log(2.0), abs=1e-3)
+    assert on_scale(0.02, EXCESS) - on_scale(0.01, EXCESS) == pytest.approx(0.01, rel=1e-3)
+    motions = np.array([[2.0], [4.0], [8.0], [16.0]])
+    found = effect(mean_over(motions), mean_over(0.0 * motions, "simulation"), EXCESS)
+    assert found.shown == pytest.approx(np.sinh(np.arcsinh(motions).mean())) and found.shown < motions.mean()
+    low, high = found.interval
+    error = np.arcsinh(motions).std(ddof=1) / 2.0
+    ends = np.sinh(t_interval(np.arcsinh(motions).mean(), error, 3))
+    assert (low, high) == pytest.approx(tuple(ends), rel=3 * NOISE)
+    less = effect(mean_over(0.5 * motions), mean_over(motions, "pbns"), EXCESS)
+    assert less.shown == pytest.approx(0.5 * found.shown - found.shown, rel=0.1) and less.interval[1] < 0.0
+
+
+def test_a_cost_has_the_range_of_what_was_measured_and_no_interval():
+    own, other = np.array([[2.0, 2.2], [3.0, 3.3]]), np.array([[4.0, 4.0], [9.0, 9.0]])
+    found = cost_effect(mean_over(own), mean_over(other, "pbns"))
+    assert found.covers == RANGE and found.p_value() is None
+    assert found.interval == pytest.approx((3.0 / 9.0, 2.2 / 4.0))
+    alone = cost_effect(mean_over(2.0), mean_over(4.0, "pbns"))
+    assert (alone.covers, alone.interval, alone.shown) == (RANGE, None, 0.5)
+
+
+TWINS = ("simulation-refrozen", "simulation-perturbed-1e-4")
+
+
+def moved_means(changes):
+    """Two means over the same motions: method -> change of each motion by each member of the ensemble."""
+    rows = [
+        replace(row(f"tshirt/{scene}", method, value=value), moved=tuple(zip(TWINS, moved)))
+        for method, value in (("snug", 1.0), ("pbns", 1.3))
+        for scene, moved in enumerate(changes[method])
+    ]
+    return pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
+
+
+def test_the_uncertainty_is_the_standard_deviation_of_the_effect_over_the_ensemble():
+    """Each member takes the reference's place in all motions at once."""
+    none = ((0.0, 0.0), (0.0, 0.0))
+    snug = ((0.2, -0.1), (0.4, 0.3))
+    found = effect(*moved_means({"snug": snug, "pbns": none}), DIFFERENCE)
+    assert found.uncertainty == pytest.approx(np.std([0.0, 0.3, 0.1], ddof=1))
+    # What a member does to both methods moves them not apart, on the scale of the test.
+    both = effect(*moved_means({"snug": snug, "pbns": snug}), DIFFERENCE)
+    assert both.uncertainty == pytest.approx(0.0)
+    logs = [np.log(1.0 + np.array(moves)).mean() for moves in zip(*snug)]
+    assert effect(*moved_means({"snug": snug, "pbns": none})).uncertainty == pytest.approx(
+        np.std([0.0, *logs], ddof=1)
+    )
+    # Of one member nobody knows the spread.
+    assert effect(*moved_means({"snug": ((0.2,), (0.4,)), "pbns": ((), ())})).uncertainty == 0.0
+
+
+def test_uncertainties_of_two_runs_add_up_as_independent_ones():
+    rows = [row(method=method, value=value) for method, value in (("snug", 2.0), ("pbns", 4.0))]
     frame = run_of(rows).frame
-    assert not within_uncertainty(*pair(frame, "snug", "pbns", "energy/strain"))  # nobody measured it
-    for moved, within in ((0.1, False), (0.2, True)):
-        one, other = pair(frame.assign(uncertainty=moved), "snug", "pbns", "energy/strain")
-        assert one.uncertainty == moved and within_uncertainty(one, other) == within
-        assert not within_uncertainty(one, other, factor=3.0)
-
-
-def test_what_another_reference_does_to_both_methods_moves_them_not_apart():
-    twins = ("simulation-refrozen", "simulation-perturbed-1e-4")
-
-    def within(changes: dict[str, tuple[tuple[float, ...], ...]], factor: float = 1.0) -> bool:
-        rows = [
-            replace(
-                row(f"tshirt/{scene}", method, value=value, seed=seed),
-                uncertainty=max(map(abs, moved), default=None), moved=tuple(zip(twins, moved)),
-            )
-            for method, value in (("snug", 1.0), ("pbns", 1.3))
-            for scene, moved in enumerate(changes[method])
-            for seed in range(2)
-        ]  # fmt: skip
-        return within_uncertainty(*pair(run_of(rows).frame, "snug", "pbns", "energy/strain"), factor)
-
-    both = ((0.5, -0.4), (-0.2, 0.3))
-    assert not within({"snug": both, "pbns": both})
-    assert within({"snug": both, "pbns": both}, factor=1.5)  # 1.5 and 1.3, .25 and .15 apart
-    assert within({"snug": both, "pbns": ((0.5, -0.4), (-0.2, -0.35))})  # 0 and .65 apart: .325
-    assert not within({"snug": both, "pbns": ((0.5, -0.4), (-0.2, -0.2))})  # .25
-    assert within({"snug": both, "pbns": ((), ())})  # the simulation beside a network: .4
-    # Nobody knows what each does in one of the scenes: both add up.
-    rows = run_of([row(method=m, value=v) for m, v in (("snug", 1.0), ("pbns", 1.3))]).frame
-    one, other = pair(rows.assign(uncertainty=0.2), "snug", "pbns", "energy/strain")
-    assert within_uncertainty(one, other)
-
-
-def test_one_rule_says_how_two_means_stand():
-    one, other = (Mean(value, None, 1, 3, 3) for value in (1.0, 1.2))
-
-    def stands(value: float, p: float | None, moved: float = 0.0, *, one_seed: bool = False) -> str:
-        error = None if p is None else 0.01
-        found = Effect(value, ratio=True, error=error, freedom=10.0, one_seed=one_seed)
-        return standing(replace(one, uncertainty=moved), other, found, p)
-
-    assert [stands(0.01, p) for p in (None, 0.04, 0.06)] == [TIED, MORE, TIED]  # all within 5 %
-    assert [stands(0.20, p) for p in (None, 0.04, 0.06)] == [MORE, MORE, OPEN]
-    assert [stands(-0.20, p) for p in (None, 0.04, 0.06)] == [significance.LESS, significance.LESS, OPEN]
-    assert stands(0.20, 1e-6, moved=0.21) == TIED and stands(0.20, 1e-6, moved=0.19) == MORE
-    assert stands(0.20, 1e-6, one_seed=True) == stands(0.01, 0.5, moved=0.21, one_seed=True) == OPEN
+    one, other = pair(frame.assign(uncertainty=[0.3, 0.4]), "snug", "pbns", "energy/strain")
+    assert effect(one, other, DIFFERENCE).uncertainty == pytest.approx(0.5)
+    assert effect(one, other, RATIO).uncertainty == pytest.approx(math.hypot(0.15, 0.1))
