@@ -29,7 +29,7 @@ class Point:
 
     time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
     standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is more,
-    how far another simulation as right as the reference moves it. Both 0 where unknown.
+    the spread over the reference's ensemble. Both 0 where unknown.
     fewer: remark on seeds that are missing, empty where none is.
     """
 

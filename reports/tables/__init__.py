@@ -13,14 +13,17 @@ from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
 from reports.tables.dictionary import dictionary
 from reports.tables.equal_data import EQUAL_DATA
-from reports.tables.excess import relative_excess, relative_excess_by_motion
-from reports.tables.findings import findings
+from reports.tables.findings import (
+    errors_in_spreads,
+    findings,
+    relative_excess,
+    relative_excess_by_motion,
+)
 from reports.tables.latex import write_latex
 from reports.tables.outcomes import endings, extremes, metrics, unfinished, validation
 from reports.tables.page_one_table import overview
 from reports.tables.pivot import metric_tables
 from reports.tables.speed import SPEED, crossings, error_rivals, reference_uncertainty
-from reports.tables.spreads import errors_in_spreads
 from reports.tables.table import Table
 from reports.tables.trainings import training_curves, trainings
 

@@ -21,12 +21,12 @@ COLUMNS = {
     "tolerance": ("of the row", "largest difference from expected with which the row passes"),
     "uncertainty": (
         "of the row",
-        "how far the value moves with another simulation as right as the reference, or its standard error "
+        "standard deviation over the ensemble of the reference, or its standard error "
         "as a sample of frames; empty where unknown",
     ),
     "moved": (
         "of the row",
-        "what each simulation as right as the reference changes of the value, in its place: JSON, or empty",
+        "what each member of the reference's ensemble changes of the value, in its place: JSON, or empty",
     ),
     "preset": ("", "sizes of everything, as declared in run.json"),
     "commit": ("", "of the source that measured the row"),

@@ -1,13 +1,15 @@
-"""Table of the paper's claims and whether they hold here."""
+"""Tables of what was found: the paper's claims, relative excess, errors in spreads of the reference."""
 
 from __future__ import annotations
 
 from reports.run.finished_run import Run
 from reports.statistics.paper_claims import judged
-from reports.statistics.verdicts import measure_of
-from reports.tables.table import Cell, Column, Table, table
+from reports.statistics.relative_excess import Excess, excess_of
+from reports.statistics.spreads import AT_REFERENCE, in_spreads
+from reports.statistics.verdicts import measure_of, standing
+from reports.tables.table import GARMENT, METHOD, SCENE, Cell, Column, Table, table
 
-NOTE = (
+CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero "
     "is a choice, points of skinning's excess between the two; of frames, the first's share less half. Below "
     "it the 95 % interval over motions and seeds, of costs the range. p: of a primary claim by Holm for "
@@ -43,4 +45,78 @@ def findings(run: Run) -> list[Table]:
         for line in judged(run)
     ]  # fmt: skip
     caption = "Claims of the paper, and whether they hold here."
-    return table("findings", columns, rows, caption, grouped_by=("claim",), note=NOTE)
+    return table("findings", columns, rows, caption, grouped_by=("claim",), note=CLAIMS_NOTE)
+
+
+EXCESS_NOTE = (
+    "Typical: the mean over motions and seeds on a scale that is logarithmic above 1 % of skinning's excess "
+    "and linear below, taken back; below it the 95 % interval. Mean and worst are of motions. Left out: "
+    "smallest and largest typical value without any one motion. Uncertain by: the spread over the "
+    "reference's ensemble."
+)
+
+
+def relative_excess(run: Run) -> list[Table]:
+    """Tabulate the relative excess of each method over the motions of a garment."""
+    lines: list[tuple[Cell, ...]] = []
+    for garment, method, excess in _measured(run):
+        low, high = excess.without_each_motion
+        worst, most = excess.worst
+        stands = standing(excess.effect, excess.effect.p_value())
+        lines.append((
+            garment, method, excess.effect, excess.mean, most, worst.partition("/")[2] or worst, low, high,
+            excess.uncertainty or None, len(excess.by_motion), stands,
+        ))  # fmt: skip
+    columns = (
+        GARMENT, METHOD, Column("typical", "Typical", "%"), Column("mean", "Mean", "%"),
+        Column("worst", "Worst", "%"), Column("worst_motion", "Worst motion", text=True),
+        Column("left_out_low", "Left out, low", "%"), Column("left_out_high", "Left out, high", "%"),
+        Column("uncertain_by", "Uncertain by", "%"), Column("motions", "Motions"),
+        Column("verdict", "Beside the reference", text=True),
+    )  # fmt: skip
+    caption = "Relative excess: share of skinning's excess energy over the reference that a method leaves."
+    return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
+
+
+def relative_excess_by_motion(run: Run) -> list[Table]:
+    """Tabulate the relative excess of each method in each motion, the mean over seeds."""
+    lines: list[tuple[Cell, ...]] = [
+        (scene, method, share)
+        for _, method, excess in _measured(run)
+        for scene, share in excess.by_motion.items()
+    ]
+    lines = sorted(lines, key=lambda line: list(dict.fromkeys(line[0] for line in lines)).index(line[0]))
+    columns = (SCENE, METHOD, Column("relative_excess", "Relative excess", "%"))
+    caption = "Relative excess by motion, mean over seeds."
+    return table("relative_excess_by_motion", columns, lines, caption, grouped_by=("scene",))
+
+
+def _measured(run: Run) -> list[tuple[str, str, Excess]]:
+    """Return (garment, method, excess) of each method but skinning, the reference and its variants."""
+    found = []
+    for garment in run.garments(run.garment_rows):
+        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        zero = {*run.with_role("reference", "reference-variant"), *run.with_role("baseline")[:1]}
+        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
+            if excess := excess_of(run, rows, method):
+                found.append((garment, method, excess))
+    return found
+
+
+def errors_in_spreads(run: Run) -> list[Table]:
+    """Tabulate distances, curvature errors and dynamics in spreads of the reference's ensemble."""
+    metrics = [run.metrics[name] for name in AT_REFERENCE if name in run.metrics]
+    variants = set(run.with_role("reference", "reference-variant"))
+    lines: list[tuple[Cell, ...]] = []
+    for garment in run.garments(run.garment_rows):
+        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        for method in run.ordered(set(rows[rows["usable"]]["method"]) - variants):
+            values = [in_spreads(run, rows, method, metric.name) for metric in metrics]
+            if any(value is not None for value in values):
+                lines.append((garment, method, *values))
+    columns = (GARMENT, METHOD, *(Column(metric.name, metric.title) for metric in metrics))
+    caption = (
+        "Distance from the reference in spreads of its ensemble: 1 is as near as another valid simulation. "
+        "Mean error of the motions over their mean spread."
+    )
+    return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))

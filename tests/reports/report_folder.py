@@ -27,8 +27,9 @@ FRAMES = 5
 SOLVERS = {"newton": "Newton", "lbfgs": "L-BFGS", "vbd": "VBD"}
 DECLARED: dict[str, dict[str, Any]] = {
     "simulation": {"label": "Simulation", "role": "reference"},
-    "simulation-perturbed-1e-9": {
-        "label": "Simulation, start moved", "role": "reference-variant", "family": "simulation-perturbed",
+    "simulation-perturbed-1e-4": {
+        "label": "Simulation, start moved", "role": "reference-variant",
+        "family": "simulation-perturbed", "level": 1e-4,
     },
     "direct-optimisation": {"label": "Vertices optimised directly", "role": "bound"},
     "skinning": {"label": "Skinning alone", "role": "baseline"},

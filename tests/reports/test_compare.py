@@ -82,13 +82,14 @@ def test_where_zero_is_a_choice_no_change_hangs_on_it():
     def heights(more: float, zero: float):
         rows = [row(s, "simulation", "energy/gravity", zero + 1.0 + i) for i, s in enumerate(SCENES)]
         rows += [row(s, "skinning", "energy/gravity", zero + 2.0 + i) for i, s in enumerate(SCENES)]
+        rows += [dataclasses.replace(r, metric="energy/total") for r in rows]
         return rows + [
             row(s, "lbfgs-4", "energy/gravity", zero + 1.1 + i + more) for i, s in enumerate(SCENES)
         ]
 
     for zero in (0.0, 50.0):
         assert found(heights(0.0, zero), heights(0.04, zero)) == []  # 4 % of what skinning has more
-        moved = [("changed", "tshirt", "lbfgs-4", "energy/gravity")]
+        moved = [("worse", "tshirt", "lbfgs-4", "relative_excess/gravity")]
         assert found(heights(0.0, zero), heights(0.06, zero)) == moved
 
 
