@@ -8,7 +8,7 @@ run can test each. All other claims are exploratory: their p-values are not corr
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pandas as pd
 
@@ -217,6 +217,8 @@ def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
         rows = rows[(rows["metric"] == metric.name) | ~rows["usable"]]
         one, other = pair(rows, claim.lower, claim.higher, metric.name)
         far = effect(one, half_of(one), DIFFERENCE) if one and other else None
+        if far and far.error is None and far.motions > 1:  # all or none of the frames in every motion
+            far = replace(far, error=0.0, covers="motions")
         return Comparison(metric, one, other, far)
     metric = BEFORE if claim.metric == BEFORE.name else run.metrics.get(claim.metric, Metric(claim.metric))
     return compare_methods(run, frame, metric, claim.lower, claim.higher)
