@@ -28,6 +28,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
+LOST = 1e6  # [m] from the origin: a vertex so far off is on no surface, and its square may overflow
 
 METRICS = (
     Metric(
@@ -51,10 +52,10 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """Return Chamfer distance [mm] and angle of normals [degrees] between the two surfaces."""
+    """Return Chamfer distance [mm] and angle of normals [degrees] between the two surfaces; empty of a lost cloth."""
     common = roll_out.judged_beside(reference.positions)
     x, y = roll_out.positions[common], reference.positions[common]
-    if not len(x):
+    if not len(x) or np.abs(x).max() > LOST:
         return {}
     faces, others = roll_out.trajectory.faces, reference.trajectory.faces
     sampled = np.unique(np.linspace(0, len(x) - 1, SAMPLED_FRAMES).round().astype(int))

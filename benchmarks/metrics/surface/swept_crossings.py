@@ -4,7 +4,7 @@ A frame without intersections may follow another one though a layer went through
 the straight way of every vertex from one frame to the next a vertex meets a triangle, or an edge an edge,
 where the four points are in one plane and their primitives touch (Provot 1997). Broad phase and test are
 those of the package ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
-Without the package nothing is measured.
+Without the package nothing is measured, and nothing of a roll-out that has fallen apart.
 """
 
 from __future__ import annotations
@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 SAMPLED_STEPS = 12  # pairs of consecutive frames that are looked at, evenly spread
+FARTHEST = (
+    1.0  # [m] beside the others that a vertex of a cloth moves in a frame: one that is lost moves further
+)
+MOST_PAIRS = 200_000  # to be tested one by one, in seconds: more have only lost cloths
 
 METRICS = (
     Metric(
@@ -34,19 +38,21 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return the crossings of a step; empty without ipctk, or where the scene leaves out frames."""
+    """Return the crossings of a step; empty without ipctk, where frames are left out, or of a lost cloth."""
     x, scene = roll_out.positions[roll_out.judged], roll_out.scene
     if len(x) < 2 or scene.kept is not None or find_spec("ipctk") is None:
         return {}
     steps = np.unique(np.linspace(0, len(x) - 2, SAMPLED_STEPS).round().astype(int))
     counts = [swept_crossings(x[step], x[step + 1], scene.cloth.faces) for step in steps]
-    return {"intersections/swept": float(np.mean(counts))}
+    known = [count for count in counts if count is not None]
+    return {"intersections/swept": float(np.mean(known))} if len(known) == len(counts) else {}
 
 
-def swept_crossings(before: Floats, after: Floats, faces: NDArray[np.int64]) -> int:
-    """Return how many pairs of primitives meet on the straight way from `before` to `after`.
+def swept_crossings(before: Floats, after: Floats, faces: NDArray[np.int64]) -> int | None:
+    """Return how many pairs of primitives meet on the straight way from `before` to `after`; None if lost.
 
-    A pair without a common vertex counts once. A motion of all vertices together changes nothing.
+    A pair without a common vertex counts once. A motion of all vertices together changes nothing. A cloth is
+    lost where a vertex moves by more than FARTHEST beside the others, or MOST_PAIRS are surpassed.
 
     Args:
         before: (V,3) [m].
@@ -57,11 +63,16 @@ def swept_crossings(before: Floats, after: Floats, faces: NDArray[np.int64]) -> 
 
     ipctk.set_logger_level(ipctk.error)  # its warnings go to standard output
     ipctk.set_num_threads(1)
-    after = after - (after - before).mean(axis=0)  # shorter ways: fewer pairs to be tested
+    with np.errstate(over="ignore", invalid="ignore"):
+        after = after - (after - before).mean(axis=0)  # shorter ways: fewer pairs to be tested
+        if not np.abs(after - before).max() <= FARTHEST:
+            return None
     triangles = np.asfortranarray(faces, dtype=np.int32)
     mesh = ipctk.CollisionMesh(np.asfortranarray(before), ipctk.edges(triangles), triangles)
     pairs = ipctk.Candidates()
     pairs.build(mesh, np.asfortranarray(before), np.asfortranarray(after), 0.0)
+    if len(pairs) > MOST_PAIRS:
+        return None
     # A rescaling of 1 asks for contact; with less, what comes within 0.1 mm counts already.
     test, edges = ipctk.TightInclusionCCD(conservative_rescaling=1.0), np.asarray(mesh.edges)
     points = [(pair.vertex_id, *faces[pair.face_id]) for pair in pairs.fv_candidates]

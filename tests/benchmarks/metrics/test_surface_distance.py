@@ -77,6 +77,14 @@ def test_frames_are_compared_after_the_warm_up_each_with_its_own():
     assert behind["surface/chamfer"] == pytest.approx(2.0)
 
 
+def test_a_lost_cloth_has_no_surface():
+    frames = np.repeat(in_space(COARSE[0])[None], 3, axis=0)
+    lost = frames.copy()
+    lost[2, 4] = 1e200
+    reference = roll_out(frames, COARSE[1], other_mesh=False)
+    assert compare(roll_out(lost, COARSE[1], other_mesh=False), reference) == {}
+
+
 def test_penetration_is_measured_here_of_another_mesh_alone():
     slab = SimpleNamespace(signed_distance=lambda points, frame: points[:, 0] - 0.25)
     frames = np.repeat(in_space(COARSE[0])[None], 3, axis=0)  # x = 0, 1/4 ... 1 in equal numbers

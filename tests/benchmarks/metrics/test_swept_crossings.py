@@ -48,6 +48,19 @@ def test_what_only_comes_near_or_moves_as_one_does_not_cross():
     assert swept_crossings(sheet, sheet + np.array([50.0, 0.0, 0.0]), faces) == 0
 
 
+def test_a_cloth_that_has_fallen_apart_is_left_out(monkeypatch):
+    before = np.concatenate([LARGE, SMALL])
+    for far in (2.0, 1e160, 1e300):
+        lost = before.copy()
+        lost[1] += far
+        assert swept_crossings(before, lost, FACES) is None
+        scene = SimpleNamespace(cloth=SimpleNamespace(faces=FACES), kept=None)
+        frames = np.stack([before, before, lost])
+        assert measure(SimpleNamespace(scene=scene, positions=frames, judged=slice(0, None))) == {}
+    monkeypatch.setattr(module, "MOST_PAIRS", 2)
+    assert swept_crossings(before, np.concatenate([LARGE, SMALL + DOWN]), FACES) is None
+
+
 def test_what_ipctk_finds_to_meet_may_be_in_one_plane():
     points = np.random.default_rng(0).normal(size=(2, 600, 4, 3))
     test = ipctk.TightInclusionCCD(conservative_rescaling=1.0)
