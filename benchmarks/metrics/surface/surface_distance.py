@@ -52,7 +52,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """Return Chamfer distance [mm] and angle of normals [degrees] between the two surfaces; empty of a lost cloth."""
+    """Return Chamfer distance [mm] and angle of normals [degrees] to the reference; empty of a lost cloth."""
     common = roll_out.judged_beside(reference.positions)
     x, y = roll_out.positions[common], reference.positions[common]
     if not len(x) or np.abs(x).max() > LOST:
