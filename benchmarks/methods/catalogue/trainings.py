@@ -20,8 +20,12 @@ TRAININGS = {
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
     "tailornet": Training("tailornet", TAILORNET, Simulated()),
     "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
+    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
+    # Each deviation has as many steps as the recipe that it changes.
     **{
-        f"snug-{recipe.name}": Training("snug", recipe)
-        for recipe in (PAPER, *ABLATIONS, *exchange_deviations(DEFAULT, PAPER))
+        f"snug-{recipe.name}": Training(
+            "snug", recipe, steps_of="snug-paper" if recipe.name.startswith("paper-") else ""
+        )
+        for recipe in exchange_deviations(DEFAULT, PAPER)
     },
 }
