@@ -92,7 +92,7 @@ def test_a_name_means_itself_whatever_is_in_it():
 
 def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is_named():
     both = ("speed", "extremes")
-    slow = {"newton-2", "lbfgs-40", "gradient-descent-10", "simulation-dt/8"}
+    slow = {"newton-2", "lbfgs-40", "gradient-descent-10", "simulation-perturbed-1e-9"}
     for words, there in (({}, False), ({"full": True}, True), ({"methods": ("*",)}, True)):
         found, cases = chosen(both, **words)
         assert (slow & {cell.method for cell in found}) == (slow if there else set())
