@@ -69,7 +69,7 @@ def test_a_first_run_that_compiles_is_no_measurement(always):
 
     _, reading = clocked(run, of=positions_of)
     assert len(calls) == 2 and len(reading.runs) == 1  # whoever compiles in each run is measured so
-    assert (reading.seconds < 0.02) is not always and reading.complaint == ""
+    assert (reading.seconds < 0.005) is not always and reading.complaint == ""  # compiling takes 20 ms
 
 
 def test_an_answer_that_was_kept_from_the_first_run_is_found():
