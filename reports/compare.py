@@ -158,8 +158,9 @@ def _means(run: Run, *frames: pd.DataFrame) -> tuple[list[Change], int, int]:
     """Return changes of means beyond noise, how many were compared, and how many of one seed differ."""
     first, second = (means(frame, *GROUP) for frame in _over_the_same(*_with_known_zero(run, *frames)))
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
+    known = _metrics(run)
     judged = [
-        (place, method, metric := _metric(run, name), mean, new, _effect(metric, new, mean))
+        (place, method, metric := known[name], mean, new, _effect(metric, new, mean))
         for (place, method, name), (mean, new) in differ.items()
         if not mean.seeded or mean.seeds > 1
     ]
@@ -190,10 +191,10 @@ def _with_known_zero(run: Run, *frames: pd.DataFrame) -> list[pd.DataFrame]:
     return made
 
 
-def _metric(run: Run, name: str) -> Metric:
-    """Return the metric of that name, with that of each energy's relative excess among them."""
+def _metrics(run: Run) -> dict[str, Metric]:
+    """Return the metrics of the run by name, with that of each energy's relative excess among them."""
     relative = (relative_metric(metric.name) for metric in run.metrics.values() if metric.arbitrary_zero)
-    return {**{metric.name: metric for metric in relative}, **run.metrics}[name]
+    return {**{metric.name: metric for metric in relative}, **run.metrics}
 
 
 def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:

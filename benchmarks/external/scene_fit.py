@@ -52,24 +52,9 @@ def fit_to_scene(
     >>> stored, changes = fit_to_scene(read_roll_out("mine.npz"), scene, FileConventions())  # doctest: +SKIP
     """
     count, cloth = stored.positions.shape[1], scene.cloth
-    if (
-        stated.other_mesh
-        and stored.faces is not None
-        and (count, len(stored.faces))
-        == (
-            cloth.vertex_count,
-            len(cloth.faces),
-        )
-    ):
-        raise RollOutError(
-            f"has {count} vertices and {len(stored.faces)} triangles as the scene's mesh: leave out "
-            "--other-mesh, or give --match-vertices where they are in another order"
-        )
-    if stated.other_mesh and stored.faces is None:
-        raise RollOutError(
-            "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"
-        )
-    if count != cloth.vertex_count and not stated.other_mesh:
+    if stated.other_mesh:
+        _check_other_mesh(stored, scene)
+    elif count != cloth.vertex_count:
         raise RollOutError(
             f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for "
             "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex; or "
@@ -83,17 +68,32 @@ def fit_to_scene(
     if stored.quasi_static is not None:
         held = to_metres_y_up(stored.quasi_static, units=stated.units, up=stated.up)
         in_metres = replace(in_metres, quasi_static=held)
-    order, change = (None, "") if stated.other_mesh else _order(in_metres, scene, expected[0], stated)
     if stated.other_mesh:
         changes.append(f"another mesh of {count} vertices: surfaces are compared alone")
-    if order is not None:
-        in_metres = _reordered(in_metres, order)
-        changes.append(change)
+    else:
+        order, change = _order(in_metres, scene, expected[0], stated)
+        if order is not None:
+            in_metres = _reordered(in_metres, order)
+            changes.append(change)
     timed, change = _retimed(in_metres, scene, stated)
     if change:
         changes.append(change)
     _check_place(timed.positions, expected)
     return timed, tuple(changes)
+
+
+def _check_other_mesh(stored: StoredRollOut, scene: BuiltScene) -> None:
+    """Raise RollOutError for a roll-out without triangles, or with as many as the scene's own mesh."""
+    if stored.faces is None:
+        raise RollOutError(
+            "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"
+        )
+    count, triangles = stored.positions.shape[1], len(stored.faces)
+    if (count, triangles) == (scene.cloth.vertex_count, len(scene.cloth.faces)):
+        raise RollOutError(
+            f"has {count} vertices and {triangles} triangles as the scene's mesh: leave out "
+            "--other-mesh, or give --match-vertices where they are in another order"
+        )
 
 
 def expected_positions(scene: BuiltScene) -> np.ndarray:

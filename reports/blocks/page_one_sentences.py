@@ -23,7 +23,7 @@ from reports.statistics.pareto import (
     run_time,
     truncated,
 )
-from reports.statistics.relative_excess import TOTAL, Excess, excess_of
+from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_relative_excess
 from reports.statistics.verdicts import LESS, MORE, TIED, compare_methods, standing
 from reports.tables.number_texts import duration, number
 
@@ -49,7 +49,8 @@ def headline(run: Run) -> list[tuple[str, str]]:
 def _near(run: Run, worn: pd.DataFrame) -> str:
     """Say which share of skinning's excess energy each network of page one leaves."""
     names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in LEARNED]
-    known = {name: excess for name in names if (excess := excess_of(run, worn, name))}
+    rows = with_relative_excess(run, worn)
+    known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not known:
         return ""
     first, *others = known
@@ -73,7 +74,8 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
 
 def _share(excess: Excess) -> str:
     """Return a relative excess as "6.1 % (2.3 to 14)"."""
-    ends = f" ({' to '.join(number(end, 2) for end in excess.interval)})" if excess.interval else ""
+    interval = excess.effect.interval
+    ends = f" ({' to '.join(number(end, 2) for end in interval)})" if interval else ""
     return f"{number(excess.typical, 2)} %{ends}"
 
 

@@ -137,8 +137,8 @@ class Effect:
 
     def _shown(self, value: float) -> float:
         if self.scale == EXCESS:  # points between typical shares of the two
-            both = (off_scale(end, EXCESS) for end in (self.second + value, self.second))
-            return float(next(both)) - float(next(both))
+            first, second = (off_scale(end, EXCESS) for end in (self.second + value, self.second))
+            return float(first) - float(second)
         return float(off_scale(value, self.scale))
 
     @property

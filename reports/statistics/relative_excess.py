@@ -11,6 +11,7 @@ other energy whose zero is a choice, as gravity, is divided by the same excess o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from reports.run.finished_run import Metric, Run
-from reports.statistics.effects import EXCESS, Effect, effect, off_scale
+from reports.statistics.effects import EXCESS, SOFTENING, Effect, effect, off_scale, on_scale
 from reports.statistics.means_and_spreads import Mean, pair
 
 TOTAL = "energy/total"
@@ -46,7 +47,8 @@ def with_relative_excess(
 ) -> pd.DataFrame:
     """Return the rows, and a row of the relative excess of each usable row of the metric.
 
-    Scenes without the reference or skinning have none, nor those in which skinning has no excess.
+    Scenes without the reference or skinning have none, nor those in which skinning has no excess. Rows that
+    have relative excesses of the metric already come back as they are.
 
     Args:
         run: declares the reference, its ensemble and the baseline, whose first one is skinning.
@@ -54,6 +56,8 @@ def with_relative_excess(
         metric: an energy.
         basis: rows whose reference and skinning are the basis; those given by default.
     """
+    if (rows["metric"] == relative_metric(metric).name).any():
+        return rows
     basis = rows if basis is None else basis
     skinning = next(iter(run.with_role("baseline")), "")
     zeros = _values(basis, metric, [run.reference, *run.reference_ensemble])
@@ -103,20 +107,27 @@ class Excess:
     """Relative excess of a method over motions and seeds [%].
 
     Attributes:
-        typical: mean on the scale of effects.EXCESS, taken back: about the geometric mean over motions.
-        interval: 95 % of it over motions and seeds; None where nothing was repeated.
-        mean: arithmetic mean over motions.
+        effect: against the reference, from which the verdict comes; its interval is that of `typical`.
         by_motion: scene -> mean over seeds.
-        uncertainty: standard deviation of the typical value over the reference's ensemble.
-        effect: against the reference, from which the verdict comes.
     """
 
-    typical: float
-    interval: tuple[float, float] | None
-    mean: float
-    by_motion: Mapping[str, float]
-    uncertainty: float
     effect: Effect
+    by_motion: Mapping[str, float]
+
+    @property
+    def typical(self) -> float:
+        """Mean on the scale of effects.EXCESS, taken back: about the geometric mean over motions."""
+        return self.effect.shown
+
+    @property
+    def uncertainty(self) -> float:
+        """Standard deviation of the typical value over the reference's ensemble."""
+        return self.effect.uncertainty * math.hypot(SOFTENING, self.typical)
+
+    @property
+    def mean(self) -> float:
+        """Arithmetic mean over motions."""
+        return float(np.mean(list(self.by_motion.values())))
 
     @property
     def worst(self) -> tuple[str, float]:
@@ -127,7 +138,7 @@ class Excess:
     @property
     def without_each_motion(self) -> tuple[float, float]:
         """Smallest and largest typical value when one motion is left out."""
-        cells = np.arcsinh(np.array(list(self.by_motion.values())))
+        cells = np.asarray(on_scale(np.array(list(self.by_motion.values())), EXCESS))
         if len(cells) < 2:
             return self.typical, self.typical
         left = (cells.sum() - cells) / (len(cells) - 1)
@@ -139,13 +150,8 @@ def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
     one, zero = compared_excess(run, rows, method, run.reference)
     if one is None or zero is None:
         return None
-    far = effect(one, zero, EXCESS)
-    cells = pd.Series(dict(one.cells))
-    by_motion = cells.groupby(level=0, sort=False).mean()
-    slope = 1.0 / np.hypot(1.0, np.sinh(far.value))
-    return Excess(
-        far.shown, far.interval, float(by_motion.mean()), by_motion.to_dict(), far.uncertainty / slope, far
-    )
+    by_motion = pd.Series(dict(one.cells)).groupby(level=0, sort=False).mean()
+    return Excess(effect(one, zero, EXCESS), by_motion.to_dict())
 
 
 def compared_excess(

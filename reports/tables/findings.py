@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from reports.run.finished_run import Run
 from reports.statistics.paper_claims import judged
-from reports.statistics.relative_excess import Excess, excess_of
+from reports.statistics.relative_excess import Excess, excess_of, with_relative_excess
 from reports.statistics.spreads import AT_REFERENCE, in_spreads
 from reports.statistics.verdicts import measure_of, standing
 from reports.tables.table import GARMENT, METHOD, SCENE, Cell, Column, Table, table
@@ -95,7 +95,7 @@ def _measured(run: Run) -> list[tuple[str, str, Excess]]:
     """Return (garment, method, excess) of each method but skinning, the reference and its variants."""
     found = []
     for garment in run.garments(run.garment_rows):
-        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
         zero = {*run.with_role("reference", "reference-variant"), *run.with_role("baseline")[:1]}
         for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):

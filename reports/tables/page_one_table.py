@@ -10,7 +10,7 @@ from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.page_one_methods import leads
 from reports.statistics.pareto import run_time
-from reports.statistics.relative_excess import excess_of
+from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, metric_column, table
 
@@ -44,7 +44,8 @@ def overview(run: Run) -> list[Table]:
     wanted = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
     wanted += [("cost/train", rows_of_garment)]
     asked = [(run.metrics[name], rows) for name, rows in wanted if name in run.metrics]
-    excess = {name: excess_of(run, rows_of_garment, name) for name in chosen if name != run.reference}
+    with_excess = with_relative_excess(run, rows_of_garment)
+    excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
     faster = {name: _times_faster(run, timed, name) for name in chosen}
     lines: list[tuple[Cell, ...]] = [
         (

@@ -191,6 +191,7 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
         # Of fewer members of the ensemble than two nobody knows the spread.
         members = [r for r in errors if is_member(r.family, r.level)]
         assert ("newton-1" in unsure) == (len(members) >= LEAST_MEMBERS)
+        assert "newton-1" not in unsure or unsure["newton-1"] > 0.0
 
 
 def test_the_settled_shirt_is_at_rest_outside_of_the_body(scenes):
