@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,17 +20,29 @@ if TYPE_CHECKING:
     from reports.figures.figure import Picture
 
 
-def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
-    """Make tables, figures, page and PDF of a run.
+@dataclass(frozen=True)
+class Built:
+    """A report that was made.
 
-    Returns:
-        Path of the PDF, and a sentence for each file that could not be read.
+    Attributes:
+        pdf: path of the PDF.
+        problems: a sentence for each file that could not be read.
+        answer: table and sentences of page one as text, empty for a run that has none.
+    """
+
+    pdf: Path
+    problems: list[str]
+    answer: str
+
+
+def build_report(run_dir: str | Path) -> Built:
+    """Make tables, figures, page and PDF of a run.
 
     Raises:
         ResultsError: when run.json or results.csv is absent, broken or of an earlier version; before anything
             is written.
 
-    >>> pdf, problems = build_report("reports/runs/first")  # doctest: +SKIP
+    >>> print(build_report("reports/runs/first").answer)  # doctest: +SKIP
     """
     # Heavy: not needed for --help.
     from reports.blocks.block import Report
@@ -40,6 +53,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     from reports.pictures import PICTURES
     from reports.run.reading import read_run_with_trainings
     from reports.tables import make_tables, write_tables
+    from reports.text.answer import answer
 
     folder = RunFolder(run_dir)
     run = read_run_with_trainings(folder)
@@ -49,7 +63,7 @@ def build_report(run_dir: str | Path) -> tuple[Path, list[str]]:
     remove_figures(folder.figures, figures)
     report = Report(run, tables, draw_figures(run, folder.figures, figures))
     write_page(folder, report)
-    return write_pdf(folder, report), run.problems
+    return Built(write_pdf(folder, report), run.problems, answer(run, tables))
 
 
 def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:
@@ -94,11 +108,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
         print(picture.caption, picture.path, sep="\n")
         return 0
-    path, problems = build_report(options.run_dir)
-    for problem in problems:
+    built = build_report(options.run_dir)
+    for problem in built.problems:
         print(f"reports.build: left out: {problem}", file=sys.stderr)
-    print(path)
-    return 1 if problems else 0
+    if built.answer:
+        print(built.answer)
+    print(built.pdf)
+    return 1 if built.problems else 0
 
 
 if __name__ == "__main__":

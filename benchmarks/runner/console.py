@@ -25,10 +25,13 @@ FEWER = "*"
 MEANS = ("garments", "speed")  # suites of which the methods' means are shown; of others, counts of endings
 
 
-def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
-    """Return means over scenes and seeds of each suite and method, counts of cases, and stage times."""
-    parts = []
-    for suite in MEANS:
+def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str = "") -> str:
+    """Return means over scenes and seeds of each suite and method, counts of cases, and stage times.
+
+    answer: text of page one, which stands in place of the means where there is one.
+    """
+    parts = [answer] if answer else []
+    for suite in () if answer else MEANS:
         of_suite = [row for row in rows if row.suite == suite]
         for title, kept in _groups(suite, of_suite):
             parts.append(_table(title, kept))

@@ -46,8 +46,8 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     log.write_rows(rows)
     log.note_outcomes(runner)
-    made = make_report(log)
-    print(summary(log.rows, log.stages), flush=True)
+    answer = make_report(log)
+    print(summary(log.rows, log.stages, answer or ""), flush=True)
     failed = [row for row in log.rows if not accepted(row)]
     for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
         print(line, file=sys.stderr)
@@ -58,9 +58,9 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
         print(line, file=sys.stderr)
     if looks := log.config["test_looks"]:
         print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
-    if made:
+    if answer is not None:
         print(log.folder.report_path.resolve(), flush=True)
-    return 0 if made and not (failed or broken) else 1
+    return 0 if answer is not None and not (failed or broken) else 1
 
 
 def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
@@ -101,18 +101,21 @@ def accepted(row: Row) -> bool:
     return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
 
 
-def make_report(log: RunLog) -> bool:
-    """Make the report and return whether it is there; a failure is one line and leaves the results."""
+def make_report(log: RunLog) -> str | None:
+    """Make the report and return its answer as text, None without a report.
+
+    A failure is one line and leaves the results.
+    """
     log.note("finished", now())
     try:
         with log.stage("report"):
             from reports.build import build_report
 
-            _, problems = build_report(log.folder.path)
+            built = build_report(log.folder.path)
     except Exception as error:
         line = one_line(error)
         print(f"no report ({line}); the results are in {log.folder.path}", file=sys.stderr)
-        return False
-    for problem in problems:
+        return None
+    for problem in built.problems:
         print(f"report: left out: {problem}", file=sys.stderr)
-    return True
+    return built.answer

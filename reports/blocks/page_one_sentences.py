@@ -23,6 +23,7 @@ from reports.statistics.pareto import (
     run_time,
     truncated,
 )
+from reports.statistics.published import published_beside
 from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_relative_excess
 from reports.statistics.verdicts import LESS, MORE, TIED, compare_methods, standing
 from reports.tables.number_texts import duration, number
@@ -61,6 +62,8 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
         f"On {count} {unseen}motion{'' if count == 1 else 's'} {run.label(first)} leaves {_share(excess)} of "
         f"the energy that skinning alone has above the converged simulation ({_stands(excess)})"
     )
+    beside = published_beside(run, first)
+    text += f" ({beside})" if beside else ""
     text += "".join(f"; {run.label(name)} leaves {_share(known[name])}" for name in others)
     if count > 1:
         scene, worst = excess.worst

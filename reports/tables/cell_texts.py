@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from reports.run.finished_run import Run
-from reports.statistics.effects import RANGE, RATIO, Effect
+from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.number_texts import DASH, aligned, duration, number
 from reports.tables.table import Cell, Column, Table
@@ -61,7 +61,7 @@ def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Seque
 
 def _text(run: Run, column: Column, cell: Cell) -> str:
     if isinstance(cell, Effect):
-        sign = "×" if cell.scale == RATIO else "+" if cell.value > 0.0 else ""
+        sign = {RATIO: "×", DIFFERENCE: "+" if cell.value > 0.0 else ""}.get(cell.scale, "")
         return sign + number(cell.shown, column.digits)
     value = cell.value if isinstance(cell, Mean) else cell
     if isinstance(value, str):

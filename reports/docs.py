@@ -1,0 +1,57 @@
+"""python -m reports.docs: make the generated parts of README and docs from the published runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from benchmarks.results.json_file import ResultsError
+from reference_sim.command.command_line import Parser, command
+from reference_sim.files.atomic_files import replacing
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
+    """Yield (path, text, text with its generated parts made anew) of README and each document of docs/.
+
+    Raises:
+        ValueError: for a part of no known form or without an end; names the document.
+    """
+    from reports.text.generated_parts import fill  # loads pandas
+    from reports.text.published_parts import published_part
+
+    for path in sorted([root / "README.md", *(root / "docs").rglob("*.md")]):
+        text = path.read_text(encoding="utf-8")
+        try:
+            yield path, text, fill(text, published_part)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+
+
+@command("reports.docs", goes_on="the same command begins again", bad_input=(ResultsError, ValueError))
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    parser = Parser(
+        prog="python -m reports.docs",
+        description="Make the parts of README.md and docs/ that stand between '<!-- generated: ... -->' and "
+        "'<!-- end of generated -->' from the runs in reports/published.",
+        epilog="Exit status: 0 when all is up to date or written, 1 when --check finds a part that is not, 2 "
+        "for a part or a run that cannot be read. Example: python -m reports.docs --check",
+    )
+    parser.add_argument("--check", action="store_true", help="write nothing; name documents out of date")
+    options = parser.parse_args(arguments)
+    stale = [(path, made) for path, text, made in documents() if made != text]
+    for path, made in stale:
+        if options.check:
+            print(f"{path}: not what the published runs give; run python -m reports.docs", file=sys.stderr)
+        else:
+            with replacing(path) as temporary:
+                temporary.write_text(made, encoding="utf-8", newline="\n")
+            print(path)
+    return 1 if stale and options.check else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,57 @@
+"""Whether a run of the default preset gives what was published, on the same motions."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
+from reports.run.finished_run import Run
+from reports.run.reading import read_run
+from reports.statistics.effects import EXCESS, LEVEL, off_scale, on_scale
+from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
+
+PUBLISHED = Path(__file__).resolve().parents[1] / "published"
+DEFAULT = "quick"  # the preset that is published, and the folder of its run
+
+
+def published_beside(run: Run, method: str) -> str:
+    """Return "published 6.8 % on these motions: reproduced", empty for a run that has nothing beside it.
+
+    It has where its preset is the default and the checkout has the published run. A method is reproduced
+    where each of its seeds lies within the interval in which one more of the published seeds is expected:
+    their mean on the scale of relative excess, plus or minus Student's t times s sqrt(1 + 1/n).
+    """
+    if run.config.get("preset") != DEFAULT or not (PUBLISHED / DEFAULT).is_dir():
+        return ""
+    try:
+        published = read_run(RunFolder(PUBLISHED / DEFAULT))
+    except ResultsError:
+        return ""  # of an earlier version
+    if published.config.get("started") == run.config.get("started"):
+        return ""
+    ours, theirs = _by_seed(run, method), _by_seed(published, method)
+    scenes = sorted(set(ours.index) & set(theirs.index))
+    if not scenes or set(ours.index) - set(scenes):
+        return ""
+    before, now = theirs.loc[scenes].mean().to_numpy(), ours.loc[scenes].mean().to_numpy()
+    text = f"published {float(off_scale(before.mean(), EXCESS)):.2g} % on these motions"
+    if len(before) < 2:
+        return text
+    reach = stats.t.ppf(1.0 - LEVEL / 2.0, len(before) - 1) * before.std(ddof=1)
+    reach *= math.sqrt(1.0 + 1.0 / len(before))
+    return f"{text}: {'reproduced' if np.all(np.abs(now - before.mean()) <= reach) else 'not reproduced'}"
+
+
+def _by_seed(run: Run, method: str) -> pd.DataFrame:
+    """Return scene x seed -> relative excess of a method of the first garment, on its scale."""
+    rows = run.garment_rows
+    rows = with_relative_excess(run, rows[rows["garment"] == run.first_garment])
+    kept = rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"] & (rows["method"] == method)]
+    shares = kept.pivot_table(index="scene", columns="seed", values="value")
+    return shares.apply(lambda column: np.asarray(on_scale(column.to_numpy(), EXCESS))).dropna()

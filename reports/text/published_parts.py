@@ -1,0 +1,55 @@
+"""What a generated part can be: sentences of page one, a table of a run, the claims of the paper.
+
+`headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN,
+...`, `counts of RUN, ...`; RUN is a folder of reports/published.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from benchmarks.results.run_folder import RunFolder
+from reports.blocks.page_one_sentences import headline
+from reports.run.finished_run import Run
+from reports.run.reading import read_run_with_trainings
+from reports.statistics.published import PUBLISHED
+from reports.tables import make_tables
+from reports.tables.table import Table
+from reports.text.claim_rows import claim_counts, claim_rows
+from reports.text.text_table import markdown_table, remarks_on, text_rows
+
+FORMS = (
+    "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
+    "claims exploratory of RUN, ...; counts of RUN, ..."
+)
+
+
+def published_part(words: str) -> str:
+    """Return the Markdown of a generated part. Raises ValueError for words of no known form."""
+    what, _, source = words.partition(" of ")
+    runs, _, columns = source.partition(";")
+    folders = [PUBLISHED / name.strip() for name in runs.split(",")]
+    kind, _, name = what.partition(" ")
+    if kind == "headline":
+        run, _ = _read(folders[0])
+        return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(run))
+    if kind == "table":
+        run, tables = _read(folders[0])
+        if name not in tables:
+            raise ValueError(f"run {folders[0].name} has no table {name}; it has {', '.join(tables)}")
+        wanted = [column.strip() for column in columns.split(",") if column.strip()]
+        rows = text_rows(run, tables[name], wanted)
+        return "\n\n".join(filter(None, [markdown_table(rows), remarks_on(rows)]))
+    if kind == "claims":
+        rows = claim_rows([(folder.name, _read(folder)[0]) for folder in folders], primary=name == "primary")
+        return markdown_table(rows)
+    if kind == "counts":
+        return claim_counts([(folder.name, _read(folder)[0]) for folder in folders])
+    raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
+
+
+@cache
+def _read(folder: Path) -> tuple[Run, dict[str, Table]]:
+    run = read_run_with_trainings(RunFolder(folder))
+    return run, dict(make_tables(run))

@@ -1,0 +1,82 @@
+"""A table as plain text: for the terminal, and for Markdown with one number a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from reports.run.finished_run import Run
+from reports.statistics.effects import Effect
+from reports.tables.cell_texts import REMARKS, CellText, column_texts
+from reports.tables.number_texts import DASH
+from reports.tables.table import Table
+
+MARKS = "*†"  # of numbers that lack something
+
+
+def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[str]]:
+    """Return headings and cells of a table, all of it as text.
+
+    Args:
+        run: has the labels of methods.
+        table: the table.
+        columns: names of those wanted, in this order; all by default.
+
+    An effect takes two columns: its value, and its interval. A mean stands without its spread. Columns in
+    which nothing stands are left out.
+
+    Raises:
+        ValueError: for a column that the table has not.
+    """
+    places = {column.name: place for place, column in enumerate(table.columns)}
+    if absent := [name for name in columns if name not in places]:
+        raise ValueError(f"table {table.name} has no column {absent[0]}; it has {', '.join(places)}")
+    texts: list[list[str]] = []
+    for place in (places[name] for name in columns or places):
+        column, cells = table.columns[place], [row[place] for row in table.rows]
+        found = column_texts(run, column, cells, [])
+        heading = f"{column.title} [{column.unit_above}]" if column.unit_above else column.title
+        texts.append([heading, *(cell["text"].strip() + _marks(cell) for cell in found)])
+        if any(isinstance(cell, Effect) and cell.interval for cell in cells):
+            texts.append(["interval", *(cell["spread"] or DASH for cell in found)])
+    return [list(line) for line in zip(*(column for column in texts if set(column[1:]) - {DASH}))]
+
+
+def _marks(cell: CellText) -> str:
+    """Return the marks of a cell; what an interval covers is not marked, it has a column."""
+    return "".join(mark for mark in cell["mark"] if mark in MARKS)
+
+
+def remarks_on(rows: Sequence[Sequence[str]]) -> str:
+    """Return what the marks in these rows mean, empty where there are none."""
+    marks = {mark for row in rows[1:] for cell in row for mark in MARKS if cell.endswith(mark)}
+    return " ".join(REMARKS[mark] for mark in sorted(marks))
+
+
+def aligned_text(rows: Sequence[Sequence[str]]) -> str:
+    """Return the rows as lines whose columns stand below each other, the first from the left.
+
+    >>> print(aligned_text([["method", "total [J]"], ["snug", "0.34"]]))
+    method  total [J]
+    snug         0.34
+    """
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if place == 0 else cell.rjust(width)
+            for place, (cell, width) in enumerate(zip(row, widths))
+        ).rstrip()
+        for row in rows
+    )
+
+
+def markdown_table(rows: Sequence[Sequence[str]]) -> str:
+    """Return the rows as a table of Markdown, the first row its head.
+
+    >>> print(markdown_table([["method", "total [J]"], ["snug", "0.34"]]))
+    | method | total [J] |
+    | --- | --- |
+    | snug | 0.34 |
+    """
+    escaped = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    lines = [escaped[0], ["---"] * len(escaped[0]), *escaped[1:]]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,76 @@
+"""A run of the default preset beside what was published."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.results.row import Row
+from reports.run.finished_run import Run, make_run
+from reports.statistics import published
+from reports.statistics.published import DEFAULT, published_beside
+from tests.reports.report_folder import DECLARED
+
+ROLES = {"simulation": "reference", "skinning": "baseline"}
+SCENES = ("tshirt/a", "tshirt/b", "tshirt/c")
+
+
+def run_of(shares: dict[int, float], scenes: tuple[str, ...] = SCENES, started: str = "now", **config) -> Run:
+    """Return a run in which SNUG leaves so many % with each seed, the reference has 1 J and skinning 2."""
+    rows = [
+        Row(
+            "garments",
+            scene,
+            method,
+            seed,
+            "energy/total",
+            "J",
+            value,
+            garment="tshirt",
+            role=ROLES.get(method, "network"),
+        )
+        for scene in scenes
+        for method, seed, value in (
+            ("simulation", 0, 1.0),
+            ("skinning", 0, 2.0),
+            *(("snug", k, 1.0 + share / 100) for k, share in shares.items()),
+        )
+    ]
+    return make_run({"methods": DECLARED, "preset": DEFAULT, "started": started, **config}, rows)
+
+
+@pytest.fixture
+def publish(monkeypatch, tmp_path):
+    def made(run: Run) -> None:
+        (tmp_path / DEFAULT).mkdir()
+        monkeypatch.setattr(published, "PUBLISHED", tmp_path)
+        monkeypatch.setattr(published, "read_run", lambda folder: run)
+
+    return made
+
+
+def test_a_seed_among_those_published_is_reproduced_and_one_far_off_is_not(publish):
+    publish(run_of({0: 5.0, 1: 5.5, 2: 6.0}, (*SCENES, "tshirt/d"), started="before"))
+    assert published_beside(run_of({0: 5.2}), "snug") == "published 5.5 % on these motions: reproduced"
+    assert published_beside(run_of({0: 12.0}), "snug").endswith(": not reproduced")
+
+
+def test_the_interval_is_that_of_one_more_seed(publish):
+    """Of seeds drawn alike, 95 % lie in it."""
+    generator = np.random.default_rng(0)
+    inside = 0
+    drawn = np.sinh(np.arcsinh(5.0) + 0.1 * generator.standard_normal((200, 4)))
+    publish(run_of({}, started="before"))
+    for line in drawn:
+        before = run_of(dict(enumerate(line[:3])), SCENES[:1], started="before")
+        published.read_run = lambda folder, before=before: before
+        inside += published_beside(run_of({0: line[3]}, SCENES[:1]), "snug").endswith(": reproduced")
+    assert 0.91 <= inside / 200 <= 0.985
+
+
+def test_nothing_stands_beside_another_preset_the_published_run_itself_or_motions_of_ones_own(publish):
+    publish(run_of({0: 5.0, 1: 5.5}, started="before"))
+    assert published_beside(run_of({0: 5.2}, preset="smoke"), "snug") == ""
+    assert published_beside(run_of({0: 5.2}, started="before"), "snug") == ""
+    assert published_beside(run_of({0: 5.2}, ("tshirt/a", "tshirt/mine")), "snug") == ""
+    assert published_beside(run_of({0: 5.2}), "pbns") == ""

@@ -1,0 +1,57 @@
+"""The parts of the documents that are generated are what the published runs give."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports.docs import ROOT, documents, main
+from reports.statistics.paper_claims import EXPLORATORY, PRIMARY
+from reports.text.generated_parts import BEGIN, END, fill
+from reports.text.published_parts import published_part
+
+
+def test_every_generated_part_is_what_the_published_runs_give():
+    for path, text, made in documents(ROOT):
+        assert text == made, f"{path}: run python -m reports.docs"
+
+
+def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys):
+    part = published_part("table overview of quick; method, relative_excess")
+    (tmp_path / "docs").mkdir()
+    readme = tmp_path / "README.md"
+    right = f"A\n{BEGIN.format('table overview of quick; method, relative_excess')}\n{part}\n{END}\nB\n"
+    readme.write_text(right.replace("| Skinning alone | 100 ", "| Skinning alone | 99 "), encoding="utf-8")
+    assert readme.read_text(encoding="utf-8") != right
+    (found,) = documents(tmp_path)
+    assert found == (readme, readme.read_text(encoding="utf-8"), right)
+
+
+def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="needs an"):
+        fill(BEGIN.format("headline of quick"), lambda words: "")
+    for words, said in (
+        ("everything of quick", "known: headline"),
+        ("table nothing of quick", "no table nothing; it has"),
+        ("table overview of quick; colour", "no column colour; it has"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            published_part(words)
+
+
+@pytest.mark.parametrize(("kind", "claims"), [("primary", PRIMARY), ("exploratory", EXPLORATORY)])
+def test_every_claim_has_a_row_whether_or_not_a_run_judges_it(kind, claims):
+    lines = published_part(f"claims {kind} of quick").splitlines()[2:]
+    assert len(lines) == len(claims)
+    said = [line.split(" | ") for line in lines]
+    assert all((cells[8] == "not measured") == (cells[9] == "– |") for cells in said)
+    assert any(cells[8] != "not measured" for cells in said)
+
+
+def test_the_command_checks_and_says_so(capsys):
+    assert main(["--check"]) == 0 and capsys.readouterr().err == ""
+
+
+def test_documents_are_readme_and_docs_alone():
+    assert {path.relative_to(Path(ROOT)).parts[0] for path, *_ in documents(ROOT)} == {"README.md", "docs"}

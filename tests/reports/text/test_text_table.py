@@ -1,0 +1,51 @@
+"""Tables as text: one number a cell, intervals in columns of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.results.row import Row
+from reports.run.finished_run import make_run
+from reports.statistics.effects import EXCESS, Effect
+from reports.statistics.means_and_spreads import Mean
+from reports.tables.table import METHOD, Column, Table
+from reports.text.text_table import aligned_text, markdown_table, remarks_on, text_rows
+from tests.reports.report_folder import DECLARED
+
+RUN = make_run({"methods": DECLARED}, [Row("garments", "a/b", "snug", 0, "energy/total", "J", 1.0)])
+
+
+def small_table() -> Table:
+    effect = Effect(value=1.5, scale=EXCESS, second=0.0, error=0.2, motions=20)
+    mean = Mean(value=0.25, spread=0.01, scenes=1, seeds=3, asked=0)
+    columns = (METHOD, Column("excess", "Excess", "%"), Column("total", "Total", "J"), Column("none", "None"))
+    return Table("t", columns, (("snug", effect, mean, None), ("skinning", None, None, None)))
+
+
+def test_an_interval_has_a_column_of_its_own_and_empty_columns_are_left_out():
+    head, snug, skinning = text_rows(RUN, small_table())
+    assert head == ["Method", "Excess [%]", "interval", "Total [J]"]
+    assert snug[0] == "SNUG" and " to " in snug[2] and "±" not in snug[3] and snug[3] == "0.250"
+    assert skinning == ["skinning", "–", "–", "–"]
+
+
+def test_columns_are_chosen_by_name_and_an_unknown_one_is_refused():
+    rows = text_rows(RUN, small_table(), ("total", "method"))
+    assert [row[0] for row in rows] == ["Total [J]", "0.250", "–"]
+    with pytest.raises(ValueError, match="no column depth; it has method, excess, total, none"):
+        text_rows(RUN, small_table(), ("depth",))
+
+
+def test_a_mean_over_fewer_roll_outs_is_marked_and_the_mark_explained():
+    fewer = replace(small_table(), rows=(("snug", None, Mean(0.25, None, scenes=1, seeds=3, asked=3), None),))
+    rows = text_rows(RUN, fewer)
+    assert rows[1] == ["SNUG", "0.250*"]
+    assert remarks_on(rows).startswith("* A mean over fewer") and remarks_on(rows[:1]) == ""
+
+
+def test_lines_are_as_wide_as_each_other_and_a_bar_in_a_cell_is_escaped():
+    lines = aligned_text([["a", "b"], ["long name", "1.25"], ["c", "2"]]).splitlines()
+    assert len({len(line) for line in lines}) == 1
+    assert markdown_table([["a|b"], ["1"]]).splitlines()[0] == "| a\\|b |"
