@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,10 +16,6 @@ from benchmarks.metrics import declared
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
-PAPER = ROOT / "docs" / "paper.md"
-PUBLISHED = ROOT / "reports" / "published"
-SAID = {"holds": "reproduced", "does not hold": "refuted", "tie": "tie", "cannot be told": "cannot be told"}
-VERDICTS = (*SAID.values(), "not measured yet")
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
 SHORT = ("A method", "An energy", "A network from elsewhere", "A scene", "A metric")
@@ -120,60 +115,6 @@ def test_every_metric_is_defined_as_declared():
     table = re.findall(r"^\| `[^`|]+/[^`|]+` \|.*$", text, re.M)
     assert not [line for line in lines if line not in table], "add these lines to the table"
     assert not [line for line in table if line not in lines], "remove these lines from the table"
-
-
-def table_rows(text: str) -> list[list[str]]:
-    """Return the cells of each row of each table of a text."""
-    lines = text.splitlines()
-    return [[cell.strip() for cell in line[1:-1].split("|")] for line in lines if line.startswith("|")]
-
-
-def effect_text(kind: str, metric: str, text: str) -> str:
-    """Return an effect as docs/paper.md writes it.
-
-    A ratio in two places, or two digits where it is small; whole points;
-    other differences in two places, or three below 1.
-    """
-    value = float(text)
-    if kind == "difference":
-        places = 0 if "%" in metric else 2 if abs(value) >= 1.0 else 3
-        return f"{value:.{places}f}"
-    return f"{value:.2f}" if value >= 0.1 else f"{value:.2g}"
-
-
-def test_the_page_of_the_paper_counts_its_own_verdicts():
-    text = PAPER.read_text(encoding="utf-8")
-    other = "Not the paper's claims"
-    rows = [row for title, part in sections(text).items() if title != other for row in table_rows(part)]
-    judged = Counter(row[1] for row in rows if row[1] in VERDICTS)
-    assert {row[0]: int(row[1]) for row in rows if row[0] in VERDICTS} == judged
-    assert f"| of {judged.total()} claims |" in text
-    assert any(row[1] in VERDICTS for row in table_rows(sections(text)[other]))
-
-
-def findings(run: str) -> list[tuple[str, str]]:
-    """(verdict, effect) of each published finding, as docs/paper.md writes it; of those with an interval."""
-    with (PUBLISHED / run / "tables" / "findings.csv").open(newline="", encoding="utf-8") as stream:
-        rows = [row for row in csv.DictReader(stream) if row["effect_low"] != "-"]
-    names = ("effect", "effect_low", "effect_high")
-    texts = [[effect_text(row["effect_kind"], row["metric"], row[name]) for name in names] for row in rows]
-    return [
-        (SAID[row["verdict"]], f"{effect} ({low} to {high})") for row, (effect, low, high) in zip(rows, texts)
-    ]
-
-
-def test_the_page_of_the_paper_says_what_the_published_findings_say():
-    published = findings("quick")
-    rows = table_rows(PAPER.read_text(encoding="utf-8"))
-    judged = [row for row in rows if row[-1] == "findings"]
-    for verdict, words in published:
-        assert any(row[1] == verdict and words in row[2] for row in judged), f"{verdict}: {words}"
-    assert len(judged) == len(published)
-    for row in rows:
-        if row[-1] == "its findings":
-            runs = [run for run in ("ablations", "windows") if f"`{run}`" in row[-2]]
-            said = [(verdict, words) for run in runs for verdict, words in findings(run) if words in row[2]]
-            assert said and {verdict for verdict, _ in said} == {row[1]}, row
 
 
 def heading_anchors(path: Path) -> set[str]:

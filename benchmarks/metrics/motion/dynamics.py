@@ -24,15 +24,15 @@ COMMON = ("amplitude", "correlation", "gain", "lag")
 METRICS = (
     _dynamics("quasi_static_difference", "mm", "From quasi-static",
               "root mean square distance to the method's own answer to each pose held still"),
-    _dynamics("amplitude", "1", "A", "amplitude of the hem's dynamic part over that of the simulation's; the "
-              "dynamic part is what motion adds to the own answer to poses held still"),
+    _dynamics("amplitude", "1", "Hem amplitude",
+              "amplitude of the hem's dynamic part over that of the simulation's; the dynamic part is what motion adds to the own answer to poses held still"),
     _dynamics("correlation", "1", "Correlation", "cosine between the two dynamic parts"),
     _dynamics("gain", "1", "Gain", "factor by which the hem answers its own quasi-static turn or shift"),
     _dynamics("lag", "frames", "Lag", "frames by which it comes later"),
     *(_dynamics(f"common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
                 "the same where every method's dynamic part is taken from the simulator's answer to poses "
                 "held still instead of its own", table="dynamics" if name in COMMON[:2] else "")
-      for name, title in zip(COMMON, ("A", "Correlation", "Gain", "Lag"))),
+      for name, title in zip(COMMON, ("Hem amplitude", "Correlation", "Gain", "Lag"))),
     _dynamics("ringing", "mm", "Ringing", "distance of the hem to where it ends, after the body has stopped"),
     *(_dynamics(f"ringing/{after}", "mm", f"Ringing, {after} frames",
                 f"the same {after} frames after the stop", table="") for after in AFTER),
