@@ -1,7 +1,7 @@
 """Cut a run in two halves of its motions and compare the verdicts: python docs/notebook/halves.py RUN_DIR.
 
-Prints each claim with its verdicts in the whole run and in both halves, and how many contradict each other: one
-half says that the claim holds, the other that it does not.
+Prints each claim with its verdicts in the whole run and in both halves, and how many contradict each other:
+one half says that the claim holds, the other that it does not.
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ def main(folder: str) -> None:
     for claim, verdict in whole.items():
         halves = one.get(claim, "-"), other.get(claim, "-")
         against += {*halves} == {HOLDS, FAILS}
-        print(
-            f"{claim.metric:28s} {claim.lower:24s} {claim.higher:24s} {verdict:16s} {halves[0]:16s} {halves[1]}"
-        )
+        texts = (claim.metric, claim.lower, claim.higher, verdict, *halves)
+        print(" ".join(text.ljust(24) for text in texts))
     print(f"{len(scenes)} motions, {len(whole)} claims, {against} contradict each other")
 
 

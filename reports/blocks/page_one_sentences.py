@@ -58,13 +58,14 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     excess = known[first]
     unseen = "" if set(worn["scene"]) <= set(run.trained_on) else "unseen "
     count = len(excess.by_motion)
+    motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
     text = (
-        f"On {count} {unseen}motion{'' if count == 1 else 's'} {run.label(first)} leaves {_share(excess)} of "
-        f"the energy that skinning alone has above the converged simulation ({_stands(excess)})"
+        f"On {motions} the relative excess energy of {run.label(first)}, the share of skinning's excess over "
+        f"the reference solver that is left, is {_share(excess)}: {_stands(excess)}"
     )
     beside = published_beside(run, first)
     text += f" ({beside})" if beside else ""
-    text += "".join(f"; {run.label(name)} leaves {_share(known[name])}" for name in others)
+    text += "".join(f"; of {run.label(name)} {_share(known[name])}" for name in others)
     if count > 1:
         scene, worst = excess.worst
         low, high = (number(share, 2) for share in excess.without_each_motion)
@@ -85,7 +86,7 @@ def _share(excess: Excess) -> str:
 def _stands(excess: Excess) -> str:
     """Say how the method stands to the reference."""
     stands = standing(excess.effect, excess.effect.p_value())
-    words = {TIED: "a tie with it", MORE: "more than it has", LESS: "less than it has"}
+    words = {TIED: "a tie with it", MORE: "more energy than it has", LESS: "less energy than it has"}
     return words.get(stands, "inconclusive")
 
 
@@ -94,14 +95,16 @@ def _moves(run: Run, worn: pd.DataFrame) -> str:
     parts = []
     swing, alike = (value_of(worn, NETWORK, name) for name in (SWING, ALIKE))
     if swing is not None:
-        parts.append(f"{run.label(NETWORK)}'s hem has {number(swing, 2)} of the simulation's amplitude")
+        share = number(100.0 * swing, 2)
+        parts.append(f"the hem of {run.label(NETWORK)} has {share} % of the simulation's dynamic amplitude")
         parts[-1] += "" if alike is None else f", correlation {number(alike, 2)}"
     inside = value_of(worn, NETWORK, INSIDE)
     if inside is not None:
         reference = value_of(worn, run.reference, INSIDE)
         beside = "" if reference is None else f", of the simulation {number(reference, 2)} %"
         parts.append(f"{number(inside, 2)} % of the vertices lie inside the body{beside}")
-    return f"{'; '.join(parts)}." if parts else ""
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:

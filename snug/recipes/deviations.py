@@ -26,13 +26,12 @@ class Deviation:
 
 
 DEVIATIONS = (
-    Deviation("torch-defaults", ("initialisation", "adam_epsilon"), "the starts of torch, not of Keras"),
     Deviation("zero-last-layer", ("zero_last_layer",), "a last layer of zero"),
     Deviation("small-output", ("output_scale",), "its small output"),
     Deviation("six-numbers", ("pose_input",), "six numbers a joint"),
     Deviation("root-axes", ("velocity_frame",), "velocity in the root's axes"),
     Deviation("smoothed-weights", ("smoothing",), "smoothed skinning weights"),
-    Deviation("higher-rate", ("learning_rate", "schedule"), "a higher rate that falls by a cosine"),
+    Deviation("cosine-rate", ("schedule",), "a rate that falls by a cosine"),
     Deviation("weight-decay", ("weight_decay",), "weight decay"),
     Deviation("remembered-states", ("remembered", "h0_sigma"), "remembered states and less noise"),
     Deviation("overlapping-windows", ("window_stride",), "overlapping windows"),

@@ -90,11 +90,11 @@ class Recipe:
     pose_input: str = "six"
     velocity_frame: str = "root"
     smoothing: int = 20
-    initialisation: str = "torch"
+    initialisation: str = "keras"
     zero_last_layer: bool = True
     output_scale: float = 0.1
-    learning_rate: float = 2e-3
-    adam_epsilon: float = 1e-8
+    learning_rate: float = 1e-3
+    adam_epsilon: float = 1e-7
     weight_decay: float = 0.1
     schedule: str = "cosine"
     drop_after_epochs: int = 10
@@ -113,7 +113,7 @@ class Recipe:
     contact_refresh: float = 0.01
     mixed: float = 12.0
     mixed_turn: float = 0.1
-    mixed_lift: float = 1.0
+    mixed_lift: float = 0.25
     terms: tuple[str, ...] = TERMS
     inertia_form: str = "equation_5"
     material: str = "stvk"

@@ -8,12 +8,21 @@ from __future__ import annotations
 
 from benchmarks.training import Simulated, Training
 from snug.recipes.deviations import exchange_deviations
-from snug.recipes.named import ABLATIONS, DYNAMIC, PAPER, PBNS_SPRINGS, SANTESTEBAN2019, SUPERVISED, TAILORNET
+from snug.recipes.named import (
+    ABLATIONS,
+    DYNAMIC,
+    PAPER,
+    PBNS,
+    PBNS_SPRINGS,
+    SANTESTEBAN2019,
+    SUPERVISED,
+    TAILORNET,
+)
 from snug.recipes.recipe import DEFAULT
 
 TRAININGS = {
     "snug": Training("snug", DEFAULT),
-    "pbns": Training("pbns", DEFAULT),
+    "pbns": Training("pbns", PBNS),
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
     "supervised": Training("supervised", SUPERVISED, Simulated()),

@@ -25,7 +25,8 @@ METRICS = (
     _dynamics("quasi_static_difference", "mm", "From quasi-static",
               "root mean square distance to the method's own answer to each pose held still"),
     _dynamics("amplitude", "1", "Hem amplitude",
-              "amplitude of the hem's dynamic part over that of the simulation's; the dynamic part is what motion adds to the own answer to poses held still"),
+              "amplitude of the hem's dynamic part over that of the simulation's; the "
+              "dynamic part is what motion adds to the own answer to poses held still"),
     _dynamics("correlation", "1", "Correlation", "cosine between the two dynamic parts"),
     _dynamics("gain", "1", "Gain", "factor by which the hem answers its own quasi-static turn or shift"),
     _dynamics("lag", "frames", "Lag", "frames by which it comes later"),
