@@ -117,6 +117,25 @@ def test_every_metric_is_defined_as_declared():
     assert not [line for line in table if line not in lines], "remove these lines from the table"
 
 
+def test_the_lines_of_python_in_the_readme_run(tmp_path):
+    (code,) = [
+        text
+        for _, language, text in blocks((ROOT / "README.md").read_text(encoding="utf-8"))
+        if language == "python"
+    ]
+    small = {
+        "cells=20": "cells=4",
+        "pins=[0, 20]": "pins=[0, 4]",
+        "frames=60": "frames=3",
+        "vertices=1000": "vertices=300",
+    }
+    for whole, part in {**small, "steps=2000": "steps=2"}.items():
+        assert whole in code
+        code = code.replace(whole, part)
+    (tmp_path / "lines.py").write_text(code, encoding="utf-8")
+    run(tmp_path, "python lines.py")
+
+
 def heading_anchors(path: Path) -> set[str]:
     """Return the anchors that GitHub makes of a document's headings."""
     titles = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.M)
