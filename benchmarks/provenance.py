@@ -21,7 +21,9 @@ def commit() -> str:
     root = Path(__file__).resolve().parent.parent
 
     def git(*words: str) -> str:
-        answer = subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True, timeout=20)
+        # No lock on the index: one would stay there where the disk is full.
+        command = ["git", "--no-optional-locks", "-C", str(root), *words]
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=20)
         return answer.stdout.strip() if answer.returncode == 0 else ""
 
     try:

@@ -25,7 +25,6 @@ import numpy as np
 from benchmarks.external.roll_out_option import RollOutError
 from reference_sim.files.mesh_files import MESH_SUFFIXES, Surface, read_mesh, read_sequence
 
-PACKED = 1032  # bytes that deflate packs into one at most
 KEYS = {  # of an npz, and of a pickle
     "positions": "positions",
     "pred": "positions",
@@ -193,8 +192,7 @@ def _meshes(path: str) -> dict[str, Any]:
 def _trajectory(path: str) -> dict[str, Any]:
     from reference_sim.trajectory.trajectory import Trajectory
 
-    _check_hdf(path)
-    trajectory = Trajectory.load(path)
+    trajectory = Trajectory.load(path, guarded=True)
     claims = trajectory.frame_fields.get("converged")
     return {
         "positions": trajectory.positions,
@@ -202,20 +200,6 @@ def _trajectory(path: str) -> dict[str, Any]:
         "fps": 1.0 / trajectory.dt if trajectory.frames > 1 else None,
         "converged": None if claims is None else np.asarray(claims),
     }
-
-
-def _check_hdf(path: str) -> None:
-    """Raise ValueError for a data set that declares more than its packed bytes can hold."""
-    import h5py
-
-    def check(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.nbytes > PACKED * (item.id.get_storage_size() + 1):
-            raise ValueError(f"{name} declares {item.nbytes} bytes in {item.id.get_storage_size()}")
-
-    if not Path(path).is_file():
-        raise ValueError("no such file")
-    with h5py.File(path, "r") as file:
-        file.visititems(check)
 
 
 _READERS: dict[str, Callable[[str], dict[str, Any]]] = {

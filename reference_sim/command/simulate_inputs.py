@@ -111,7 +111,7 @@ def read_obstacle(cloth: Cloth, options: Namespace) -> tuple[Obstacle | None, fl
 
     axes = {"units": options.units, "up": options.up}
     if options.obstacle.lower().endswith(TRAJECTORY_SUFFIXES):
-        moving = Trajectory.load(options.obstacle)
+        moving = Trajectory.load(options.obstacle, guarded=True)
         positions, faces = moving.positions, moving.faces
         dt = moving.dt if moving.frames > 1 else None
     else:

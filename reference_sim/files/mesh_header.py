@@ -38,7 +38,8 @@ def check_header(path: Path) -> None:
         return
     data = path.read_bytes()
     most, kind = dense * len(data), path.suffix.lower()
-    head, end, _ = data.partition(b"end_header") if kind == ".ply" else (data, b"", b"")
+    end = re.search(rb"^\s*end_header\s*$", data, re.MULTILINE) if kind == ".ply" else None  # in no comment
+    head = data[: end.start()] if end else data
     lines = list(re.finditer(pattern, head, re.MULTILINE | re.IGNORECASE))
     if (kind == ".ply" and not end) or (kind == ".off" and not lines):
         raise MeshError(f"{path}: cannot be read (its header does not end): {EXPORT_AGAIN}")

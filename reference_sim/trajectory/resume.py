@@ -20,6 +20,7 @@ import numpy as np
 
 from reference_sim.files.atomic_files import create
 from reference_sim.trajectory.trajectory import UNREADABLE_ERRORS, Trajectory, TrajectoryError, read_frames
+from reference_sim.trajectory.trial import try_out
 from reference_sim.trajectory.writer import BEFORE_LAST_STEP, END_OF_FILE, FIRST_FAILURE, UNFINISHED
 
 if TYPE_CHECKING:
@@ -61,8 +62,9 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
     if not path.exists():
         return None
     try:
-        with _opened(path) as file:
-            earlier = _whole_frames(file)
+        if wrong := try_out(path, read_whole_frames):
+            raise ValueError(wrong)
+        earlier = read_whole_frames(path)
     except UNREADABLE_ERRORS as error:
         raise TrajectoryError(
             f"{path}: nothing to resume: not a readable trajectory ({_one_line(error)}); "
@@ -74,6 +76,16 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
             f"{path}: holds {earlier.trajectory.frames} frames already, more than the {frames} asked for"
         )
     return earlier
+
+
+def read_whole_frames(path: Path) -> PartialRun:
+    """Read the frames of a file that are whole; its end may be cut off.
+
+    Raises:
+        UNREADABLE_ERRORS: one of these, for a file that is no trajectory or is damaged.
+    """
+    with _opened(path) as file:
+        return _whole_frames(file)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.array_file import MOST_PACKED
+from reference_sim.trajectory.trial import try_out
 from reference_sim.trajectory.writer import TrajectoryWriter
 
 if TYPE_CHECKING:
@@ -96,17 +97,21 @@ class Trajectory:
             writer.finish(self.status, self.reason)
 
     @classmethod
-    def load(cls, path: str | Path) -> Trajectory:
+    def load(cls, path: str | Path, *, guarded: bool = False) -> Trajectory:
         """Read a file of this project; an unfinished one gives its whole frames and status "unfinished".
+
+        Args:
+            path: the file.
+            guarded: whether a process of its own tries the file first, which takes some 0.2 s: for files
+                of others. A file can be made, or damaged, so that it crashes HDF5.
 
         Raises:
             TrajectoryError: missing file, or not a trajectory.
         """
-        import h5py
-
         try:
-            with h5py.File(path, "r") as file:
-                return read_frames(file)
+            if guarded and Path(path).is_file() and (wrong := try_out(Path(path), read_file)):
+                raise ValueError(wrong)
+            return read_file(Path(path))
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
         except UNREADABLE_ERRORS as error:
@@ -129,6 +134,18 @@ class Trajectory:
         """Return the frames before the first in which a position is not finite."""
         whole = np.isfinite(self.positions).all(axis=(1, 2))
         return self if whole.all() else self.first(int(np.argmin(whole)))
+
+
+def read_file(path: Path) -> Trajectory:
+    """Read all whole frames of a file.
+
+    Raises:
+        UNREADABLE_ERRORS: one of these, for a file that is no trajectory or is damaged.
+    """
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return read_frames(file)
 
 
 def read_frames(file: h5py.File, *, frames: int | None = None) -> Trajectory:

@@ -140,6 +140,24 @@ def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, capfd, name, text, mes
     assert printed.out == printed.err == ""
 
 
+def test_a_header_that_ends_in_a_comment_alone_does_not_end(tmp_path):
+    """The reader of meshes looks for a line of its own for ever."""
+    path = tmp_path / "mine.ply"
+    write_ply(path)
+    text = path.read_text(encoding="ascii")
+    path.write_text(text.replace("end_header\n", "comment end_header\n"), encoding="ascii")
+    with pytest.raises(MeshError, match="its header does not end"):
+        read_mesh(path)
+    path.write_text(text.replace("end_header\n", "comment end_header\nend_header\n"), encoding="ascii")
+    assert len(read_mesh(path).faces) == 1
+
+
+def write_ply(path):
+    head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    path.write_text(head + "0 0 0\n1 0 0\n0 0 1\n3 0 2 1\n", encoding="ascii")
+
+
 def test_a_sequence_follows_the_numbers_in_its_names(tmp_path):
     positions, faces = sphere(1)
     for k in (0, 2, 10, 1):

@@ -187,3 +187,16 @@ def test_pyvista_reads_it(tmp_path):
     mesh = reader.read()
     assert mesh.n_points == len(REST) and mesh.n_cells == len(FACES)
     np.testing.assert_array_equal(mesh.points, wave(3).positions[2])
+
+
+def test_a_tree_that_comes_back_to_itself_crashes_no_reader(tmp_path):
+    """HDF5 follows the tree of names until its stack is gone, which no exception tells."""
+    made, path = wave(), tmp_path / "round.vtkhdf"
+    made.save(path)
+    data = bytearray(path.read_bytes())
+    tree = data.rindex(b"TREE\0\0\1\0")  # of the group that was made last: the names of frame fields
+    data[tree + 5] = 1
+    data[tree + 32 : tree + 40] = tree.to_bytes(8, "little")
+    path.write_bytes(data)
+    with pytest.raises(TrajectoryError, match=r"round\.vtkhdf: not a VTKHDF trajectory"):
+        Trajectory.load(path, guarded=True)
