@@ -1,0 +1,198 @@
+"""Comparison of two runs: means of garments, single scenes, times, what is gone, what ended otherwise."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import pandas as pd
+
+from benchmarks.results.json_file import ResultsError
+from reports.comparison.change import (
+    BETTER,
+    GONE,
+    ONCE,
+    OTHER,
+    SPREADS,
+    TIME_TOLERANCE,
+    WORSE,
+    Change,
+    side,
+    size_of_means,
+    within_tolerance,
+)
+from reports.comparison.gone import CELL, endings, gone
+from reports.comparison.scenes import changed_scenes
+from reports.run.finished_run import SUITES, Metric, Run
+from reports.statistics.effects import DIFFERENCE, LEVEL, RATIO, Effect, effect
+from reports.statistics.means_and_spreads import Mean, means
+from reports.statistics.pareto import REPEATS, TIME, WHOLE
+from reports.statistics.relative_excess import relative_metric, with_relative_excess
+from reports.statistics.verdicts import effect_of, holm
+
+GROUP = ["place", "method", "metric"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Result of a comparison of two runs.
+
+    Attributes:
+        changes: what is gone and worse first.
+        compared: number of means.
+        one_seed: number of means that differ and cannot be judged, for they have one seed.
+        taken_once: method -> number of its times that differ and cannot be judged, for they were taken once.
+        added: number of values of the later run alone.
+    """
+
+    changes: tuple[Change, ...]
+    compared: int
+    one_seed: int
+    taken_once: dict[str, int]
+    added: int
+
+
+def compare(
+    one: Run, other: Run, metrics: str = "*", methods: str = "*", *, times: bool = True, shared: bool = False
+) -> Comparison:
+    """Compare two runs.
+
+    Args:
+        one: the earlier run.
+        other: the later run.
+        metrics: patterns joined by commas.
+        methods: likewise.
+        times: compare run times and memory too.
+        shared: leave out what the later run lacks; otherwise it is a change for the worse.
+
+    Raises:
+        ResultsError: where the presets differ or nothing is shared.
+    """
+    presets = [run.config.get("preset") for run in (one, other)]
+    if presets[0] != presets[1]:
+        raise ResultsError(f"A is of preset {presets[0]}, B of {presets[1]}: their numbers differ by design")
+    frames = [_chosen(run, methods) for run in (one, other)]
+    ended = endings(*frames)
+    of_metrics = [frame[_matching(frame["metric"], metrics)] for frame in frames]
+    lost = [] if shared else gone(*of_metrics)
+    keys = [frame.set_index(CELL).index for frame in of_metrics]
+    added = len(keys[1].difference(keys[0]))
+    kept = [frame[key.isin(rest)] for frame, key, rest in zip(of_metrics, keys, reversed(keys))]
+    if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
+        machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
+        kept = [frame[~frame["metric"].isin(machines)] for frame in kept]
+    if kept[0].empty:
+        raise ResultsError("the two runs share no such scene, method, seed and metric: nothing to compare")
+    judged, compared, one_seed, once = _means(one, *kept)
+    order = (GONE, WORSE, BETTER, OTHER)
+    changes = sorted([*lost, *ended, *judged], key=lambda change: order.index(change.verdict))
+    return Comparison(tuple(changes), compared, one_seed, once, added)
+
+
+def _chosen(run: Run, methods: str) -> pd.DataFrame:
+    """Return each cell once, with its garment or scene, and the range of repeats as a time's uncertainty."""
+    cases = run.frame[run.frame["case"] != ""].drop_duplicates(CELL)
+    frame = pd.concat([run.cells(*SUITES), cases], ignore_index=True)
+    frame = frame[(frame["status"] != "skipped") & _matching(frame["method"], methods)]
+    worn = (frame["suite"] == "garments") & (frame["garment"] != "")
+    frame = frame.assign(place=frame["garment"].where(worn, frame["scene"]))
+    cell = ["scene", "method", "seed"]
+    repeats = frame[frame["metric"] == REPEATS].set_index(cell)["value"] / 100.0
+    timed = frame["metric"].isin((TIME, WHOLE))
+    apart = repeats.reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell])).to_numpy()
+    frame.loc[timed, "uncertainty"] = frame.loc[timed, "value"] * apart
+    # Another run has another reference ensemble: uncertainties add up.
+    return frame[frame["metric"] != REPEATS].drop(columns="moved")
+
+
+def _matching(names: pd.Series, patterns: str) -> pd.Series:
+    chosen = [n for n in names.unique() if any(fnmatchcase(n, p.strip()) for p in patterns.split(","))]
+    return names.isin(chosen)
+
+
+def _means(run: Run, one: pd.DataFrame, other: pd.DataFrame) -> tuple[list[Change], int, int, dict[str, int]]:
+    """Return changes, number of means, of those of one seed that differ, and times taken once by method."""
+    rows = _over_the_same(*_with_known_zero(run, one, other))
+    first, second = (means(frame, *GROUP) for frame in rows)
+    differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
+    known = _metrics(run)
+    scales = rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median())
+    judged = [
+        (place, method, metric := known[name], mean, new, _effect(metric, new, mean))
+        for (place, method, name), (mean, new) in differ.items()
+        if not mean.seeded or mean.seeds > 1
+    ]
+    p_values = [far.p_value() for *_, far in judged]
+    corrected = iter(holm([p for p in p_values if p is not None]))
+    changes, once = [], Counter[str]()
+    for (place, method, metric, mean, new, far), alone in zip(judged, p_values):
+        p = None if alone is None else next(corrected)
+        if within_tolerance(metric, mean, new, far, float(scales[place, metric.name])):
+            continue
+        if metric.of == "machine" and mean.uncertainty is None and mean.seeds < 2:
+            if max(far.shown, 1.0 / far.shown) < ONCE:
+                once[method] += 1
+                continue
+        elif not _beyond_noise(metric, far, p):
+            continue
+        size = size_of_means(metric, mean, new, far, p)
+        changes.append(Change(side(metric, far.value), place, method, metric.name, size))
+    told = {(change.place, change.method, change.metric) for change in changes}
+    before, after = (frame[frame["place"] != frame["scene"]] for frame in rows)
+    garments = dict(zip(before["scene"], before["place"]))
+    of_scenes = changed_scenes(before, after, known)
+    changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in told]
+    return changes, len(first), len(differ) - len(judged), dict(once)
+
+
+def _with_known_zero(run: Run, *frames: pd.DataFrame) -> list[pd.DataFrame]:
+    """Return the frames with relative excesses by the first one's references in place of energies.
+
+    Of energies whose zero is a choice, in scenes whose reference and skinning the first frame has.
+    """
+    made = []
+    for frame in frames:
+        for metric in (metric for metric in run.metrics.values() if metric.arbitrary_zero):
+            frame = with_relative_excess(run, frame, metric.name, basis=frames[0])
+            excess = frame[frame["metric"] == relative_metric(metric.name).name]
+            covered = frame.set_index(CELL[:3]).index.isin(excess.set_index(CELL[:3]).index)
+            frame = frame[~(covered & (frame["metric"] == metric.name))]
+        made.append(frame)
+    return made
+
+
+def _metrics(run: Run) -> dict[str, Metric]:
+    """Return the metrics of the run by name, with that of each energy's relative excess among them."""
+    relative = (relative_metric(metric.name) for metric in run.metrics.values() if metric.arbitrary_zero)
+    return {**{metric.name: metric for metric in relative}, **run.metrics}
+
+
+def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
+    """Compute the effect of a change; of relative excess in points, of which 100 are skinning's excess."""
+    if metric.name.startswith("relative_excess/"):
+        return effect(new, before, DIFFERENCE, unit=100.0)
+    return effect(new, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, new, before)
+
+
+def _beyond_noise(metric: Metric, far: Effect, p: float | None) -> bool:
+    """Return whether a change is more than what another draw of seeds, or of times, would do."""
+    if metric.of == "machine":
+        low, high = far.interval or (far.shown, far.shown)
+        return far.scale == RATIO and (low > 1.0 + TIME_TOLERANCE or high < 1.0 / (1.0 + TIME_TOLERANCE))
+    if p is None:
+        return abs(far.above()) > SPREADS * far.uncertainty
+    return abs(far.above()) > far.uncertainty and p < LEVEL
+
+
+def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
+    """Return the usable rows of both, without cases, of scenes that have all seeds of their group."""
+    rows = [frame[frame["usable"] & (frame["case"] == "")] for frame in (one, other)]
+    keys = [frame.set_index(CELL).index for frame in rows]
+    rows = [frame[key.isin(rest)] for frame, key, rest in zip(rows, keys, reversed(keys))]
+    whole = [
+        frame.groupby([*GROUP, "scene"])["seed"].transform("nunique")
+        == frame.groupby(GROUP)["seed"].transform("nunique")
+        for frame in rows
+    ]
+    return [frame[full] for frame, full in zip(rows, whole)]
