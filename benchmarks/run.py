@@ -40,8 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return carry_out(plan, dry_run=options.dry_run)
 
 
-def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> int:
-    """Run the plan, or print what would be run; return the exit status."""
+def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, report: bool = True) -> int:
+    """Run the plan, or print what would be run; return the exit status. report: whether to make one."""
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     from benchmarks.runner.lock import HeldError, held
@@ -56,7 +56,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM) -> i
 
         assets = check_roll_outs(plan)
         with held(plan.folder), heeded_interrupts():
-            return execute(plan, assets)
+            return execute(plan, assets, report=report)
     except (HeldError, DeclarationError, RollOutError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2

@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
+import json
 import shlex
 import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from benchmarks.plan.options import add_scene_options
 from benchmarks.plan.plan import Plan
@@ -26,6 +30,7 @@ EXAMPLES = """examples:
   python -m benchmarks.score mine.pc2 --scene tshirt/kick --units cm --up z --match-vertices
   python -m benchmarks.score frames/ --scene hanging_sheet --fps 60 --declared-ms 2.2
   python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
+  python -m benchmarks.score mine.npz --scene tshirt/kick --json --no-report > numbers.json
   python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
 
 ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
@@ -65,6 +70,8 @@ def make_parser() -> argparse.ArgumentParser:
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
     reference.add_argument("--no-reference", action="store_true", help="leave out what needs a reference")
+    add("--no-report", action="store_true", help="make no figures, page and PDF, which takes longest")
+    add("--json", action="store_true", help="print all numbers as one JSON object in place of the line")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     return parser
 
@@ -75,7 +82,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one_thread()
     try:
         command = shlex.join(["python", "-m", PROGRAM, *command_line])
-        plan = plan_roll_out(make_parser().parse_args(command_line), command)
+        options = make_parser().parse_args(command_line)
+        plan = plan_roll_out(options, command)
     except (ValueError, OSError) as error:  # as in benchmarks.run
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -83,10 +91,55 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)
         return 130
     with contextlib.redirect_stdout(sys.stderr):
-        status = carry_out(plan, program=PROGRAM)
+        status = carry_out(plan, program=PROGRAM, report=not options.no_report)
     if status in (0, 1):
-        print(summary(plan))
+        print(json.dumps(numbers(plan), indent=1) if options.json else summary(plan))
     return status
+
+
+def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
+    """Evaluate a roll-out in a scene and return the numbers, without figures, page and PDF.
+
+    Args:
+        roll_out: a file, a folder or a pattern, as the command takes it.
+        *options: of the command, such as "--scene", "tshirt/kick".
+
+    Returns:
+        What `numbers` returns.
+
+    Raises:
+        ValueError: one line, where the roll-out cannot be read or does not belong to the scene.
+
+    >>> score("mine.npz", "--scene", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
+    0.031
+    """
+    plan = plan_roll_out(make_parser().parse_args([str(roll_out), *options]), "benchmarks.score.score")
+    message = io.StringIO()
+    with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(message):
+        status = carry_out(plan, program=PROGRAM, report=False)
+    if status not in (0, 1):
+        raise ValueError(message.getvalue().strip().splitlines()[-1])
+    return numbers(plan)
+
+
+def numbers(plan: Plan) -> dict[str, Any]:
+    """Return what was found of the roll-out, ready for JSON.
+
+    Returns:
+        name, scene, status ("ok" or the first other one), reason, metrics (name -> value and unit), folder.
+    """
+    folder, name = RunFolder(plan.folder), plan.cells[-1].method
+    rows = [row for row in folder.read_rows() if row.method == name]
+    bad = next((row for row in rows if row.status != "ok"), None)
+    known = (row for row in rows if row.value is not None)
+    return {
+        "name": name,
+        "scene": plan.scenes[0].name,
+        "status": bad.status if bad else "ok",
+        "reason": bad.reason if bad else "",
+        "metrics": {row.metric: {"value": row.value, "unit": row.unit} for row in known},
+        "folder": str(plan.folder),
+    }
 
 
 SUMMARY_METRICS = (
@@ -106,15 +159,18 @@ SUMMARY_METRICS = (
 
 def summary(plan: Plan) -> str:
     """Return one line of results, and where the rest is."""
-    folder, name = RunFolder(plan.folder), plan.cells[-1].method
-    rows = [row for row in folder.read_rows() if row.method == name]
-    values = {row.metric: row.value for row in rows if row.value is not None}
+    found = numbers(plan)
+    metrics = found["metrics"]
     shown = [
-        f"{word} {values[metric]:.4g} {unit}" for metric, word, unit in SUMMARY_METRICS if metric in values
+        f"{word} {metrics[metric]['value']:.4g} {unit}"
+        for metric, word, unit in SUMMARY_METRICS
+        if metric in metrics
     ]
-    bad = next((f"{row.status}: {row.reason}" for row in rows if row.status != "ok"), "")
+    bad = f"{found['status']}: {found['reason']}" if found["status"] != "ok" else ""
     results = ", ".join(filter(None, (bad, *shown)))
-    return f"{name} in {plan.scenes[0].name}: {results}; {folder.report_path}"
+    report = RunFolder(plan.folder).report_path
+    where = report if report.is_file() else plan.folder
+    return f"{found['name']} in {found['scene']}: {results}; {where}"
 
 
 if __name__ == "__main__":

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
 
 
-def execute(plan: Plan, assets: Assets | None = None) -> int:
-    """Run the plan, with its assets where they have been made.
+def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) -> int:
+    """Run the plan, with its assets where they have been made; then make its report unless that is unwanted.
 
     Returns 0 when all ended well, 1 when something failed or there is no report.
     """
@@ -46,7 +46,8 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     log.write_rows(rows)
     log.note_outcomes(runner)
-    answer = make_report(log)
+    log.note("finished", now())
+    answer = make_report(log) if report else ""
     print(summary(log.rows, log.stages, answer or ""), flush=True)
     failed = [row for row in log.rows if not accepted(row)]
     for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
@@ -58,7 +59,7 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
         print(line, file=sys.stderr)
     if looks := log.config["test_looks"]:
         print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
-    if answer is not None:
+    if report and answer is not None:
         print(log.folder.report_path.resolve(), flush=True)
     return 0 if answer is not None and not (failed or broken) else 1
 
@@ -106,7 +107,6 @@ def make_report(log: RunLog) -> str | None:
 
     A failure is one line and leaves the results.
     """
-    log.note("finished", now())
     try:
         with log.stage("report"):
             from reports.build import build_report

@@ -143,7 +143,9 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monk
     (tmp_path / "torn" / "run.json").write_text('{"command": ')
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("benchmarks.runner.execute_plan.execute", lambda *_: pytest.fail("the run was begun"))
+    monkeypatch.setattr(
+        "benchmarks.runner.execute_plan.execute", lambda *_, **__: pytest.fail("the run was begun")
+    )
     assert run.main(words) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and hint in err

@@ -91,6 +91,23 @@ def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path,
     assert (tmp_path / "out" / "report.pdf").stat().st_size > 1000
 
 
+def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, capsys):
+    files = [str(made.trajectory_path("hanging_sheet", name)) for name in ("newton-1", "simulation")]
+    words = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "--reference", files[1]]
+    printed = ["--json", "--no-report", "-o", str(tmp_path / "out")]
+    assert score.main([files[0], *words, *printed]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["name"], said["scene"], said["status"]) == ("mine", "hanging_sheet", "ok")
+    strain = numbers(made, "newton-1")["energy/strain"]
+    assert said["metrics"]["energy/strain"] == {"value": strain, "unit": "J"}
+    assert not (tmp_path / "out" / "report.pdf").exists() and (tmp_path / "out" / "results.csv").is_file()
+    returned = score.score(files[0], *words, "-o", str(tmp_path / "again"))
+    assert returned["metrics"]["energy/strain"]["value"] == strain
+    with pytest.raises(ValueError, match="no such file"):
+        score.score(tmp_path / "absent.npz", *words, "-o", str(tmp_path / "none"))
+    assert not (tmp_path / "none").exists()
+
+
 def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_path, capsys):
     simulated = str(made.trajectory_path("hanging_sheet", "simulation"))
     cloth = Trajectory.load(simulated)

@@ -138,7 +138,7 @@ def test_the_device_reaches_what_trains_and_nothing_else(tmp_path, monkeypatch):
 
 @pytest.fixture
 def without_report(monkeypatch):
-    monkeypatch.setattr(execution, "make_report", lambda log: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: "")
 
 
 def test_a_run_measures_in_a_process_of_its_own_and_reuses_the_rows(tmp_path, without_report):

@@ -150,7 +150,7 @@ def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
 @pytest.mark.slow
 def test_a_run_on_clusters_of_one_and_two_is_that_of_this_machine(tmp_path, monkeypatch):
     """Bit for bit, but for times: ground truth, a network, frames, metrics."""
-    monkeypatch.setattr(execution, "make_report", lambda log: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: "")
     words = ["--preset", "smoke", "--suite", "garments", "--split", "validation"]
     words += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
     assert run.main([*words, "-o", str(tmp_path / "0")]) == 0

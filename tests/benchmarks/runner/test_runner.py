@@ -45,7 +45,7 @@ with held(Path(sys.argv[1])):
 
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
-    monkeypatch.setattr(execution, "make_report", lambda log: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: "")
 
 
 def words_of(folder: Path, *methods: str) -> list[str]:
@@ -58,7 +58,7 @@ def words_of(folder: Path, *methods: str) -> list[str]:
 def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     words, answers = words_of(tmp_path / "run", "simulation"), []
 
-    def execute(plan, assets):
+    def execute(plan, assets, *, report):
         if len(answers) == 0:
             answers.append(None)
             answers.append(run.main(words))
@@ -78,7 +78,7 @@ def test_a_killed_run_holds_its_folder_no_longer(tmp_path, monkeypatch):
         cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE,
     )  # fmt: skip
     assert process.stdout is not None and process.stdout.readline() == b"held\n"
-    monkeypatch.setattr(execution, "execute", lambda plan, assets: 0)
+    monkeypatch.setattr(execution, "execute", lambda plan, assets, **_: 0)
     assert run.main(words_of(tmp_path, "simulation")) == 2
     process.kill()
     process.wait()

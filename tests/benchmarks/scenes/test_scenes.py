@@ -159,7 +159,7 @@ TRAININGS = {"snug", "snug.recipes", "snug.recipes.recipe", "snug.recipes.named"
 def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
     out = tmp_path / "run"
     words = ["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1"]
-    monkeypatch.setattr("benchmarks.runner.execute_plan.make_report", lambda log: True)
+    monkeypatch.setattr("benchmarks.runner.execute_plan.make_report", lambda log: "")
     assert main([*words, "-o", str(out)]) == 0
     for method in ("simulation", "newton-1"):
         record = json.loads((out / "cache" / "cell" / "hanging_sheet" / f"{method}.json").read_text())

@@ -484,7 +484,7 @@ def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
         time.sleep(0.05)
     before = entry.read_bytes()
 
-    monkeypatch.setattr(execution, "make_report", lambda log: True)
+    monkeypatch.setattr(execution, "make_report", lambda log: "")
     assert run.main(words) == 0
     assert entry.read_bytes() == before
     first = RunFolder(out).read_rows()
