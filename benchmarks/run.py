@@ -44,6 +44,8 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
     """Run the plan, or print what would be run; return the exit status. report: whether to make one."""
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
+    for name, text in plan.cut_motions.items():
+        print(f"motion {name}: {text} are measured; --frames measures more", file=sys.stderr)
     from benchmarks.runner.lock import HeldError, held
 
     try:

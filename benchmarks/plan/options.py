@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from snug.garments.options import add_garment_options, demand_garment_file, make
 from snug.motion.options import add_motion_options, parse_motion_options
 
 PROGRAM = "benchmarks.run"
+LEAST_FRAMES = 3  # inertia needs two frames before
 EXAMPLES = """examples:
   python -m benchmarks.run                                    the quick run: every suite's quick subset
   python -m benchmarks.run --preset smoke                     everything once, tiny, about 3 minutes
@@ -111,6 +113,8 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
     add("--motions", action="append", default=[], metavar="PATH",
         help="motion file (.npz, .bvh, .amc with .asf), folder, or the word library; repeatable")  # fmt: skip
     add_motion_options(add)
+    add("--frames", type=int, metavar="N",
+        help="measure at most N frames of a motion, at 30 a second (default: the preset's)")  # fmt: skip
     add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
     add("--validation-motions", action="append", default=[], metavar="NAME,...",
         help="motions to choose recipes by; neither these nor those to test on train")  # fmt: skip
@@ -162,8 +166,13 @@ def scene_fields(options: argparse.Namespace) -> dict[str, Any]:
         demand_garment_file(options)
     else:
         garment = make_garment_file(options.garment, options)
+    preset = find_preset(options.preset)
+    if options.frames is not None:
+        if options.frames < LEAST_FRAMES:
+            raise PlanError(f"--frames {options.frames}: give {LEAST_FRAMES} or more")
+        preset = replace(preset, frames=options.frames)
     return {
-        "preset": find_preset(options.preset),
+        "preset": preset,
         "motions": tuple(options.motions),
         "motion_options": parse_motion_options(options),
         "test_motions": split(options.test_motions),

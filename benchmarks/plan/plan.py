@@ -177,6 +177,16 @@ class Plan:
         learning = (network for network in self.networks if network.learns_from_simulation)
         return tuple(dict.fromkeys(network.garment for network in learning))
 
+    @property
+    def cut_motions(self) -> dict[str, str]:
+        """Motion of a user's file -> which of its frames are measured, where these are not all."""
+        most = self.preset.frames
+        return {
+            name: f"the first {most} of {motion.frames} frames"
+            for name, motion in self.inputs.motions.items()
+            if name in self.motions.measured and motion.frames > most
+        }
+
     def open_assets(self) -> Assets:
         """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
         from benchmarks.assets.assets import embedded_motions, open_assets  # loads numpy

@@ -58,6 +58,7 @@ class RunLog:
                     ("test", plan.motions.test_of),
                 )
             },
+            "cut_motions": plan.cut_motions,
             "split": plan.motions.split,
             "body": [body.path.name, body.digest] if body else "of the package",
             "garment": [garment.file.path.name, garment.digest] if garment else "tailored",

@@ -8,7 +8,9 @@ import pytest
 
 from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan.choose_cells import Selection, choose_cells
+from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motion_split import split_motions
+from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import Motions, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.validation.stress.cases import MAPS
@@ -220,3 +222,21 @@ def test_motions_are_divided_as_help_says():
     ):
         with pytest.raises(PlanError, match=said):
             split_motions(clips, preset=quick, **words)
+
+
+def test_own_clips_that_are_cut_are_named_and_frames_measures_more(tmp_path):
+    import numpy as np
+
+    poses = np.zeros((200, 24, 3))
+    np.savez(
+        tmp_path / "long.npz", poses=poses.reshape(200, 72), trans=np.zeros((200, 3)), mocap_framerate=30.0
+    )
+
+    def plan_of(*words: str):
+        line = ["--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *words]
+        return make_plan(request_of_run(make_parser().parse_args(line), line))
+
+    assert plan_of().cut_motions == {"long": "the first 150 of 200 frames"}
+    assert plan_of("--frames", "200").cut_motions == {} and plan_of("--frames", "180").preset.frames == 180
+    with pytest.raises(PlanError, match="--frames 2: give 3 or more"):
+        plan_of("--frames", "2")
