@@ -37,7 +37,7 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
         heading = f"{column.title} [{column.unit_above}]" if column.unit_above else column.title
         texts.append([heading, *(cell["text"].strip() + _marks(cell) for cell in found)])
         if any(isinstance(cell, Effect) and cell.interval for cell in cells):
-            texts.append(["interval", *(cell["spread"] or DASH for cell in found)])
+            texts.append(["Interval", *(cell["spread"] or DASH for cell in found)])
     return [list(line) for line in zip(*(column for column in texts if set(column[1:]) - {DASH}))]
 
 

@@ -26,7 +26,7 @@ def small_table() -> Table:
 
 def test_an_interval_has_a_column_of_its_own_and_empty_columns_are_left_out():
     head, snug, skinning = text_rows(RUN, small_table())
-    assert head == ["Method", "Excess [%]", "interval", "Total [J]"]
+    assert head == ["Method", "Excess [%]", "Interval", "Total [J]"]
     assert snug[0] == "SNUG" and " to " in snug[2] and "±" not in snug[3] and snug[3] == "0.250"
     assert skinning == ["skinning", "–", "–", "–"]
 
