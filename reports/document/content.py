@@ -24,7 +24,7 @@ def content(report: Report) -> dict[str, Any]:
     run = report.run
     sections = _sections(report)
     return {
-        "title": "Neural garments beside a converged solver",
+        "title": "Neural garments versus a reference solver",
         "subtitle": report.subtitle,
         "changed": changed_files(run),
         "size": _size(run.config),

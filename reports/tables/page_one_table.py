@@ -15,6 +15,7 @@ from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, metric_column, table
 
 ROWS = 8
+NAMED = 4  # scenes that a caption names
 ANSWERS = ("penetration/vertices", "dynamics/amplitude", "dynamics/correlation")
 GAP = "gap/energy"
 
@@ -64,8 +65,9 @@ def overview(run: Run) -> list[Table]:
     columns = [columns[k - 1] for k in kept]
     if not columns:
         return []
-    caption = f"{garment}: means over its motions" if garment else f"Means over {', '.join(scenes)}"
-    caption += f"; gaps and run times over {', '.join(scenes)}." if garment and scenes else "."
+    timed_in = ", ".join(scenes) if len(scenes) <= NAMED else f"{len(scenes)} scenes"
+    caption = f"{garment}: means over its motions" if garment else f"Means over {timed_in}"
+    caption += f"; gaps and run times over {timed_in}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)
 
