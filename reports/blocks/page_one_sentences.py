@@ -60,12 +60,12 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     count = len(excess.by_motion)
     motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
     text = (
-        f"On {motions} the relative excess energy of {run.label(first)}, the share of skinning's excess over "
-        f"the reference solver that is left, is {_share(excess)}: {_stands(excess)}"
+        f"On {motions} {run.label(first)} has a relative excess energy of {_share(excess)}, where the "
+        f"reference solver has 0 % and skinning alone 100 %: {_stands(excess)}"
     )
     beside = published_beside(run, first)
     text += f" ({beside})" if beside else ""
-    text += "".join(f"; of {run.label(name)} {_share(known[name])}" for name in others)
+    text += "".join(f"; {run.label(name)} has {_share(known[name])}" for name in others)
     if count > 1:
         scene, worst = excess.worst
         low, high = (number(share, 2) for share in excess.without_each_motion)
@@ -86,7 +86,7 @@ def _share(excess: Excess) -> str:
 def _stands(excess: Excess) -> str:
     """Say how the method stands to the reference."""
     stands = standing(excess.effect, excess.effect.p_value())
-    words = {TIED: "a tie with it", MORE: "more energy than it has", LESS: "less energy than it has"}
+    words = {TIED: "a tie", MORE: "more energy than the reference", LESS: "less energy than the reference"}
     return words.get(stands, "inconclusive")
 
 
