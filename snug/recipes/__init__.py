@@ -9,8 +9,8 @@
 
 >>> from dataclasses import replace
 >>> from snug.recipes import DEFAULT, find_recipe
->>> find_recipe("paper").learning_rate, DEFAULT.learning_rate
-(0.001, 0.002)
+>>> find_recipe("paper").pose_input, DEFAULT.pose_input
+('axis_angle', 'six')
 >>> replace(DEFAULT, name="longer", window=6, batch=8).window
 6
 """
