@@ -159,18 +159,18 @@ SUMMARY_METRICS = (
 
 def summary(plan: Plan) -> str:
     """Return one line of results, and where the rest is."""
-    found = numbers(plan)
-    metrics = found["metrics"]
+    result = numbers(plan)
+    metrics = result["metrics"]
     shown = [
         f"{word} {metrics[metric]['value']:.4g} {unit}"
         for metric, word, unit in SUMMARY_METRICS
         if metric in metrics
     ]
-    bad = f"{found['status']}: {found['reason']}" if found["status"] != "ok" else ""
+    bad = f"{result['status']}: {result['reason']}" if result["status"] != "ok" else ""
     results = ", ".join(filter(None, (bad, *shown)))
     report = RunFolder(plan.folder).report_path
     where = report if report.is_file() else plan.folder
-    return f"{found['name']} in {found['scene']}: {results}; {where}"
+    return f"{result['name']} in {result['scene']}: {results}; {where}"
 
 
 if __name__ == "__main__":

@@ -1,1 +1,1 @@
-"""What changed from one run to another beyond the noise of both."""
+"""Changes from one run to another that exceed the noise of both."""

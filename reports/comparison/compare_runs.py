@@ -138,11 +138,11 @@ def _means(run: Run, one: pd.DataFrame, other: pd.DataFrame) -> tuple[list[Chang
             continue
         size = size_of_means(metric, mean, new, far, p)
         changes.append(Change(side(metric, far.value), place, method, metric.name, size))
-    told = {(change.place, change.method, change.metric) for change in changes}
+    reported = {(change.place, change.method, change.metric) for change in changes}
     before, after = (frame[frame["place"] != frame["scene"]] for frame in rows)
     garments = dict(zip(before["scene"], before["place"]))
     of_scenes = changed_scenes(before, after, known)
-    changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in told]
+    changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
     return changes, len(first), len(differ) - len(judged), dict(once)
 
 

@@ -1,4 +1,4 @@
-"""What the earlier run has and the later one lacks, and what ended well in one of them alone."""
+"""Losses from one run to another: rows that are gone, and cells that ended well in one run alone."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Changes of single scenes of a garment: what a mean over its motions hides.
+"""Changes of single scenes of a garment, which a mean over its motions hides.
 
 A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter is
 pooled over all scenes of the method, and a scene that scatters more has its own. The test is Student's with
-the pooled degrees of freedom, corrected by Bonferroni for all of these tests. What has no seeds is compared
-with the uncertainty that the reference's ensemble leaves.
+the pooled degrees of freedom, corrected by Bonferroni for all of these tests. A method without seeds is
+compared with the uncertainty that the reference's ensemble leaves.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Difference:
         before: mean over seeds in the earlier run.
         after: mean over seeds in the later run.
         far: difference on the scale: of logarithms where all values are positive, else plain.
-        least: what is no change on that scale.
+        least: largest difference on that scale that is no change.
         error: standard error; 0 without seeds.
         freedom: degrees of freedom of the error.
     """
@@ -57,14 +57,14 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     """
     from scipy import stats
 
-    found: list[Difference] = []
+    differences: list[Difference] = []
     later = dict(list(other.groupby(["method", "metric"], sort=False)))
     for (method, name), rows in one.groupby(["method", "metric"], sort=False):
         if metrics[name].of != "machine":
-            found += _differences(method, metrics[name], rows, later[method, name])
-    tests = sum(d.error > 0.0 for d in found)
+            differences += _differences(method, metrics[name], rows, later[method, name])
+    tests = sum(difference.error > 0.0 for difference in differences)
     changes = []
-    for d in found:
+    for d in differences:
         reach = 0.0
         if d.error > 0.0:
             reach = d.error * float(stats.t.isf(LEVEL / 2.0 / tests, d.freedom))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from reports.run.finished_run import Run
 from reports.statistics.effects import RATIO
@@ -14,55 +15,57 @@ HEAD = ["Claim", "Measure", "First", "Claimed", "Second", "Effect", "Interval", 
 NOT_MEASURED = "not measured"
 
 
-def claim_rows(runs: Sequence[tuple[str, Run]], *, primary: bool) -> list[list[str]]:
-    """Return a heading and a row of each claim, judged by the first run that has both of its methods.
+@dataclass(frozen=True)
+class JudgedClaims:
+    """Claims as several runs judge them.
 
-    Args:
-        runs: (name, run), in the order in which they are asked.
-        primary: of the primary family, else the exploratory claims.
+    Attributes:
+        verdicts: claim -> name of the first run that has both of its methods, and the claim as it came out.
+        labels: method -> its name for people.
     """
-    found = _judged(runs)
-    claims = PRIMARY if primary else EXPLORATORY
-    return [HEAD, *(_row(claim, runs, found.get(claim)) for claim in claims)]
+
+    verdicts: Mapping[Claim, tuple[str, Judged]]
+    labels: Mapping[str, str]
 
 
-def claim_counts(runs: Sequence[tuple[str, Run]]) -> str:
+def judge_in_first(runs: Sequence[tuple[str, Run]]) -> JudgedClaims:
+    """Judge each claim by the first of these (name, run) that has both of its methods."""
+    verdicts: dict[Claim, tuple[str, Judged]] = {}
+    labels: dict[str, str] = {}
+    for name, run in runs:
+        for line in judged(run):
+            verdicts.setdefault(line.claim, (name, line))
+        labels = {method: run.label(method) for method in run.methods} | labels
+    return JudgedClaims(verdicts, labels)
+
+
+def claim_rows(claims: JudgedClaims, *, primary: bool) -> list[list[str]]:
+    """Return a heading and a row of each claim, judged or not: of the primary family, or exploratory."""
+    return [HEAD, *(_row(claim, claims) for claim in (PRIMARY if primary else EXPLORATORY))]
+
+
+def claim_counts(claims: JudgedClaims) -> str:
     """Return how many claims came out how, the primary ones first."""
-    found = _judged(runs)
     lines = []
-    for name, claims in (("Primary", PRIMARY), ("Exploratory", EXPLORATORY)):
-        counts = Counter(found[claim][1].verdict for claim in claims if claim in found)
-        absent = len(claims) - counts.total()
-        words = ", ".join(
-            part for part in (in_words(counts), f"not measured {absent}" * bool(absent)) if part
-        )
-        lines.append(f"{name} claims: {words}.")
+    for name, family in (("Primary", PRIMARY), ("Exploratory", EXPLORATORY)):
+        counts = Counter(claims.verdicts[claim][1].verdict for claim in family if claim in claims.verdicts)
+        absent = len(family) - counts.total()
+        texts = [in_words(counts), f"{NOT_MEASURED} {absent}" if absent else ""]
+        lines.append(f"{name} claims: {', '.join(filter(None, texts))}.")
     return "\n".join(lines)
 
 
-def _judged(runs: Sequence[tuple[str, Run]]) -> dict[Claim, tuple[str, Judged]]:
-    found: dict[Claim, tuple[str, Judged]] = {}
-    for name, run in runs:
-        for line in judged(run):
-            found.setdefault(line.claim, (name, line))
-    return found
-
-
-def _row(claim: Claim, runs: Sequence[tuple[str, Run]], found: tuple[str, Judged] | None) -> list[str]:
-    methods = [_label(runs, claim.lower), claim.relation, _label(runs, claim.higher)]
-    if found is None:
+def _row(claim: Claim, claims: JudgedClaims) -> list[str]:
+    lower, higher = (claims.labels.get(method, method) for method in (claim.lower, claim.higher))
+    methods = [lower, claim.relation, higher]
+    if claim not in claims.verdicts:
         return [claim.says, claim.metric, *methods, DASH, DASH, DASH, NOT_MEASURED, DASH]
-    name, line = found
+    name, line = claims.verdicts[claim]
     far = line.compared.effect
     effect, interval = DASH, DASH
     if far is not None:
-        sign = "×" if far.scale == RATIO else ""
-        effect = sign + number(far.shown)
+        effect = ("×" if far.scale == RATIO else "") + number(far.shown)
         interval = " to ".join(number(end) for end in far.interval or ()) or DASH
     p = DASH if line.p is None else number(line.p, 2)
-    found_by = [effect, interval, p, line.verdict + line.remark, name]
-    return [claim.says, line.compared.metric.heading, *methods, *found_by]
-
-
-def _label(runs: Sequence[tuple[str, Run]], method: str) -> str:
-    return next((run.label(method) for _, run in runs if method in run.methods), method)
+    outcome = [effect, interval, p, line.verdict + line.remark, name]
+    return [claim.says, line.compared.metric.heading, *methods, *outcome]

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 
 BEGIN, END = "<!-- generated: {} -->", "<!-- end of generated -->"
-_PART = re.compile(r"(<!-- generated: (.+?) -->\n)(.*?)(<!-- end of generated -->)", re.S)
+_PART = re.compile(rf"({BEGIN.format('(.+?)')}\n)(.*?)({END})", re.S)
 
 
 def fill(document: str, generate: Callable[[str], str]) -> str:

@@ -1,4 +1,4 @@
-"""What a generated part can be: sentences of page one, a table of a run, the claims of the paper.
+"""Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
 `headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN,
 ...`, `counts of RUN, ...`; RUN is a folder of reports/published.
@@ -16,7 +16,7 @@ from reports.run.reading import read_run_with_trainings
 from reports.statistics.published import PUBLISHED
 from reports.tables import make_tables
 from reports.tables.table import Table
-from reports.text.claim_rows import claim_counts, claim_rows
+from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 
 FORMS = (
@@ -42,11 +42,15 @@ def published_part(words: str) -> str:
         rows = text_rows(run, tables[name], wanted)
         return "\n\n".join(filter(None, [markdown_table(rows), remarks_on(rows)]))
     if kind == "claims":
-        rows = claim_rows([(folder.name, _read(folder)[0]) for folder in folders], primary=name == "primary")
-        return markdown_table(rows)
+        return markdown_table(claim_rows(_claims(*folders), primary=name == "primary"))
     if kind == "counts":
-        return claim_counts([(folder.name, _read(folder)[0]) for folder in folders])
+        return claim_counts(_claims(*folders))
     raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
+
+
+@cache
+def _claims(*folders: Path) -> JudgedClaims:
+    return judge_in_first([(folder.name, _read(folder)[0]) for folder in folders])
 
 
 @cache

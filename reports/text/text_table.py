@@ -33,11 +33,11 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
     texts: list[list[str]] = []
     for place in (places[name] for name in columns or places):
         column, cells = table.columns[place], [row[place] for row in table.rows]
-        found = column_texts(run, column, cells, [])
+        printed = column_texts(run, column, cells, [])
         heading = f"{column.title} [{column.unit_above}]" if column.unit_above else column.title
-        texts.append([heading, *(cell["text"].strip() + _marks(cell) for cell in found)])
+        texts.append([heading, *(cell["text"].strip() + _marks(cell) for cell in printed)])
         if any(isinstance(cell, Effect) and cell.interval for cell in cells):
-            texts.append(["Interval", *(cell["spread"] or DASH for cell in found)])
+            texts.append(["Interval", *(cell["spread"] or DASH for cell in printed)])
     return [list(line) for line in zip(*(column for column in texts if set(column[1:]) - {DASH}))]
 
 

@@ -56,7 +56,7 @@ def test_a_seed_among_those_published_is_reproduced_and_one_far_off_is_not(publi
 
 
 def test_the_interval_is_that_of_one_more_seed(publish):
-    """Of seeds drawn alike, 95 % lie in it."""
+    """The interval holds 95 % of seeds that are drawn like the published ones."""
     generator = np.random.default_rng(0)
     inside = 0
     drawn = np.sinh(np.arcsinh(5.0) + 0.1 * generator.standard_normal((200, 4)))
