@@ -176,12 +176,13 @@ def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
     """Read the first rows of a dataset, by default all, once their size is that of what is stored.
 
     Raises:
-        ValueError: it declares more numbers than it holds, or no plain numbers.
+        ValueError: it declares more numbers than its file can hold, or no plain numbers.
     """
     rows = len(dataset) if rows is None else rows
     if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
         raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
     size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
-    if size > MOST_PACKED * dataset.id.get_storage_size() + ALWAYS_READ:
-        raise ValueError(f"{dataset.name} declares {size} bytes, more than it holds")
+    # Of the file and not of the dataset, whose index a kill may have left ahead of the whole frames.
+    if size > MOST_PACKED * dataset.file.id.get_filesize() + ALWAYS_READ:
+        raise ValueError(f"{dataset.name} declares {size} bytes, more than its file can hold")
     return dataset[:rows]

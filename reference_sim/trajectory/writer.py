@@ -18,6 +18,10 @@ UNFINISHED = "unfinished"  # status of a file whose writer did not end by itself
 # Where the writer keeps what a resumed run needs.
 BEFORE_LAST_STEP, FIRST_FAILURE = "before_last_step", "first_failure"
 END_OF_FILE = slice(40, 48)  # of the superblock (version 0): where HDF5 believes the file to end
+# An index of blocks in the format of HDF5 1.10 grows at its end. In the format before it is a tree whose
+# nodes are split, and between two writes of a split no frame can be read. The file itself is made in the
+# format before: in that of 1.10 it notes that it is open for writing, and after a kill could not be opened.
+INDEX_THAT_GROWS = ("v110", "v110")
 ROOM_FOR_HDF5 = 1 << 20  # [bytes] that HDF5 may need beside the numbers of a frame
 
 
@@ -70,7 +74,8 @@ class TrajectoryWriter:
         create(path)
         try:
             reserve(path, 16 * numbers + ROOM_FOR_HDF5)
-            self._file = h5py.File(path, "w")
+            h5py.File(path, "w").close()
+            self._file = h5py.File(path, "r+", libver=INDEX_THAT_GROWS)
             self._reserve(numbers)
         except OSError:
             path.unlink()
@@ -170,7 +175,7 @@ class TrajectoryWriter:
         self._close(self._part)
         os.replace(self._part, self.path)
         self._part = None
-        self._file = h5py.File(self.path, "r+")
+        self._file = h5py.File(self.path, "r+", libver=INDEX_THAT_GROWS)
 
     def go_live(self) -> None:
         """Flush every frame from now on; the file is put in place with what it holds."""

@@ -312,7 +312,7 @@ def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_
     with h5py.File(tmp_path / "a.vtkhdf", "r+") as file:
         del file["VTKHDF/Points"]
         file.create_dataset("VTKHDF/Points", (10**12, 3), chunks=(10**4, 3), dtype="f8")
-    with pytest.raises(RollOutError, match="more than it holds"):
+    with pytest.raises(RollOutError, match="more than its file can hold"):
         read_roll_out(tmp_path / "a.vtkhdf")
 
 

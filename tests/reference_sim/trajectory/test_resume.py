@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import subprocess
@@ -15,6 +16,7 @@ import pytest
 
 from reference_sim import Cloth, Material, Obstacle, Trajectory, TrajectoryError, TrajectoryWriter, simulate
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Gravity, StretchStVK
+from reference_sim.trajectory.writer import INDEX_THAT_GROWS
 from tests.reference_sim.meshes import grid, sphere
 
 FRAMES = 7
@@ -197,6 +199,47 @@ def test_killed_while_it_writes_nothing_else_than_frames(tmp_path):
     assert held.frames > 1
     np.testing.assert_array_equal(held.positions, np.arange(600.0).reshape(200, 3) + k[:, None, None])
     np.testing.assert_array_equal(held.frame_fields["energy/strain"], k)
+
+
+class Recorded(io.RawIOBase):
+    """File for HDF5 that keeps each write, (offset, bytes), in its order."""
+
+    def __init__(self, path):
+        self.file, self.writes = open(path, "r+b"), []  # noqa: SIM115 (HDF5 keeps it)
+
+    def write(self, data):
+        self.writes.append((self.file.tell(), bytes(data)))
+        return self.file.write(data)
+
+    def __getattribute__(self, name):
+        if name in ("seek", "tell", "readinto", "truncate", "flush"):
+            return getattr(self.file, name)
+        return super().__getattribute__(name)
+
+
+def test_killed_between_any_two_writes_of_hdf5(tmp_path):
+    """An index of 64 blocks is split between the frames that are appended: its parts are written in turn."""
+    path, copy = tmp_path / "run.vtkhdf", tmp_path / "killed.vtkhdf"
+    x = np.arange(30.0).reshape(10, 3)
+    with TrajectoryWriter(path, np.array([[0, 1, 2]]), {}, vertex_count=10) as writer:
+        for k in range(60):
+            writer.append(x + k, 0.1 * k, 1.0, {"energy/strain": 1.0 * k})
+        writer._file.close()
+        killed = bytearray(path.read_bytes())
+        recorded = Recorded(path)
+        writer._file = h5py.File(recorded, "r+", libver=INDEX_THAT_GROWS)
+        whole = []  # frames that are whole before each write
+        for k in range(60, 68):
+            writer.append(x + k, 0.1 * k, 1.0, {"energy/strain": 1.0 * k})
+            whole += [k] * (len(recorded.writes) - len(whole))
+    recorded.file.close()
+    assert len(recorded.writes) > 100
+    for (start, data), frames in zip(recorded.writes, whole, strict=False):
+        killed[start : start + len(data)] = data
+        copy.write_bytes(killed)
+        held = Trajectory.load(copy)
+        assert frames <= held.frames <= frames + 1
+        np.testing.assert_array_equal(held.positions, x + np.arange(held.frames)[:, None, None])
 
 
 def test_of_a_file_cut_short_the_whole_frames_are_saved(tmp_path, unbroken):
