@@ -150,7 +150,7 @@ SUMMARY_METRICS = (
     ("gap/energy", "gap", "J"),
     ("curvature/mean", "curvature", "1/m"),
     ("curvature/error", "curvature error", "1/m"),
-    ("penetration/vertices", "penetration", "%"),
+    ("penetration/surface", "penetration", "%"),
     ("distance/rms", "distance", "mm"),
     ("surface/chamfer", "Chamfer distance", "mm"),
     ("surface/normals", "angle of normals", "deg"),

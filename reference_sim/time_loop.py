@@ -82,8 +82,8 @@ def simulate(
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the first other status; a
         frame that is not finite ends it. frame_fields: iterations, factorisations, gradient_norm (relative
-        residual, see `Result`), converged (0/1), relaxed (1 where round-off excused a residual above the
-        tolerance; the reason tells of the first), energy/<term> [J].
+        residual, see `Result`), converged (0/1), relaxed (1 where the residual is within the tolerance up to
+        round-off alone; the reason tells of the first), energy/<term> [J].
 
     Raises:
         ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, a step of no size, a

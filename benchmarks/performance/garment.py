@@ -37,7 +37,7 @@ def measure(settings: Settings, *, motion: str, vertices: int) -> dict[str, floa
         medians.append(np.median(trajectory.frame_seconds[1:]))
         worst.append(trajectory.frame_seconds.max())
     fields = trajectory.frame_fields
-    depth = penetration([trajectory.positions], scene.obstacle)[0].depth
+    depth = penetration([trajectory.positions], [trajectory.faces], scene.obstacle)[0].depth
     return {
         "vertices": scene.cloth.vertex_count,
         "frame": 1e3 * float(np.median(medians)),

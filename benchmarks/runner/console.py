@@ -16,7 +16,7 @@ COLUMNS = (
     ("gap/energy", "gap J"),
     ("curvature/error", "dH 1/m"),
     ("distance/rms", "rms mm"),
-    ("penetration/vertices", "inside %"),
+    ("penetration/surface", "inside %"),
     ("cost/frame", "ms/frame"),
     ("cost/train", "train s"),
 )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
 LOG_EVERY = 20  # training steps between two reports of progress
-CHECKPOINT_MINUTES = 5.0  # between two checkpoints: a training of preset quick is over before the first
+CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

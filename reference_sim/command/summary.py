@@ -43,7 +43,9 @@ def summarise(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int)
         converged, worst = int(fields["converged"][1:].sum()), np.nanmax(fields["gradient_norm"])
         lines[0] += f"; {converged} of {frames - 1} steps converged, worst relative residual {worst:.1e}"
     if (relaxed := int(fields["relaxed"].sum())) and trajectory.status == "converged":
-        lines.append(f"round-off  {relaxed} frames above the tolerance, first {trajectory.reason}")
+        lines.append(
+            f"round-off  {relaxed} frames within tolerance up to round-off alone, first {trajectory.reason}"
+        )
     if trajectory.status != "converged":
         lines.append(f"first not  {trajectory.status}: {trajectory.reason}")
     if trajectory.frames > 1:

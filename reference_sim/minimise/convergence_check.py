@@ -14,7 +14,12 @@ LAST_SHIFT = 1e12  # in units of M/dt^2
 
 
 def convergence_check(
-    run: FactorisedDescent, data: np.ndarray, *, tolerance: float, step_tolerance: float
+    run: FactorisedDescent,
+    data: np.ndarray,
+    *,
+    tolerance: float,
+    step_tolerance: float,
+    round_off: float = 0.0,
 ) -> Stop | None:
     """Return "converged", "stalled" on a saddle, or None to go on, where the gradient of `run` is small.
 
@@ -26,12 +31,15 @@ def convergence_check(
         data: (nnz,) values of its true Hessian.
         tolerance: relative residual [1]; above it, round-off excuses the residual.
         step_tolerance: largest Newton step [m] that counts as none.
+        round_off: of the residual [1]; where it is above the tolerance, the reason says so.
     """
     residual = run.gradient_norm()
-    relaxed = residual > tolerance
+    relaxed = max(residual, round_off) > tolerance
     why = "gradient within tolerance"
-    if relaxed:
+    if relaxed and residual > tolerance:
         why = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
+    elif relaxed:
+        why = f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"
     if run.factorise(data, run.hessian.tiny_shift(data)):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
         small = step <= step_tolerance or residual == 0.0

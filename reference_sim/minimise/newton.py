@@ -108,7 +108,7 @@ class Newton:
             return None
         run.residuals = []
         small = run.gradient_norm() <= self.tolerance
-        # Round-off excuses no more than this (`target`): no Hessian is needed to say so.
+        # Round-off excuses no more than this: no Hessian is needed to say so.
         if spent and run.gradient_norm() > max(self.tolerance, RESIDUAL_ROUND_OFF):
             return None
         if small:
@@ -117,21 +117,23 @@ class Newton:
         run.data = run.assemble(CONVEXITY[0 if small else projection])
         if not np.isfinite(run.data).all():
             return Stop("diverged", "the Hessian is not finite")
-        run.target = self.target(run)
+        round_off = self.round_off(run)
+        run.target = max(self.tolerance, min(round_off, RESIDUAL_ROUND_OFF))
         if run.gradient_norm() > run.target:
             return None
         self.potential.forget()
         data = run.data if small else run.assemble(0.0)
-        stop = convergence_check(run, data, tolerance=self.tolerance, step_tolerance=self.step_tolerance)
+        stop = convergence_check(
+            run, data, tolerance=self.tolerance, step_tolerance=self.step_tolerance, round_off=round_off
+        )
         if stop is None:
             run.predicting, run.data = False, run.assemble(CONVEXITY[projection])
         return stop
 
-    def target(self, run: NewtonRun) -> float:
-        """Return the tolerance, but never below what round-off of the positions does to the gradient."""
+    def round_off(self, run: NewtonRun) -> float:
+        """Return what round-off of the positions may do to the relative residual [1]."""
         stiffest = self.hessian.stiffest(run.data)
-        round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(run.x).max(initial=0.0))
-        return max(self.tolerance, min(round_off / run.weight, RESIDUAL_ROUND_OFF))
+        return 8 * np.finfo(float).eps * stiffest * float(np.abs(run.x).max(initial=0.0)) / run.weight
 
     def step(self, run: NewtonRun) -> Stop | None:
         """Go on with the last factorisation while it serves, else with the Hessian that was assembled."""

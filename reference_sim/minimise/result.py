@@ -28,7 +28,8 @@ class Result:
             negligible, and no negative curvature left. A factorisation proves the last of these; of meshes
             too large for one it is an estimate, and the reason says so.
         reason: one line in words.
-        relaxed: whether round-off let a residual above the tolerance count as converged: see the reason.
+        relaxed: whether "converged" holds within round-off alone: the residual, or the round-off in it, is
+            above the tolerance; the reason says which.
         iterations, factorisations: counts.
         gradient_norm: the relative residual [1], by which every minimisation here is stopped: the largest
             component of dPhi/dx over the free vertices, divided by the mean weight of a vertex.

@@ -29,7 +29,7 @@ from reports.statistics.verdicts import LESS, MORE, TIED, compare_methods, stand
 from reports.tables.number_texts import duration, number
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
-SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/vertices"
+SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
 
 
 def headline(run: Run) -> list[tuple[str, str]]:
@@ -102,7 +102,7 @@ def _moves(run: Run, worn: pd.DataFrame) -> str:
     if inside is not None:
         reference = value_of(worn, run.reference, INSIDE)
         beside = "" if reference is None else f", of the simulation {number(reference, 2)} %"
-        parts.append(f"{number(inside, 2)} % of the vertices lie inside the body{beside}")
+        parts.append(f"{number(inside, 2)} % of the surface lies inside the body{beside}")
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 

@@ -16,7 +16,7 @@ from reports.tables.table import Cell, Column, Table, metric_column, table
 
 ROWS = 8
 NAMED = 4  # scenes that a caption names
-ANSWERS = ("penetration/vertices", "dynamics/amplitude", "dynamics/correlation")
+ANSWERS = ("penetration/surface", "dynamics/amplitude", "dynamics/correlation")
 GAP = "gap/energy"
 
 

@@ -253,8 +253,8 @@ FAULTS = (
     Fault(
         "tolerance a hundred thousand times too loose",
         NEWTON,
-        "return max(self.tolerance, min(",
-        "return max(1e5 * self.tolerance, min(",
+        "run.target = max(self.tolerance, min(",
+        "run.target = max(1e5 * self.tolerance, min(",
     ),
     Fault(
         "gradient of one vertex only",

@@ -1,4 +1,4 @@
-"""Metric solver/relaxed_frames: frames that count as converged above their tolerance, at round-off."""
+"""Metric solver/relaxed_frames: frames that are within their tolerance up to round-off alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ METRICS = (
         name="solver/relaxed_frames",
         unit="frames",
         title="Relaxed",
-        definition="frames that count as converged though a step ended above its tolerance, at round-off",
+        definition="frames with a step whose residual, or the round-off in it, is above the tolerance",
         lower_is_better=True,
     ),
 )

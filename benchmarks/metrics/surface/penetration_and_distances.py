@@ -34,6 +34,12 @@ METRICS = (
         lower_is_better=True, definition="vertices inside the body, none left out, mean over frames",
     ),
     Metric(
+        name="penetration/surface", unit="%", title="Surface inside", table="penetration",
+        lower_is_better=True,
+        definition="share of the cloth's area inside the body, at vertices, midpoints of edges and "
+        "centroids, mean over frames",
+    ),
+    Metric(
         name="penetration/deep", unit="%", title="Deep", table="penetration", lower_is_better=True,
         definition="vertices more than 5 mm inside the body",
     ),
@@ -81,10 +87,11 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def penetration_values(inside: Penetration, judged: slice) -> dict[str, float]:
-    """Return shares [%] and depth [mm] of the vertices inside an obstacle over the evaluated frames."""
+    """Return shares [%] of vertices and area inside an obstacle and depth [mm] over the evaluated frames."""
     depth = inside.depth[judged]
     return {
         "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
+        "penetration/surface": 100.0 * float(inside.area[judged].mean()),
         "penetration/deep": 100.0 * float((depth > DEEP).mean()),
         "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
     }
@@ -97,7 +104,8 @@ def inside_of(roll_out: RollOut) -> Penetration:
 
 def _of_all(group: SceneRollOuts) -> list[Penetration]:
     assert group.scene.obstacle is not None
-    return penetration(group.positions, group.scene.obstacle)
+    faces = [roll_out.trajectory.faces for roll_out in group.roll_outs]
+    return penetration(group.positions, faces, group.scene.obstacle)
 
 
 def rms(x: Floats, y: Floats) -> float:
@@ -121,30 +129,78 @@ def distance_rms(positions: Floats, reference: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Penetration:
-    """Penetration per frame, over all vertices with none left out: share and depth (0 outside) [m]."""
+    """Penetration per frame, with nothing left out: shares of vertices and of area, and depth (0 outside)."""
 
-    share: Floats  # (T,)
-    depth: Floats  # (T,V)
+    share: Floats  # (T,) of the vertices [1]
+    depth: Floats  # (T,V) [m]
+    area: Floats  # (T,) share of the area [1]
 
 
-def penetration(trajectories: Sequence[Floats], obstacle: Obstacle) -> list[Penetration]:
-    """Return how deep the vertices of each trajectory lie in the obstacle, by its signed distance.
+class SurfaceSamples:
+    """Points of a triangle mesh whose weights give integrals over its area.
+
+    The seven-point rule of degree 3 for triangles: vertices, midpoints of edges and centroid have weights of
+    1/20, 2/15 and 9/20 of a triangle's area, and integrals of cubic polynomials are exact.
+
+    Args:
+        faces: (F,3).
+
+    >>> import numpy as np
+    >>> x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> samples = SurfaceSamples(np.array([[0, 2, 1]]))
+    >>> samples.points(x).shape, round(float(samples.weights(x) @ samples.points(x)[:, 0] ** 3), 12)
+    ((7, 3), 0.05)
+    """
+
+    def __init__(self, faces: NDArray[np.int64]) -> None:
+        self.faces = faces
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        self.edges, places = np.unique(sides, axis=0, return_inverse=True)
+        self.edges_of_faces = places.reshape(-1, 3)
+
+    def points(self, x: Floats) -> Floats:
+        """Return vertices, midpoints of edges and centroids (V+E+F,3) [m] of positions (V,3)."""
+        return np.concatenate([x, x[self.edges].mean(axis=1), x[self.faces].mean(axis=1)])
+
+    def weights(self, x: Floats) -> Floats:
+        """Return the weight [m^2] of each of these points (V+E+F,); their sum is the area."""
+        sides = x[self.faces[:, 1:]] - x[self.faces[:, :1]]
+        areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        of_vertices = np.bincount(self.faces.ravel(), np.repeat(areas / 20.0, 3), len(x))
+        of_edges = np.bincount(self.edges_of_faces.ravel(), np.repeat(areas * 2.0 / 15.0, 3), len(self.edges))
+        return np.concatenate([of_vertices, of_edges, 0.45 * areas])
+
+
+def penetration(
+    trajectories: Sequence[Floats], faces: Sequence[NDArray[np.int64]], obstacle: Obstacle
+) -> list[Penetration]:
+    """Return how far each trajectory lies in the obstacle, by its signed distance.
 
     All trajectories are asked about together at each frame: the obstacle's search tree is made once.
 
     Args:
         trajectories: positions (T,V,3) [m] each.
+        faces: (F,3) each.
         obstacle: with a signed distance, as a body.
     """
-    depths = [np.empty(positions.shape[:2]) for positions in trajectories]
+    known = {id(each): SurfaceSamples(each) for each in faces}
+    samples = [known[id(each)] for each in faces]
+    found = [
+        Penetration(share=np.empty(len(x)), depth=np.empty(x.shape[:2]), area=np.empty(len(x)))
+        for x in trajectories
+    ]
     for frame in range(max(map(len, trajectories), default=0)):
         present = [k for k, positions in enumerate(trajectories) if frame < len(positions)]
-        points = np.concatenate([trajectories[k][frame] for k in present])
-        inside = np.maximum(0.0, -np.asarray(obstacle.signed_distance(points, frame)))
-        ends = np.cumsum([trajectories[k].shape[1] for k in present])
-        for k, part in zip(present, np.split(inside, ends[:-1])):
-            depths[k][frame] = part
-    return [Penetration(share=(depth > 0.0).mean(1), depth=depth) for depth in depths]
+        points = [samples[k].points(trajectories[k][frame]) for k in present]
+        distances = np.asarray(obstacle.signed_distance(np.concatenate(points), frame))
+        for k, distance in zip(present, np.split(distances, np.cumsum([len(each) for each in points])[:-1])):
+            x, inside = trajectories[k][frame], distance < 0.0
+            weights = samples[k].weights(x)
+            found[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])
+            found[k].share[frame] = inside[: len(x)].mean()
+            # Of a cloth drawn together to a point nothing is inside or outside by area.
+            found[k].area[frame] = weights @ inside / max(weights.sum(), np.finfo(float).tiny)
+    return found
 
 
 def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats) -> Floats:

@@ -48,7 +48,8 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     obstacle = roll_out.scene.obstacle
     if obstacle is None or not roll_out.entry.other_mesh:
         return {}
-    return penetration_values(penetration([roll_out.positions], obstacle)[0], roll_out.judged)
+    (inside,) = penetration([roll_out.positions], [roll_out.trajectory.faces], obstacle)
+    return penetration_values(inside, roll_out.judged)
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:

@@ -158,11 +158,30 @@ class Slab:
 def test_penetration_counts_every_vertex_and_measures_depth():
     x = np.zeros((2, 4, 3))
     x[:, :, 1] = [0.5, -0.25, 2.0, -0.5]
-    shorter, found = penetration([x[:1], x], Slab())
+    faces = np.array([[0, 1, 2], [1, 2, 3]])
+    shorter, found = penetration([x[:1], x], [faces, faces], Slab())
     assert shorter.share == pytest.approx([0.5])
     assert found.share == pytest.approx([0.5, 0.75])
     assert found.depth[0] == pytest.approx([0, 0.25, 0, 0.5])
     assert found.depth[1] == pytest.approx([0.5, 1.25, 0, 1.5])
+
+
+def test_penetration_sees_the_surface_between_vertices():
+    """A tent whose vertices stand outside and whose ridge dips into a ball: 0 % of the vertices."""
+
+    class Ball:
+        def signed_distance(self, points, frame):
+            return np.linalg.norm(points, axis=1) - 1.0
+
+    x = np.array([[[-2.0, 0.1, 0.0], [2.0, 0.1, 0.0], [0.0, 0.1, 3.0]]])
+    (found,) = penetration([x], [np.array([[0, 2, 1]])], Ball())
+    # Of its seven points the midpoint of one side alone is in the ball; the centroid is at z = 1.
+    assert found.share[0] == 0.0 and found.area[0] == pytest.approx(2 / 15)
+    finer, faces = right_grid(81, 81, 4.0, 4.0)  # with a quarter of the ball's disc
+    (found,) = penetration([np.pad(finer, ((0, 0), (0, 1)))[None]], [faces], Ball())
+    assert found.area[0] == pytest.approx(np.pi / 64, rel=1e-2)
+    (found,) = penetration([np.zeros((1, 3, 3)) + 2.0], [np.array([[0, 1, 2]])], Ball())
+    assert found.area[0] == 0.0
 
 
 def test_inertia_follows_the_body_where_the_cloth_is_shaken_as_the_body_is():
@@ -234,7 +253,9 @@ def test_own_part_depth_does_not_see_the_limb_beside():
     belongs = np.array([[0.11, 0.0, 0.0], [0.101, 0.0, 0.0]])
     # The ball is a mesh: its faces lie up to 1 % of the radius below the sphere.
     assert own_part_depth(x, obstacle, belongs)[0] == pytest.approx([0.0, 0.01], abs=1e-3)
-    assert penetration([x], obstacle)[0].depth[0] == pytest.approx([0.05, 0.01], abs=1e-3)
+    assert penetration([x], [np.zeros((0, 3), int)], obstacle)[0].depth[0] == pytest.approx(
+        [0.05, 0.01], abs=1e-3
+    )
 
 
 def test_hem_drift_follows_the_hem_against_the_pelvis():
