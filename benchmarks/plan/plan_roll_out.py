@@ -54,7 +54,7 @@ def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:
     request = Request(
         command=command,
         scenes=scenes,
-        methods=("simulation",),
+        methods=("simulation", "skinning"),  # relative excess is the share of skinning's
         one_scene=True,
         roll_outs=(option,),
         folder=Path(options.out) if options.out else None,

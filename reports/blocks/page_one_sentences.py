@@ -12,7 +12,7 @@ from reports.statistics import paper_claims
 from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
 from reports.statistics.break_even import NETWORK, compared_scenes
 from reports.statistics.means_and_spreads import pair, value_of
-from reports.statistics.page_one_methods import LEARNED, leads
+from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads, subjects
 from reports.statistics.pareto import (
     SMALLER_STEPS,
     Point,
@@ -49,7 +49,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
     """Say which share of skinning's excess energy each network of page one leaves."""
-    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in LEARNED]
+    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not known:
@@ -91,32 +91,36 @@ def _stands(excess: Excess) -> str:
 
 
 def _moves(run: Run, worn: pd.DataFrame) -> str:
-    """Say what the network lacks of the simulation's motion, and how much of it lies inside the body."""
+    """Say what each subject lacks of the simulation's motion, and how much of it lies inside the body."""
     parts = []
-    swing, alike = (value_of(worn, NETWORK, name) for name in (SWING, ALIKE))
-    if swing is not None:
-        share = number(100.0 * swing, 2)
-        parts.append(f"the hem of {run.label(NETWORK)} has {share} % of the simulation's dynamic amplitude")
-        parts[-1] += "" if alike is None else f", correlation {number(alike, 2)}"
-    inside = value_of(worn, NETWORK, INSIDE)
-    if inside is not None:
-        reference = value_of(worn, run.reference, INSIDE)
-        beside = "" if reference is None else f", of the simulation {number(reference, 2)} %"
-        parts.append(f"{number(inside, 2)} % of the surface lies inside the body{beside}")
+    reference = value_of(worn, run.reference, INSIDE)
+    for method in subjects(run, set(worn[worn["usable"]]["method"])):
+        swing, alike, inside = (value_of(worn, method, name) for name in (SWING, ALIKE, INSIDE))
+        if swing is not None:
+            share = number(100.0 * swing, 2)
+            parts.append(
+                f"the hem of {run.label(method)} has {share} % of the simulation's dynamic amplitude"
+            )
+            parts[-1] += "" if alike is None else f", correlation {number(alike, 2)}"
+        if inside is not None:
+            beside = "" if reference is None else f", of the simulation {number(reference, 2)} %"
+            whose = f" of {run.label(method)}" if swing is None else ""
+            parts.append(f"{number(inside, 2)} % of the surface{whose} lies inside the body{beside}")
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     metric = run.metrics.get(run_time(timed))
-    compared = compare_methods(run, timed, metric, run.reference, NETWORK) if metric else None
+    network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
+    compared = compare_methods(run, timed, metric, run.reference, network) if metric else None
     if compared is None or compared.effect is None or compared.other is None or not compared.other.value:
         return ""
     ends = compared.effect.interval
     times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
     own = number(compared.other.value)
-    text = f"{run.label(NETWORK)} takes {own} ms a frame, the simulation {times} times as long"
-    training = value_of(run.garment_rows, NETWORK, "cost/train")
+    text = f"{run.label(network)} takes {own} ms a frame, the simulation {times} times as long"
+    training = value_of(run.garment_rows, network, "cost/train")
     text += f"; training takes {duration(training)}" if training else ""
     more = _rivals(run, run.cells("speed", "garments"), scenes) if scenes else ""
     return f"{text}; {more}" if more else f"{text}."

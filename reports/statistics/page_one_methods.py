@@ -1,8 +1,8 @@
-"""Methods that page one shows: the reference, SNUG, the best other network and a baseline."""
+"""Methods that page one shows: reference, SNUG, roll-outs of the user, the best other network, a baseline."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import pandas as pd
 
@@ -11,13 +11,15 @@ from reports.statistics.break_even import NETWORK
 from reports.statistics.means_and_spreads import mean_of, shared_scenes
 
 LEARNED = ("network", "ablation")
+EXTERNAL = "external"  # role of roll-outs from files and programs
+MOST_EXTERNAL = 2  # of these that page one shows
 BEST_BY = ("step/distance", "gap/energy", "curvature/error", "energy/total")
 
 
 def leads(
     run: Run, rows: pd.DataFrame, among: Iterable[str] | None = None, by: Sequence[str] = BEST_BY
 ) -> list[str]:
-    """Choose the methods of page one: reference, SNUG, the best other network, the first baseline.
+    """Choose the methods of page one: reference, subjects, the best other network, the first baseline.
 
     Args:
         run: the run.
@@ -29,12 +31,26 @@ def leads(
     """
     usable = set(rows[rows["usable"]]["method"])
     have = usable if among is None else usable & set(among)
-    learned = [name for name in run.with_role(*LEARNED) if name in have]
-    others = [name for name in learned if not run.methods[name].base] or learned
-    first = NETWORK if NETWORK in others else next(iter(others), "")
-    best = _best(rows, [name for name in others if name != first], by)
+    first = subjects(run, have)
+    best = _best(rows, [name for name in _networks(run, have) if name not in first], by)
     baseline = next((name for name in run.with_role("baseline") if name in have), "")
-    return [name for name in (run.reference, first, best, baseline) if name in have]
+    return [name for name in (run.reference, *first, best, baseline) if name in have]
+
+
+def subjects(run: Run, have: Collection[str]) -> list[str]:
+    """Return the methods, of those in `have`, that page one is about: SNUG, and roll-outs of the user.
+
+    Another network takes the place of SNUG where there is none.
+    """
+    networks = _networks(run, have)
+    first = NETWORK if NETWORK in networks else next(iter(networks), "")
+    external = [name for name in run.with_role(EXTERNAL) if name in have]
+    return [name for name in (first, *external[:MOST_EXTERNAL]) if name]
+
+
+def _networks(run: Run, have: Collection[str]) -> list[str]:
+    learned = [name for name in run.with_role(*LEARNED) if name in have]
+    return [name for name in learned if not run.methods[name].base] or learned
 
 
 def _best(rows: pd.DataFrame, names: Sequence[str], by: Sequence[str]) -> str:

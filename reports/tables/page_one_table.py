@@ -8,7 +8,7 @@ from reports.run.finished_run import Run
 from reports.statistics.break_even import compared_scenes, rivals
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
-from reports.statistics.page_one_methods import leads
+from reports.statistics.page_one_methods import EXTERNAL, leads
 from reports.statistics.pareto import run_time
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
@@ -37,7 +37,7 @@ def overview(run: Run) -> list[Table]:
     chosen += [
         m
         for m in run.ordered(plain)
-        if m not in chosen and run.methods[m].role in ("network", "bound", "baseline")
+        if m not in chosen and run.methods[m].role in ("network", "bound", "baseline", EXTERNAL)
     ]
     why = rivals(run, cells, scenes) if scenes else {}
     solvers = [m for m in why if m not in chosen]

@@ -1,7 +1,7 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
 `headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN,
-...`, `counts of RUN, ...`; RUN is a folder of reports/published.
+...`, `counts of RUN, ...`, `runs of RUN, ...`, `metrics`; RUN is a folder of reports/published.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from benchmarks.metrics import declared
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks.page_one_sentences import headline
 from reports.run.finished_run import Run
@@ -21,8 +22,11 @@ from reports.text.text_table import markdown_table, remarks_on, text_rows
 
 FORMS = (
     "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
-    "claims exploratory of RUN, ...; counts of RUN, ..."
+    "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; metrics"
 )
+
+METRIC = ("Metric", "Unit", "Definition")  # heads
+ORIGIN = ("Run", "Day", "Commit", "Processor (2 cores)", "Command")  # heads
 
 
 def published_part(words: str) -> str:
@@ -31,6 +35,8 @@ def published_part(words: str) -> str:
     runs, _, columns = source.partition(";")
     folders = [PUBLISHED / name.strip() for name in runs.split(",")]
     kind, _, name = what.partition(" ")
+    if words == "metrics":
+        return markdown_table([METRIC, *((f"`{m.name}`", m.unit, m.definition) for m in declared().values())])
     if kind == "headline":
         run, _ = _read(folders[0])
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(run))
@@ -45,7 +51,21 @@ def published_part(words: str) -> str:
         return markdown_table(claim_rows(_claims(*folders), primary=name == "primary"))
     if kind == "counts":
         return claim_counts(_claims(*folders))
+    if kind == "runs":
+        return markdown_table([ORIGIN, *(line for folder in folders for line in _origins(folder))])
     raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
+
+
+def _origins(folder: Path) -> list[tuple[str, ...]]:
+    """Return name, day, commit, processor and command of a run, of each part of a merged one."""
+    config = RunFolder(folder).read_config()
+    return [
+        (
+            folder.name, str(part.get("finished", ""))[:10], part["commit"], part["hardware"]["processor"],
+            f"`{part['command']}`",
+        )
+        for part in config.get("merged", [config])
+    ]  # fmt: skip
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The documents: examples run as written, links lead somewhere, definitions are those of the code."""
+"""The documents: examples run as written, links lead somewhere."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from benchmarks.metrics import declared
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -106,15 +104,6 @@ def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
 def test_every_example_is_tested():
     examples = {title for title, text in SECTIONS.items() if "```sh" in text}
     assert examples == {*SHORT, *LONG}
-
-
-def test_every_metric_is_defined_as_declared():
-    text = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
-    escaped = {name: metric.definition.replace("|", "\\|") for name, metric in declared().items()}
-    lines = [f"| `{name}` | {metric.unit} | {escaped[name]} |" for name, metric in declared().items()]
-    table = re.findall(r"^\| `[^`|]+/[^`|]+` \|.*$", text, re.M)
-    assert not [line for line in lines if line not in table], "add these lines to the table"
-    assert not [line for line in table if line not in lines], "remove these lines from the table"
 
 
 def test_the_lines_of_python_in_the_readme_run(tmp_path):

@@ -400,6 +400,27 @@ def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():
     assert leads(run, run.garment_rows, ["pbns", "simulation"]) == ["simulation", "pbns"]
 
 
+def test_roll_outs_of_the_user_are_on_page_one_beside_snug_or_alone():
+    def mine(inside: float = 2.5):
+        rows = on_two_scenes("mine", 3.0, 9.0) + [
+            row(s, "mine", m, v, unit=u)
+            for s in SCENES
+            for m, v, u in (("penetration/surface", inside, "%"), ("dynamics/amplitude", 0.5, "1"))
+        ]
+        return [dataclasses.replace(r, role="external", seeded=False, pairing_group="") for r in rows]
+
+    reference = on_two_scenes("simulation", 0.5, 7.0) + on_two_scenes("skinning", 10.5, 17.0)
+    alone, beside = run_of([*reference, *mine()]), run_of([*all_rows(), *mine()])
+    assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
+    assert leads(beside, beside.garment_rows)[:3] == ["simulation", "snug", "mine"]
+    said = {topic: text.replace("\u00a0", " ") for topic, text in headline(alone)}
+    assert "mine has a relative excess energy of" in said["How near"]
+    assert said["How it moves"].startswith(
+        "The hem of mine has 50 % of the simulation's dynamic amplitude; 2.5 % "
+    )
+    assert "mine" in {line[0] for line in make_tables(alone)["overview"].rows}
+
+
 def test_changed_networks_are_networks_where_a_run_has_no_others():
     rows = on_two_scenes("snug-springs", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
     changed = [dataclasses.replace(r, role="ablation", base="snug") for r in rows[:2]] + rows[2:]

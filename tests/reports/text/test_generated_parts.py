@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.metrics import find_metric
 from reports.docs import ROOT, documents, main
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY
 from reports.text.generated_parts import BEGIN, END, fill
@@ -47,6 +48,14 @@ def test_every_claim_has_a_row_whether_or_not_a_run_judges_it(kind, claims):
     said = [line.split(" | ") for line in lines]
     assert all((cells[8] == "not measured") == (cells[9] == "– |") for cells in said)
     assert any(cells[8] != "not measured" for cells in said)
+
+
+def test_each_part_of_a_merged_run_has_its_command_and_a_metric_its_definition():
+    lines = published_part("runs of quick, shapes").splitlines()[2:]
+    assert [line.split(" | ")[0] for line in lines] == ["| quick", "| quick", "| shapes"]
+    assert "--suite garments" in lines[0] and "--suite speed" in lines[1]
+    assert "| `energy/wind` |" not in published_part("metrics")
+    assert f"| `distance/rms` | mm | {find_metric('distance/rms').definition} |" in published_part("metrics")
 
 
 def test_the_command_checks_and_says_so(capsys):
