@@ -36,7 +36,7 @@ def convergence_check(
     residual = run.gradient_norm()
     relaxed = max(residual, round_off) > tolerance
     why = "gradient within tolerance"
-    if relaxed and residual > tolerance:
+    if residual > tolerance:
         why = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
     elif relaxed:
         why = f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"

@@ -183,8 +183,7 @@ def penetration(
         faces: (F,3) each.
         obstacle: with a signed distance, as a body.
     """
-    known = {id(each): SurfaceSamples(each) for each in faces}
-    samples = [known[id(each)] for each in faces]
+    samples = [SurfaceSamples(each) for each in faces]
     found = [
         Penetration(share=np.empty(len(x)), depth=np.empty(x.shape[:2]), area=np.empty(len(x)))
         for x in trajectories
