@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.external.scene_files import FileList, facts_of, write_cloth, write_motion, write_obstacle
+from benchmarks.external.scene_files import (
+    FileList,
+    facts_of,
+    write_cloth,
+    write_energies,
+    write_motion,
+    write_obstacle,
+)
 from reference_sim.files.atomic_files import new_folder
 from reference_sim.trajectory.point_cache import write_point_cache
 
@@ -37,7 +44,7 @@ def write_scene(
     if simulation is not None and declared.networks_only:
         raise ValueError(f"--reference: nobody simulates {declared.name}: it is for networks alone")
     with new_folder(folder) as part:
-        files = [*write_cloth(part, scene), *write_obstacle(part, scene)]
+        files = [*write_cloth(part, scene), *write_energies(part, scene), *write_obstacle(part, scene)]
         if scene.dressed is not None:
             files += write_motion(part, scene.dressed)
         files += _reference(part, scene, simulation) if simulation is not None else []

@@ -25,6 +25,7 @@ def write_for_program(folder: Path, scene: BuiltScene) -> None:
     """Write the scene into a new folder for a program: arrays, meshes and scene.json, no README."""
     folder.mkdir()
     write_cloth(folder, scene)
+    write_energies(folder, scene)
     write_obstacle(folder, scene)
     if scene.dressed is not None:
         write_motion(folder, scene.dressed)
@@ -54,6 +55,16 @@ def write_cloth(part: Path, scene: BuiltScene) -> FileList:
         content += ", kept (T,), the frames of the motion that a roll-out holds"
     np.savez(part / "cloth.npz", **arrays)
     return [("rest.obj", "rest mesh" + ", with its UV" * (cloth.rest_uv is not None)), ("cloth.npz", content)]
+
+
+def write_energies(part: Path, scene: BuiltScene) -> FileList:
+    """Write the elements of every energy term; return what was written."""
+    arrays: dict[str, Any] = {
+        f"{term.name}_{name}": value for term in scene.energies for name, value in term.arrays().items()
+    }
+    np.savez(part / "energies.npz", **arrays)
+    content = "elements of each energy term: vertices, stiffness, rest state; formulas in docs/scene-files.md"
+    return [("energies.npz", content)]
 
 
 def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndarray | None) -> None:

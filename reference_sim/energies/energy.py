@@ -85,6 +85,13 @@ class Energy:
         """Return the numbers that identify the term in a result file."""
         return {}
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return what belongs to each element of the term, by name: enough to evaluate it elsewhere.
+
+        Names end in their unit; "vertices" (N, k) are the stencils.
+        """
+        return {"vertices": self.stencils}
+
     def _elements(self, x: np.ndarray) -> Tensor:
         import torch
 

@@ -38,6 +38,10 @@ class Gravity(Energy):
         """Return y0 [m] and the total weight [N]."""
         return {"origin_height_m": self.origin_height, "total_weight_N": float(self.weights.sum())}
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return vertices (V, 1) and their weights (V,) [N]."""
+        return {"vertices": self.stencils, "weights_N": self.weights}
+
     def element_energy(self, u: Tensor) -> Tensor:
         """Return E [J] of each vertex: u (..., N, 1, 3) [m] -> (..., N)."""
         import torch

@@ -30,6 +30,10 @@ class StretchSpring(Energy):
         """Return the stiffness [N/m]."""
         return {"stiffness_N_per_m": self.stiffness}
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return vertices (E, 2) and rest lengths (E,) [m] of the springs."""
+        return {"vertices": self.stencils, "rest_lengths_m": self.rest_lengths}
+
     def element_energy(self, u: Tensor) -> Tensor:
         """Return E [J] of each edge: u (..., N, 2, 3) [m] -> (..., N)."""
         import torch

@@ -21,6 +21,8 @@ from benchmarks.fingerprint.digest import digest
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.metrics.energies.energy import energy_series
+from benchmarks.metrics.surface.curvature import curvature_series
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
@@ -345,6 +347,41 @@ def test_what_is_exported_is_the_scene(home):
     text = (folder / "README.txt").read_text()
     assert all(path.name in text for path in folder.iterdir() if path.name != "README.txt")
     assert not list(folder.parent.glob(".*part"))
+
+
+def exported(folder: Path):
+    """The class of docs/scene-files.md, as it stands there, opened on an exported folder."""
+    page = (Path(__file__).parents[2] / "docs" / "scene-files.md").read_text()
+    names: dict = {}
+    exec(page[page.index("import json") :].partition("```")[0], names)
+    return names["Exported"](folder)
+
+
+@pytest.mark.parametrize("name", ["skinning", "simulation", "sunk"])
+def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name):
+    """In numpy, by the code of the documents, which shares nothing with that of the project."""
+    folder, scene = home
+    if name == "sunk":  # vertices of all depths, some of them below skin that they must not meet
+        positions = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
+        positions += np.random.default_rng(0).normal(0, 0.03, positions.shape)
+    else:
+        method = find_method(name).make(models=Path(), seed=0)
+        method.prepare(scene)
+        positions = method.run().positions
+    ours, files = energy_series(scene, [positions])[0], exported(folder)
+    curvature = curvature_series(positions, scene.cloth.faces).means()
+    for frame in (0, 2, 7):
+        x, last, last_but_one = (positions[max(frame - i, 0)] for i in range(3))
+        found = {
+            "strain": files.strain(x), "bending": files.bending(x), "gravity": files.gravity(x, frame),
+            "inertia": files.inertia(x, last, last_but_one) if frame > 1 else 0.0,
+            "collision": files.collision(x, frame),
+        }  # fmt: skip
+        assert found.keys() | {"total"} == ours.keys() and (name != "sunk" or found["collision"] > 0)
+        for term, value in found.items():
+            np.testing.assert_allclose(value, ours[term][frame], rtol=1e-10, err_msg=f"{term}, {frame}")
+        np.testing.assert_allclose(sum(found.values()), ours["total"][frame], rtol=1e-10)
+        np.testing.assert_allclose(files.mean_curvature(x), curvature[frame], rtol=1e-10)
 
 
 def test_a_uv_of_corners_is_written_into_the_mesh(tmp_path):

@@ -77,6 +77,12 @@ class BendHinge(Energy):
             "rest": fingerprint(self.stiffness, self.rest_angles),
         }
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return vertices (H, 4), stiffness (H,) [J] and rest angles (H,) [rad] of the hinges."""
+        return {
+            "vertices": self.stencils, "stiffness_J": self.stiffness, "rest_angles_rad": self.rest_angles,
+        }  # fmt: skip
+
     def element_energy(self, u: Tensor) -> Tensor:
         """Return E [J] of each hinge: u (..., N, 4, 3) [m] -> (..., N)."""
         import torch

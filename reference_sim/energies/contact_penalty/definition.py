@@ -97,6 +97,13 @@ class ContactPenalty(Energy):
             "mean_stiffness_J_per_m3": float(self.stiffness.mean()),
         }
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return of each sample: vertices and weights (S, 3), stiffness (S,) [J/m^3], rest place (S, 3) [m]."""
+        return {
+            "vertices": self.stencils, "weights": self.weights, "stiffness_J_per_m3": self.stiffness,
+            "rest_positions_m": self.rest_samples,
+        }  # fmt: skip
+
     def prepare(self, step: Step) -> None:
         """Freeze one contact plane for each sample, at the guess. Raises ValueError without an obstacle."""
         if step.obstacle is None:

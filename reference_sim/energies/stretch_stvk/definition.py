@@ -52,6 +52,10 @@ class StretchStVK(Energy):
         """Return lambda and mu [N/m]."""
         return {"lambda_N_per_m": self.lam, "mu_N_per_m": self.mu}
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return of each face: vertices (F, 3), inverse rest shape (F, 2, 2) [1/m], rest area (F,) [m^2]."""
+        return {"vertices": self.stencils, "Dm_inverse_per_m": self.Dm_inverse, "areas_m2": self.areas}
+
     def element_energy(self, u: Tensor) -> Tensor:
         """Return E [J] of each face: u (..., N, 3, 3) [m] -> (..., N)."""
         import torch
