@@ -98,7 +98,7 @@ class ContactPenalty(Energy):
         }
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return of each sample: vertices and weights (S, 3), stiffness (S,) [J/m^3], rest place (S, 3) [m]."""
+        """Return vertices and weights (S, 3), stiffness (S,) [J/m^3], rest places (S, 3) [m] of samples."""
         return {
             "vertices": self.stencils, "weights": self.weights, "stiffness_J_per_m3": self.stiffness,
             "rest_positions_m": self.rest_samples,
