@@ -10,6 +10,8 @@ from pathlib import Path
 
 from benchmarks.contract.check_files import SECONDS, check_files, read_files
 from benchmarks.declarations import DeclarationError
+from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.plan_scene import plan_scene
 from benchmarks.process.timing import one_thread
 from reference_sim.command.command_line import Parser, command
 
@@ -22,6 +24,8 @@ EXAMPLES = """examples:
   python -m benchmarks.check mine.py            all that METHODS, SCENES and METRICS of the file declare
   python -m benchmarks.check mine.py my_scene.py
   python -m benchmarks.check mine.py --seconds 300
+  python -m benchmarks.check mine.py --scene tshirt/kick --preset smoke    methods in a scene of that size
+  python -m benchmarks.check mine.py --scene dress/kick --garment dress.obj
 
 exit status: 0 when nothing is wrong; 1 when something is, a line for each; 2 when a file cannot be read."""
 
@@ -30,8 +34,12 @@ def make_parser() -> argparse.ArgumentParser:
     """Return the parser of the command."""
     parser = Parser(prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES)
     parser.add_argument("what", nargs="+", metavar="FILE", help="a file")
+    parser.add_argument("--scene", metavar="SCENE",
+        help="check the methods in this scene of benchmarks.run --list, in place of the tiny ones: for "
+        "networks that are bound to a garment or a mesh")  # fmt: skip
     parser.add_argument("--seconds", type=float, default=SECONDS,
         help=f"after which one method in one scene is ended (default {SECONDS:g})")  # fmt: skip
+    add_scene_options(parser)
     return parser
 
 
@@ -43,8 +51,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not options.seconds > 0.0:
         raise DeclarationError(f"--seconds {options.seconds:g}: give a positive number")
     declared, wrong = read_files(options.what), 0
+    scene_plan = None
+    if options.scene:
+        if not declared.methods:
+            raise DeclarationError(f"--scene {options.scene}: {', '.join(options.what)} declares no METHODS")
+        scene_plan = plan_scene(options.scene, options)
     with tempfile.TemporaryDirectory() as folder:
-        for line, fine in check_files(declared, Path(folder), options.seconds):
+        for line, fine in check_files(declared, Path(folder), options.seconds, scene_plan):
             print(line, flush=True)
             wrong += not fine
     print("nothing is wrong" if not wrong else f"{wrong} to mend")

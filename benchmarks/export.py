@@ -6,14 +6,12 @@ import argparse
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import add_scene_options, scene_fields, split
-from benchmarks.plan.plan import Plan, PlanError
-from benchmarks.plan.request import Request
+from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.plan import PlanError
+from benchmarks.plan.plan_scene import plan_scene
 from benchmarks.process.timing import one_thread
 from reference_sim.command.command_line import Parser, command
 
@@ -54,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     folder = Path(options.out)
     demand_new(folder)
-    plan = plan_export(options)
+    plan = plan_scene(options.scene, options)
     try:
         scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
         from benchmarks.external.exported_scene import write_scene  # loads the simulator
@@ -69,16 +67,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise PlanError(str(error)) from error
     print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")
     return 0
-
-
-def plan_export(options: argparse.Namespace) -> Plan:
-    """Return the plan of one scene and its simulation alone. Raises ValueError, one line."""
-    # Nobody simulates scenes for networks alone: the networks are there to find them, and taken out again.
-    methods = ("simulation", "untrained", "snug")
-    fields = scene_fields(options)
-    plan = make_plan(Request(scenes=split([options.scene]), methods=methods, one_scene=True, **fields))
-    first = plan.cells[0]
-    return replace(plan, cells=(replace(first, entry=replace(first.entry, trained=None)),))
 
 
 def scene_arguments(options: argparse.Namespace) -> list[str]:

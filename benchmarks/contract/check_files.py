@@ -70,24 +70,36 @@ def read_files(paths: Sequence[str]) -> Declarations:
     return declared
 
 
-def check_files(declared: Declarations, folder: Path, seconds: float = SECONDS) -> Iterator[tuple[str, bool]]:
+def check_files(
+    declared: Declarations, folder: Path, seconds: float = SECONDS, scene_plan: Plan | None = None
+) -> Iterator[tuple[str, bool]]:
     """Check each entry in each scene.
 
     Args:
         declared: of `read_files`.
         folder: is written into.
         seconds: after which one method in one scene is ended.
+        scene_plan: plan of one scene, in which the methods are checked in place of the tiny ones; scenes and
+            metrics are not checked then.
 
     Yields:
         Lines for people, and whether the entry is fine there.
     """
-    plan = plan_check(declared, folder)
+    if scene_plan is None:
+        plan = plan_check(declared, folder)
+    else:
+        declared = Declarations(methods=declared.methods)
+        cells = _cells(declared, [scene_plan.cells[0].scene])
+        plan = dataclasses.replace(scene_plan, cells=tuple(cells), suites=("speed",), folder=folder)
     for entry in declared.methods:
         if not any(cell.entry is entry for cell in plan.cells):
-            why = next(filter(None, map(entry.skip, SCENES)), "no scene is meant for it")
+            scenes = SCENES if scene_plan is None else scene_plan.scenes
+            why = next(filter(None, map(entry.skip, scenes)), "no scene is meant for it")
             yield f"{entry.name}: wrong\n  is skipped in every scene: {why}", False
     run, assets = RunFolder(folder), None
-    if plan.garments:
+    if scene_plan is not None:
+        assets = scene_plan.open_assets() if plan.garments else None
+    elif plan.garments:
         motions = dict.fromkeys([TRAIN, *(scene.motion for scene in plan.scenes if scene.dressed)])
         assets = open_assets(plan.preset, embedded_motions(motions), plan.garments)
     schedule = Schedule(plan)
@@ -114,16 +126,21 @@ def plan_check(declared: Declarations, folder: Path) -> Plan:
     simulations = [
         Cell(scene.at(SIZES), find_method("simulation"), 0, ("speed",)) for scene in declared.scenes
     ]
-    cells = [
-        Cell(scene.at(SIZES), entry, 0, ("speed",))
-        for entry in declared.methods
-        for scene in (*bare, worn)
-        if entry.meant_for(scene) and entry.skip(scene) is None
-    ]
+    cells = _cells(declared, [scene.at(SIZES) for scene in (*bare, worn)])
     return Plan(
         preset=SIZES, suites=("speed",), cells=(*simulations, *cells), cases=(), seeds=(0,), device="cpu",
         folder=folder, command="", motions=Motions((TRAIN,), (TEST,)),
     )  # fmt: skip
+
+
+def _cells(declared: Declarations, scenes: Sequence[Scene]) -> list[Cell]:
+    """Return the cells of all methods in those of the scenes that are for them."""
+    return [
+        Cell(scene, entry, 0, ("speed",))
+        for entry in declared.methods
+        for scene in scenes
+        if entry.meant_for(scene) and entry.skip(scene) is None
+    ]
 
 
 def _tasks(

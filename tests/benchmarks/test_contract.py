@@ -238,6 +238,42 @@ def judge(roll_out, values):
 )
 
 
+BOUND_FILE = """import numpy as np
+from benchmarks.method import Method, MethodEntry
+from reference_sim import Trajectory
+
+METHODS = (MethodEntry(name="bound", label="Bound", description="", role="solver"),)
+
+class Bound(Method):
+    def prepare(self, scene):
+        if scene.cloth.vertex_count != 49:
+            raise ValueError(f"bound to 49 vertices, not {scene.cloth.vertex_count}")
+        self.scene = scene
+
+    def run(self):
+        positions = np.repeat(np.array(self.scene.start)[None], self.scene.frames, axis=0)
+        return Trajectory(positions, self.scene.cloth.faces, np.arange(len(positions)) * self.scene.dt)
+
+def make(*, models, seed):
+    return Bound()
+"""
+
+
+def test_a_method_that_is_bound_to_a_mesh_is_checked_in_the_scene_that_has_it(in_process, tmp_path, capsys):
+    path = tmp_path / "bound.py"
+    path.write_text(BOUND_FILE)
+    assert check.main([str(path), "--scene", "hanging_sheet", "--preset", "smoke"]) == 0
+    assert capsys.readouterr().out == "bound in hanging_sheet: fine\nnothing is wrong\n"
+    assert check.main([str(path)]) == 1
+    assert "bound to 49 vertices, not 25" in capsys.readouterr().out
+    (tmp_path / "highest.py").write_text(METRIC_FILE)
+    for words in (["hanging"], ["hanging_sheet", "--preset", "tiny"]):
+        assert check.main([str(path), "--scene", *words]) == 2
+    assert check.main([str(tmp_path / "highest.py"), "--scene", "hanging_sheet"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 3 and "unknown scene 'hanging'" in error and "declares no METHODS" in error
+
+
 def test_the_command_asks_metrics_for_their_judgement_and_takes_curves_of_vertices(
     in_process, tmp_path, capsys
 ):
