@@ -98,9 +98,13 @@ def begin_tasks(context: Context, progress: SimpleQueue[float] | None = None) ->
 
 
 def forget() -> None:
-    """Empty the memo of this process and give back its memory."""
-    _context.memo.clear()
-    give_back()
+    """Empty the memo of this process and give back its memory.
+
+    A batch that left nothing there is no reason to look through all objects for garbage.
+    """
+    if _context.memo:
+        _context.memo.clear()
+        give_back()
 
 
 def begin_task(task: Task, needed: Needed) -> None:
