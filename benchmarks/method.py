@@ -94,7 +94,7 @@ class MethodEntry:
         name: in commands, rows and files.
         description: one line, for --list and run.json.
         label: its name for people.
-        module: has make(*, models, seed, **options), which returns a Method; by default the file that
+        module: has `make(*, models, seed, **options)`, which returns a Method; by default the file that
             declares the entry.
         declared_in: that file, or module of an installed package; empty for the project's own. Filled in
             where it is read.

@@ -60,7 +60,7 @@ class Metric:
     """Declaration of a metric.
 
     Attributes:
-        name: in results.csv, also a pattern such as "energy/*".
+        name: in results.csv, also a pattern such as `energy/*`.
         unit: "1" where it has no dimension.
         title: head of its column.
         definition: one line for the report.

@@ -29,7 +29,7 @@ class Scene:
     Attributes:
         name: in commands, rows and files.
         description: one line, for --list and run.json.
-        module: has build(scene, assets, **options), which returns a BuiltScene.
+        module: has `build(scene, assets, **options)`, which returns a BuiltScene.
         declared_in, files: as of a MethodEntry.
         sizes: values of the preset that build() takes as options.
         options: further options of build().
