@@ -133,8 +133,9 @@ class LBFGS:
     def _in_float32(self, compiled: CompiledLBFGS, x0: np.ndarray) -> Descent | None:
         """Return the state where the compiled part ends.
 
-        None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton, where the
-        rounding of float32 would stay in the answer.
+        None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton though the
+        tolerance is below the switch: the rounding of float32 would stay in an answer that is meant to be
+        nearer.
         """
         run = Descent(self.potential, x0)
         if not run.finite:
@@ -147,7 +148,8 @@ class LBFGS:
         for part, seconds in result.seconds.items():
             run.seconds[part] += seconds
         falls = run.finite and run.value <= start
-        return run if falls and run.gradient_norm() > self.tolerance else None
+        loose = self.tolerance >= self.switch
+        return run if falls and (loose or run.gradient_norm() > self.tolerance) else None
 
 
 def _compiled(potential: Potential, max_iterations: int, switch: float) -> CompiledLBFGS:

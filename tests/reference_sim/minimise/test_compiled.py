@@ -168,6 +168,20 @@ def test_what_begins_in_float32_ends_in_a_minimum_of_float64(seed, monkeypatch):
     assert there.status == "converged" and np.array_equal(there.positions, found.positions)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_loose_tolerance_is_reached_in_float32_alone(seed, monkeypatch):
+    potential, guess = pressed(seed)
+
+    def again(solver: LBFGS, x0: np.ndarray) -> None:
+        raise AssertionError("the same descent begins a second time, in float64")
+
+    monkeypatch.setattr(lbfgs, "LBFGSRun", again)
+    found = LBFGS(potential, tolerance=0.1).minimise(guess)
+    weight = 9.81 * potential.cloth.masses.mean()
+    gradient = potential.value_and_gradient(found.positions)[1][potential.cloth.free]
+    assert found.status == "converged" and np.abs(gradient).max() < 0.1 * weight
+
+
 def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
     potential, guess = pressed(1)
     solver = LBFGS(potential)
