@@ -1,7 +1,8 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
 `headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN,
-...`, `counts of RUN, ...`, `runs of RUN, ...`, `metrics`; RUN is a folder of reports/published.
+...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`, `metrics`; RUN is a
+folder of reports/published. Earlier runs judge claims that the runs before them cannot.
 """
 
 from __future__ import annotations
@@ -17,12 +18,19 @@ from reports.run.reading import read_run_with_trainings
 from reports.statistics.published import PUBLISHED
 from reports.tables import make_tables
 from reports.tables.table import Table
-from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
+from reports.text.claim_rows import (
+    JudgedClaims,
+    claim_counts,
+    claim_rows,
+    judge_in_first,
+    rows_of_earlier_runs,
+)
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 
 FORMS = (
     "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
-    "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; metrics"
+    "claims exploratory of RUN, ...; claims earlier of RUN, ...; EARLIER RUN, ...; counts of RUN, ...; "
+    "runs of RUN, ...; metrics"
 )
 
 METRIC = ("Metric", "Unit", "Definition")  # heads
@@ -47,6 +55,9 @@ def published_part(words: str) -> str:
         wanted = [column.strip() for column in columns.split(",") if column.strip()]
         rows = text_rows(run, tables[name], wanted)
         return "\n\n".join(filter(None, [markdown_table(rows), remarks_on(rows)]))
+    if words.startswith("claims earlier"):
+        earlier = [PUBLISHED / run.strip() for run in columns.split(",")]
+        return markdown_table(rows_of_earlier_runs(_claims(*folders), _claims(*earlier)))
     if kind == "claims":
         return markdown_table(claim_rows(_claims(*folders), primary=name == "primary"))
     if kind == "counts":

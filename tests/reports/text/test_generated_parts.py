@@ -64,3 +64,13 @@ def test_the_command_checks_and_says_so(capsys):
 
 def test_documents_are_readme_and_docs_alone():
     assert {path.relative_to(Path(ROOT)).parts[0] for path, *_ in documents(ROOT)} == {"README.md", "docs"}
+
+
+def test_earlier_runs_judge_what_current_ones_cannot_and_nothing_else():
+    current = published_part("claims exploratory of quick, paper_text").splitlines()[2:]
+    earlier = published_part("claims earlier of quick, paper_text; windows").splitlines()[2:]
+    claims = {tuple(line.split(" | ")[:5]): line for line in earlier}
+    judged = {tuple(line.split(" | ")[:5]) for line in current if "not measured" not in line}
+    assert len(claims) == len(earlier) > 3 and not claims.keys() & judged
+    assert all(line.endswith(" windows |") for line in earlier)
+    assert published_part("claims earlier of windows; windows").splitlines()[2:] == []
