@@ -1,8 +1,8 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
 `headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN,
-...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`, `metrics`; RUN is a
-folder of reports/published. Earlier runs judge claims that the runs before them cannot.
+...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`, `metrics`; RUN
+is a folder of reports/published. Earlier runs judge claims that the runs before them cannot.
 """
 
 from __future__ import annotations
