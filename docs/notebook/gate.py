@@ -105,7 +105,7 @@ def main(folder: str, copies: int, seed: int = 0) -> None:
     noisy = NoisyCopies(run)
     random = np.random.default_rng(seed)
     alarms, planted_counts, missed = 0, Counter[str](), Counter[str]()
-    for _ in range(copies):
+    for done in range(1, copies + 1):
         copy = noisy.draw(random)
         for change in (found := failures(run, copy)):
             print(f"false alarm: {change}", flush=True)
@@ -115,6 +115,8 @@ def main(folder: str, copies: int, seed: int = 0) -> None:
         if not failures(run, worse):
             missed[name] += 1
             print(f"missed: {name}, {place}", flush=True)
+        if done % 10 == 0:
+            print(f"{done} copies: {alarms} false alarms, {missed.total()} missed", flush=True)
     print(f"{alarms} false alarms in {copies} noisy copies")
     for name, count in sorted(planted_counts.items()):
         print(f"{name}: {missed[name]} of {count} missed")
