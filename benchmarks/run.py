@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_option import RollOutError
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import PROGRAM, make_parser, request_of_run
+from benchmarks.plan.options import PROGRAM, make_parser, request_of_run, split
 from benchmarks.plan.plan import Plan
+from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
 from benchmarks.tasks.task import RunStopped
 from reference_sim.command.command_line import heeded_interrupts
@@ -28,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.list:
             from benchmarks.plan.list_names import list_names
 
-            print(list_names())
+            print(list_names(find_preset(options.preset), split(options.suite)))
             return 0
         plan = make_plan(request_of_run(options, command_line))
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy

@@ -104,7 +104,7 @@ def choose_cells(
     if selection.one_scene:  # some have the name of a scene
         cases, microbenchmarks = (), ()
     if not (chosen or cases or microbenchmarks):
-        raise PlanError("nothing to run: no suite asked for has these scenes and methods; see --list")
+        raise PlanError(_nothing_to_run(selection))
     if selection.one_scene and len({scene for scene, _, _ in chosen}) != 1:
         raise PlanError(f"{', '.join(selection.scenes)}: name one scene; see python -m benchmarks.run --list")
     stored = roll_out_cells(selection.roll_outs, tuple(chosen.values()))
@@ -122,6 +122,22 @@ def choose_cells(
     for user_scene in (scene for scene in scenes.values() if scene.declared_in):
         _check_user_scene(user_scene, known, selection.motions)
     return tuple(cells), cases, microbenchmarks
+
+
+def _nothing_to_run(selection: Selection) -> str:
+    """Return the line that refuses an empty selection: its preset and suites, and the remedy."""
+    preset = selection.preset.name
+    suites = f"suite{'s' * (len(selection.suites) > 1)} {', '.join(selection.suites)}"
+    line = f"nothing to run: at preset {preset} no such scene meets such a method in {suites}"
+    everywhere = replace(selection, suites=SUITE_NAMES, full=True)
+    for suite in SUITE_NAMES:
+        in_suite = replace(everywhere, suites=(suite,))
+        if any(any(part(in_suite)) for part in (_pairs, _cases, _microbenchmarks)):
+            return f"{line}; --suite {suite} has them"
+    methods = list(dict.fromkeys(entry.name for *_, entry in _pairs(replace(everywhere, methods=()))))
+    if selection.scenes and methods:
+        return f"{line}; methods of these scenes are {', '.join(methods[:6])}{', ...' * bool(methods[6:])}"
+    return f"{line}; see --list --preset {preset}"
 
 
 def _check_user_scene(scene: Scene, known: Mapping[str, Scene], motions: Motions) -> None:

@@ -8,16 +8,25 @@ from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.performance.registry import MICROBENCHMARKS
-from benchmarks.plan.choose_cells import default_suites
+from benchmarks.plan.choose_cells import Selection, choose_suites, default_suites
+from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.suites import SUITES
-from benchmarks.presets import PRESETS, find_preset
+from benchmarks.presets import PRESETS, Preset
 from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES
 from benchmarks.scenes.variations import shapes, there_and_back
 from benchmarks.validation.registry import CASES
 
 
-def list_names() -> str:
-    """Return suites, scenes, methods, motions and presets, one line each."""
+def list_names(preset: Preset, suites: tuple[str, ...] = ()) -> str:
+    """Return suites, scenes, methods, motions and presets, one line each.
+
+    Every scene and method can be named at every preset. The scenes that take part without being named are
+    those of the given preset and suites.
+
+    Raises:
+        PlanError: a suite that does not exist.
+    """
+    measured = [suite for suite in SUITES if suite.name in choose_suites(suites)]
     from snug.motion.library import CONTROL, DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
     from snug.motion.recorded.table import CLIPS
 
@@ -29,8 +38,15 @@ def list_names() -> str:
         for motion, role in (swinging if scenes.dynamic else roles).items()
         for scene in (scenes.scene(motion),)
     ]
+    extent = Selection(
+        suites=suites, preset=preset, motions=split_motions((), (), preset), full=bool(suites)
+    ).extent
     parts = (
         ("suites", ((s.name, s.description) for s in SUITES)),
+        (
+            f"scenes that preset {preset.name} measures in each suite where none is named",
+            ((s.name, ", ".join(s.scenes(extent))) for s in measured if s.scenes(extent)),
+        ),
         (
             "scenes; of a dressed body, in a test or validation motion, also its liveliest part, as "
             f"{dressed[0][0]}@clip",
@@ -43,8 +59,8 @@ def list_names() -> str:
             ],
         ),
         (
-            "methods, and the suites in which they take part without being named",
-            ((m.name, f"{m.description} {_where(m)}") for m in METHODS),
+            f"methods, and the suites in which they take part at preset {preset.name} without being named",
+            ((m.name, f"{m.description} {_where(m, preset)}") for m in METHODS),
         ),
         (
             "training motions",
@@ -66,8 +82,8 @@ def _cases(suite: str) -> list[tuple[str, str]]:
     return [(name, f"{len(d)} points, {d[0]} the first" if d[1:] else d[0]) for name, d in by_scene.items()]
 
 
-def _where(method: MethodEntry) -> str:
-    suites = default_suites(method.name, find_preset("quick"))
+def _where(method: MethodEntry, preset: Preset) -> str:
+    suites = default_suites(method.name, preset)
     return f"[{', '.join(suites)}]" if suites else "[when named]"
 
 

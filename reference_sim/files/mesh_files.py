@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, Polygon, read_parts
+from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, Polygon, read_parts, try_poly_data
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
@@ -145,6 +145,8 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     (2, 3, 3)
     """
     paths = mesh_paths(str(pattern))
+    if paths[1:] and paths[0].suffix.lower() in (".vtk", ".vtp"):
+        try_poly_data(*paths)  # all in one process, for one takes a second to start
     first = read_mesh(paths[0])
     frames = [first.positions]
     for path in paths[1:]:

@@ -9,11 +9,13 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from reference_sim.cloth import MeshError
 from reference_sim.files.mesh_header import check_header
+from reference_sim.files.trial import try_out
 
 UV_OF_VTK = "UV"  # what the texture coordinates of a VTK file are called here
 
@@ -116,8 +118,25 @@ def _read_with_meshio(path: Path) -> Parts:
     return Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
 
 
-def _read_with_vtk(path: Path) -> Parts | None:
-    """Read points and triangles of a file of PolyData; None if it holds none."""
+def try_poly_data(*paths: Path) -> bool:
+    """Return whether VTK can read the files; a process tries each once, until it changes."""
+    new = [path for path in paths if _state(path) not in _TRIED]
+    if new and try_out(read_poly_data, *new):
+        return False
+    _TRIED.update(map(_state, new))
+    return True
+
+
+_TRIED: set[tuple[str, int, int]] = set()  # files that VTK could read
+
+
+def _state(path: Path) -> tuple[str, int, int]:
+    stat = path.stat()
+    return str(path.absolute()), stat.st_mtime_ns, stat.st_size
+
+
+def read_poly_data(path: Path) -> Any:
+    """Return what VTK makes of a file. Raises an exception of pyvista, or crashes: see `try_poly_data`."""
     import pyvista
 
     try:
@@ -128,11 +147,18 @@ def _read_with_vtk(path: Path) -> Parts | None:
         ):
             warnings.simplefilter("ignore")
             logging.disable(logging.CRITICAL)  # to which readers of pyvista hand errors on
-            surface = pyvista.read(path)
-    except Exception:  # whatever VTK finds wrong with it, meshio's message is the one to show
-        return None
+            return pyvista.read(path)
     finally:
         logging.disable(logging.NOTSET)
+
+
+def _read_with_vtk(path: Path) -> Parts | None:
+    """Read points and triangles of a file of PolyData; None if it holds none, or VTK cannot read it."""
+    if not try_poly_data(path):
+        return None
+    import pyvista
+
+    surface = read_poly_data(path)
     if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
         return None
     if not surface.is_all_triangles:

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.atomic_files import create
+from reference_sim.files.trial import try_out
 from reference_sim.trajectory.trajectory import UNREADABLE_ERRORS, Trajectory, TrajectoryError, read_frames
-from reference_sim.trajectory.trial import try_out
 from reference_sim.trajectory.writer import BEFORE_LAST_STEP, END_OF_FILE, FIRST_FAILURE, UNFINISHED
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
     if not path.exists():
         return None
     try:
-        if wrong := try_out(path, read_whole_frames):
+        if wrong := try_out(read_whole_frames, path):
             raise ValueError(wrong)
         earlier = read_whole_frames(path)
     except UNREADABLE_ERRORS as error:

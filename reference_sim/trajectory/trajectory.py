@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.array_file import MOST_PACKED
-from reference_sim.trajectory.trial import try_out
+from reference_sim.files.trial import try_out
 from reference_sim.trajectory.writer import TrajectoryWriter
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Trajectory:
             TrajectoryError: missing file, or not a trajectory.
         """
         try:
-            if guarded and Path(path).is_file() and (wrong := try_out(Path(path), read_file)):
+            if guarded and Path(path).is_file() and (wrong := try_out(read_file, Path(path))):
                 raise ValueError(wrong)
             return read_file(Path(path))
         except FileNotFoundError:

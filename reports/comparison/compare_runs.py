@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -114,10 +115,10 @@ def _matching(names: pd.Series, patterns: str) -> pd.Series:
 def _means(run: Run, one: pd.DataFrame, other: pd.DataFrame) -> tuple[list[Change], int, int, dict[str, int]]:
     """Return changes, number of means, of those of one seed that differ, and times taken once by method."""
     rows = _over_the_same(*_with_known_zero(run, one, other))
-    first, second = (means(frame, *GROUP) for frame in rows)
+    first, second = (means(frame, *GROUP).to_dict() for frame in rows)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
     known = _metrics(run)
-    scales = rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median())
+    scales = rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
     judged = [
         (place, method, metric := known[name], mean, new, _effect(metric, new, mean))
         for (place, method, name), (mean, new) in differ.items()
@@ -139,8 +140,9 @@ def _means(run: Run, one: pd.DataFrame, other: pd.DataFrame) -> tuple[list[Chang
         size = size_of_means(metric, mean, new, far, p)
         changes.append(Change(side(metric, far.value), place, method, metric.name, size))
     reported = {(change.place, change.method, change.metric) for change in changes}
-    before, after = (frame[frame["place"] != frame["scene"]] for frame in rows)
-    garments = dict(zip(before["scene"], before["place"]))
+    worn = rows[0][rows[0]["place"] != rows[0]["scene"]]
+    garments = dict(zip(worn["scene"], worn["place"]))
+    before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
     of_scenes = changed_scenes(before, after, known)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
     return changes, len(first), len(differ) - len(judged), dict(once)
@@ -178,8 +180,8 @@ def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
 def _beyond_noise(metric: Metric, far: Effect, p: float | None) -> bool:
     """Return whether a change is more than what another draw of seeds, or of times, would do."""
     if metric.of == "machine":
-        low, high = far.interval or (far.shown, far.shown)
-        return far.scale == RATIO and (low > 1.0 + TIME_TOLERANCE or high < 1.0 / (1.0 + TIME_TOLERANCE))
+        low, high = far.ends or (far.value - far.uncertainty, far.value + far.uncertainty)
+        return far.scale == RATIO and max(low, -high) > math.log1p(TIME_TOLERANCE)
     if p is None:
         return abs(far.above()) > SPREADS * far.uncertainty
     return abs(far.above()) > far.uncertainty and p < LEVEL

@@ -1,9 +1,10 @@
 """Changes of single scenes of a garment, which a mean over its motions hides.
 
 A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter is
-pooled over all scenes of the method, and a scene that scatters more has its own. The test is Student's with
-the pooled degrees of freedom, corrected by Bonferroni for all of these tests. A method without seeds is
-compared with the uncertainty that the reference's ensemble leaves.
+pooled over the scenes of the method, and a scene that scatters more has its own. A scene that scatters far
+more than most stays out of the pool: one motion on which seeds disagree would hide changes of all others.
+The test is Student's with the pooled degrees of freedom, corrected by Bonferroni for all of these tests. A
+method without seeds is compared with the uncertainty that the reference's ensemble leaves.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ import pandas as pd
 from reports.comparison.change import FLOOR, SPREADS, Change, side, size_of_values, tolerance_of
 from reports.run.finished_run import Metric
 from reports.statistics.effects import LEVEL
+
+ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,23 @@ class Difference:
     freedom: float = math.inf
 
 
+@dataclass(frozen=True)
+class Table:
+    """Values of one metric of one method in a run.
+
+    Attributes:
+        scenes: names of its rows, sorted.
+        values: (scenes, seeds); NaN where a scene lacks a seed.
+        uncertainty: (scenes,), 0 where it is unknown.
+        seeded: whether the method has seeds.
+    """
+
+    scenes: tuple[str, ...]
+    values: np.ndarray
+    uncertainty: np.ndarray
+    seeded: bool
+
+
 def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Metric]) -> list[Change]:
     """Return the changes of single scenes.
 
@@ -57,71 +77,96 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     """
     from scipy import stats
 
+    answers = [name for name, metric in metrics.items() if metric.of != "machine"]
+    before, after = (_tables(frame[frame["metric"].isin(answers)]) for frame in (one, other))
     differences: list[Difference] = []
-    later = dict(list(other.groupby(["method", "metric"], sort=False)))
-    for (method, name), rows in one.groupby(["method", "metric"], sort=False):
-        if metrics[name].of != "machine":
-            differences += _differences(method, metrics[name], rows, later[method, name])
+    for (method, name), table in before.items():
+        differences += _differences(method, metrics[name], table, after[method, name])
     tests = sum(difference.error > 0.0 for difference in differences)
     changes = []
     for d in differences:
-        reach = 0.0
-        if d.error > 0.0:
-            reach = d.error * float(stats.t.isf(LEVEL / 2.0 / tests, d.freedom))
-        if abs(d.far) > max(d.least, reach):
-            size = size_of_values(d.metric, d.before, d.after)
-            changes.append(Change(side(d.metric, d.far), d.scene, d.method, d.metric.name, size))
+        if abs(d.far) <= d.least:
+            continue
+        if d.error > 0.0 and abs(d.far) <= d.error * float(stats.t.isf(LEVEL / 2.0 / tests, d.freedom)):
+            continue
+        size = size_of_values(d.metric, d.before, d.after)
+        changes.append(Change(side(d.metric, d.far), d.scene, d.method, d.metric.name, size))
     return changes
 
 
-def _differences(method: str, metric: Metric, one: pd.DataFrame, other: pd.DataFrame) -> Iterator[Difference]:
+def _tables(frame: pd.DataFrame) -> dict[tuple[str, str], Table]:
+    """Return (method, metric) -> its table, in the order of the rows.
+
+    The frame is pivoted once: a pivot of each metric of each method takes pandas some 10 s a run.
+    """
+    if frame.empty:
+        return {}
+    group = ["method", "metric"]
+    pivot = frame.pivot_table(index=[*group, "scene"], columns="seed", values="value")
+    unsure = frame.groupby([*group, "scene"])["uncertainty"].mean().reindex(pivot.index).fillna(0.0)
+    values, uncertainty = pivot.to_numpy(), unsure.to_numpy()
+    scenes = pivot.index.get_level_values("scene").to_numpy()
+    seeded = frame.groupby(group, sort=False)["seeded"].any()
+    places = pivot.groupby(level=group).indices
+    tables = {}
+    for key, has_seeds in seeded.items():
+        chosen = places[key]
+        some = ~np.isnan(values[chosen]).all(axis=0)
+        tables[key] = Table(
+            tuple(scenes[chosen]), values[chosen][:, some], uncertainty[chosen], bool(has_seeds)
+        )
+    return tables
+
+
+def _differences(method: str, metric: Metric, one: Table, other: Table) -> Iterator[Difference]:
     """Yield the difference of each scene that both have; of a network, where both have two seeds."""
-    before, after = (rows.pivot_table(index="scene", columns="seed", values="value") for rows in (one, other))
-    scenes = before.index.intersection(after.index)
-    before, after = before.loc[scenes], after.loc[scenes]
-    if bool(one["seeded"].any()) and min(before.shape[1], after.shape[1]) < 2:
+    if one.seeded and min(one.values.shape[1], other.values.shape[1]) < 2:
         return
+    before, after = one.values, other.values
     relative = metric.name.startswith("relative_excess/")
     signed = relative or metric.arbitrary_zero
-    positive = not signed and min(one["value"].min(), other["value"].min()) > 0.0
+    positive = not signed and min(np.nanmin(before), np.nanmin(after)) > 0.0
     scales = [np.log(x) if positive else x for x in (before, after)]
-    far = scales[1].mean(axis=1) - scales[0].mean(axis=1)
+    far = np.nanmean(scales[1], axis=1) - np.nanmean(scales[0], axis=1)
     scatter, freedom = _scatter(scales)
     share = tolerance_of(metric)
-    median = float(before.mean(axis=1).abs().median())
-    moved = SPREADS * np.hypot(*(_uncertainty(rows).reindex(scenes).fillna(0.0) for rows in (one, other)))
-    for scene in scenes:
-        old, new = float(before.loc[scene].mean()), float(after.loc[scene].mean())
-        unit = 100.0 if relative else max(abs(old), median)
-        if positive:
-            least = max(math.log1p(share), math.log1p((FLOOR * median + moved[scene]) / old))
-        else:
-            least = max(share * unit, FLOOR * median, moved[scene])
-        counts = before.loc[scene].count(), after.loc[scene].count()
-        error = scatter[scene] * math.sqrt(1.0 / counts[0] + 1.0 / counts[1])
-        yield Difference(scene, method, metric, old, new, float(far[scene]), least, error, freedom)
+    old, new = np.nanmean(before, axis=1), np.nanmean(after, axis=1)
+    median = float(np.median(np.abs(old)))
+    moved = SPREADS * np.hypot(one.uncertainty, other.uncertainty)
+    if positive:
+        least = np.maximum(math.log1p(share), np.log1p((FLOOR * median + moved) / old))
+    else:
+        unit = 100.0 if relative else np.maximum(np.abs(old), median)
+        least = np.maximum(np.maximum(share * unit, FLOOR * median), moved)
+    counts = [np.isfinite(x).sum(axis=1) for x in (before, after)]
+    error = scatter * np.sqrt(1.0 / counts[0] + 1.0 / counts[1])
+    for k, scene in enumerate(one.scenes):
+        yield Difference(
+            scene, method, metric, float(old[k]), float(new[k]), float(far[k]), float(least[k]),
+            float(error[k]), freedom,
+        )  # fmt: skip
 
 
-def _scatter(runs: list[pd.DataFrame]) -> tuple[pd.Series, float]:
+def _scatter(runs: list[np.ndarray]) -> tuple[np.ndarray, float]:
     """Return the standard deviation over seeds in each scene, at least the pooled one, and its freedom.
 
     A seed may move all scenes alike. With correlation rho between S scenes, the pooled variance has
     1 + (S - 1) rho^2 times fewer degrees of freedom than with independent scenes.
     """
-    residuals = [x.sub(x.mean(axis=1), axis=0) for x in runs]
-    squares = sum((x**2).sum(axis=1) for x in residuals)
-    freedom = sum(x.count(axis=1) - 1 for x in runs)
-    total = float(freedom.sum())
-    if total == 0.0 or not squares.any():
+    residuals = [x - np.nanmean(x, axis=1, keepdims=True) for x in runs]
+    squares = sum(np.nansum(x**2, axis=1) for x in residuals)
+    freedom = sum(np.isfinite(x).sum(axis=1) - 1 for x in runs)
+    if not freedom.any() or not squares.any():
         return squares * 0.0, math.inf
-    pooled = float(squares.sum()) / total
-    scenes, seeds = len(squares), sum(x.shape[1] - 1 for x in runs)
-    common = sum(float((x.mean(axis=0) ** 2).sum()) for x in residuals) / seeds
+    own = np.sqrt(squares / np.maximum(freedom, 1))
+    pool = (freedom > 0) & (own <= ODD * np.median(own[freedom > 0]))
+    if not squares[pool].any():
+        pool = freedom > 0
+    total = float(freedom[pool].sum())
+    pooled = float(squares[pool].sum()) / total
+    residuals = [x[pool] for x in residuals]
+    scenes, seeds = int(pool.sum()), sum(x.shape[1] - 1 for x in runs)
+    common = sum(float((np.nanmean(x, axis=0) ** 2).sum()) for x in residuals) / seeds
     rho = (scenes * common / pooled - 1.0) / (scenes - 1) if scenes > 1 else 0.0
     total /= 1.0 + (scenes - 1) * min(max(rho, 0.0), 1.0) ** 2
-    own = np.sqrt(squares / freedom.where(freedom > 0))
-    return own.fillna(0.0).clip(lower=math.sqrt(pooled)), total
-
-
-def _uncertainty(rows: pd.DataFrame) -> pd.Series:
-    return rows.groupby("scene")["uncertainty"].mean().fillna(0.0)
+    return np.maximum(own, math.sqrt(pooled)), total

@@ -69,8 +69,8 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     names = list(keys)
     places, ends = ([key for key in names if key != name] for name in ("method", "metric"))
     tried = frame[frame["status"] != "skipped"]
-    asked = tried.groupby(places)["scene"].nunique()
-    failed = tried[~tried["usable"]].groupby(ends)["seed"].agg(set)
+    asked = tried.groupby(places)["scene"].nunique().to_dict()
+    failed = tried[~tried["usable"]].groupby(ends)["seed"].agg(set).to_dict()
     usable = frame.assign(stalled=frame["status"] == "stalled")[frame["usable"]]
     of_seed, of_all = (usable.groupby(group, sort=False) for group in ([*names, "seed"], names))
     seeds = of_seed["value"].mean()

@@ -12,7 +12,7 @@ from reports.statistics.means_and_spreads import mean_of, shared_scenes
 
 LEARNED = ("network", "ablation")
 EXTERNAL = "external"  # role of roll-outs from files and programs
-MOST_EXTERNAL = 2  # of these that page one shows
+MOST_EXTERNAL = 3  # of these that page one shows
 BEST_BY = ("step/distance", "gap/energy", "curvature/error", "energy/total")
 
 

@@ -16,10 +16,11 @@ from benchmarks import run
 from benchmarks.methods.catalogue import all_methods as methods
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.plan import choose_cells as choosing
-from benchmarks.plan.make_plan import choose_folder
+from benchmarks.plan.make_plan import choose_folder, make_plan
 from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.request import Request
 from benchmarks.plan.suites import SUITES, Extent
-from benchmarks.presets import PRESETS
+from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS
 from benchmarks.validation.stress.cases import MAPS, STEPS
@@ -100,6 +101,14 @@ def test_the_list_names_every_scene_that_a_suite_has(preset, split, capsys):
     assert not {name.removesuffix("@clip") for name in asked} - listed
 
 
+def test_the_list_has_the_scenes_that_the_preset_and_suites_measure(capsys):
+    assert run.main(["--list", "--preset", "smoke", "--suite", "speed"]) == 0
+    measured = capsys.readouterr().out.partition("preset smoke measures")[2].partition("\n\n")[0]
+    plan = make_plan(Request(preset=find_preset("smoke"), suites=("speed",)))
+    assert measured.splitlines()[1].split("speed", 1)[1].strip().split(", ") == [s.name for s in plan.scenes]
+    assert len(measured.splitlines()) == 2
+
+
 # --- wrong words -----------------------------------------------------------------------------------------
 
 
@@ -128,8 +137,10 @@ def test_the_list_names_every_scene_that_a_suite_has(preset, split, capsys):
         (["--only", "failed", "--fresh"], "leave out"),
         (["--workers", "0"], "1 or more"),
         (["--frobnicate"], "--frobnicate"),
-        (["--scenes", "free_fall", "--methods", "snug", "--suite", "garments"], "nothing to run"),
-        (["--scenes", "free_fall", "--suite", "extremes"], "nothing to run"),
+        (["--scenes", "free_fall", "--methods", "snug", "--suite", "garments"], "at preset quick no such"),
+        (["--scenes", "free_fall", "--suite", "extremes"], "suite extremes; --suite speed has them"),
+        (["--scenes", "flag", "--methods", "snug-dynamic"], "methods of these scenes are simulation"),
+        (["--list", "--suite", "garment"], "garments"),
     ],
 )
 def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monkeypatch, capsys):

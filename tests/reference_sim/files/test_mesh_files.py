@@ -7,6 +7,7 @@ import struct
 import meshio
 import numpy as np
 import pytest
+import pyvista as pv
 
 from reference_sim import Trajectory
 from reference_sim.cloth import MeshError
@@ -227,3 +228,18 @@ def test_point_cache_by_its_bytes(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.obj", "sheet.pc2"]
     with pytest.raises(ValueError, match=r"ends in \.pc2"):
         write_point_cache(tmp_path / "sheet.abc", trajectory)
+
+
+def test_a_file_that_crashes_vtk_is_refused(tmp_path):
+    path = tmp_path / "sheet.vtk"
+    pv.Plane(i_resolution=4, j_resolution=4).triangulate().save(path)
+    data = path.read_bytes()
+    assert len(read_mesh(path).faces) == 32
+    # VTK then takes the offsets of faces for their corners, and reads beyond the vertices.
+    path.write_bytes(data.replace(b"Version 5.1", b"Version 4.2"))
+    with pytest.raises(MeshError, match="cannot be read"):
+        read_mesh(path)
+    (tmp_path / "more").mkdir()
+    for frame in range(2):
+        (tmp_path / "more" / f"{frame}.vtk").write_bytes(data)
+    assert read_sequence(tmp_path / "more")[0].shape == (2, 25, 3)

@@ -95,3 +95,21 @@ def test_other_seeds_other_times_and_round_off_are_no_change():
     assert alarms <= 1
     tiny = [times(1.0 - 1e-6, metric="energy/total")(given) for given in a_run(0)]
     assert not fails(a_run(0), tiny)
+
+
+def test_a_motion_on_which_seeds_disagree_hides_no_change_of_another():
+    broken = {"scene": SCENES[6], "seed": 1} | STRAIN
+    before, after = ([times(40.0, **broken)(given) for given in a_run(draw)] for draw in (0, 1))
+    assert not fails(before, after)
+    assert fails(before, [times(3.0, scene=SCENES[0], **STRAIN)(given) for given in after])
+
+
+def test_a_repeated_time_is_compared_with_the_range_of_its_repeats():
+    def spread(given: Row) -> Row:
+        wide = given.metric == "cost/spread"
+        return dataclasses.replace(given, value=12.0) if wide else given
+
+    before = [spread(given) for given in a_run(0)]
+    slower = {factor: times(factor, method="lbfgs-4", metric="cost/frame") for factor in (1.17, 1.5)}
+    assert not fails(before, [slower[1.17](given) for given in before])
+    assert fails(before, [slower[1.5](given) for given in before])

@@ -1,8 +1,8 @@
-"""Trial of a trajectory file in a process of its own, under a cap of memory and time.
+"""Trial of a file in a process of its own, under a cap of memory and time.
 
-HDF5 follows what a file says: a tree of links or of chunks that comes back to itself crashes it, or keeps it
-going for ever. So a file that somebody else made, or that a disk has damaged, is first read where that harms
-nobody.
+HDF5 and VTK follow what a file says: a tree of links or of chunks that comes back to itself crashes HDF5, or
+keeps it going for ever, and a wrong count crashes VTK. So a file that somebody else made, or that a disk has
+damaged, is first read where that harms nobody.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ NO_TRIAL = (1, 2)  # exit statuses of Python where it finds no such module: noth
 REFUSED = 3  # exit status of a trial that has said why
 
 
-def try_out(path: Path, read: Callable[[Path], object]) -> str:
-    """Return why a function cannot read the file, in one line; empty where it can.
+def try_out(read: Callable[[Path], object], *paths: Path) -> str:
+    """Return why a function cannot read one of the files, in one line; empty where it can read all.
 
     Args:
-        path: a file that exists.
         read: a function of a module, which the process imports by its name.
+        paths: files that exist.
     """
-    size = path.stat().st_size
+    size = sum(path.stat().st_size for path in paths)
     memory, seconds = MEMORY + FILES * size, SECONDS + size / SPEED
     # Each thread of a linear algebra library takes addresses for itself: on many cores more than the cap.
     alone = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
-    words = [read.__module__, read.__name__, str(path.absolute()), str(memory)]
+    words = [read.__module__, read.__name__, str(memory), *(str(path.absolute()) for path in paths)]
     try:
         done = subprocess.run(
             [sys.executable, "-m", __name__, *words],
@@ -46,15 +46,16 @@ def try_out(path: Path, read: Callable[[Path], object]) -> str:
         return " ".join(done.stdout.decode(errors="replace").split())[:300]
     if done.returncode in (0, *NO_TRIAL):
         return ""
-    return f"reading it crashes HDF5, or takes more than {memory / 1e9:.0f} GB"
+    return f"reading it crashes the reader, or takes more than {memory / 1e9:.0f} GB"
 
 
-def main(module: str, name: str, path: str, memory: int) -> int:
-    """Read the file by that function under a cap of memory [bytes]; return the exit status."""
+def main(module: str, name: str, memory: str, *paths: str) -> int:
+    """Read the files by that function under a cap of memory [bytes]; return the exit status."""
     read = getattr(import_module(module), name)
-    _cap(memory)
+    _cap(int(memory))
     try:
-        read(Path(path))
+        for path in paths:
+            read(Path(path))
     except Exception as error:  # whatever it is, the file is to blame
         print(error or type(error).__name__)
         return REFUSED
@@ -71,4 +72,4 @@ def _cap(memory: int) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4])))
+    sys.exit(main(*sys.argv[1:]))

@@ -1,6 +1,6 @@
 """Coverage of intervals and rates of verdicts, by simulated relative excesses and the code that judges.
 
-    python docs/notebook/coverage.py --times 1000
+    python docs/notebook/interval_coverage.py --times 1000
 
 prints the tables of statistics.md. Excesses are lognormal over motions, with scatter of seeds and
 of single cells, and noise of the reference, which can bring it below zero.
