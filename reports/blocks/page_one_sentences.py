@@ -40,7 +40,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
     compared = next(iter(compared_scenes(run, cells).values()), [])
     timed = cells[cells["scene"].isin(compared)] if compared else worn
     sentences = {
-        "How near": _near(run, worn), "How it moves": _moves(run, worn),
+        "How near": _near(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
         "At what cost": _cost(run, timed, compared), "How certain": _trust(run, timed),
         "On other bodies": _on_other_bodies(run),
     }  # fmt: skip
@@ -74,6 +74,17 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
             f"({scene.partition('/')[2] or scene}), {low} to {high} % when any one motion is left out"
         )
     return f"{text}."
+
+
+def _distances(run: Run, rows: pd.DataFrame) -> str:
+    """Say how far the subjects are from the reference, for a run without relative excess: no skinning there."""
+    parts = []
+    for method in subjects(run, set(rows[rows["usable"]]["method"])):
+        distance, gap = (value_of(rows, method, name) for name in (DISTANCE, GAP))
+        if distance is not None:
+            above = "" if gap is None else f", with an energy gap of {number(gap)} J"
+            parts.append(f"{run.label(method)} lies {number(distance)} mm from the reference{above}")
+    return f"{'; '.join(parts)}." if parts else ""
 
 
 def _share(excess: Excess) -> str:

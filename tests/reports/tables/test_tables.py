@@ -421,6 +421,18 @@ def test_roll_outs_of_the_user_are_on_page_one_beside_snug_or_alone():
     assert "mine" in {line[0] for line in make_tables(alone)["overview"].rows}
 
 
+def test_a_roll_out_in_scenes_without_skinning_has_its_distance_on_page_one():
+    numbers = (("distance/rms", 12.0, "mm"), ("gap/energy", 0.25, "J"))
+    mine = [
+        dataclasses.replace(row(s, "mine", m, v, unit=u), role="external", seeded=False, pairing_group="")
+        for s in ("free_fall", "flag")
+        for m, v, u in numbers
+    ]
+    run = run_of([*(row(s, "simulation", "energy/total", 0.5) for s in ("free_fall", "flag")), *mine])
+    said = dict(headline(run))["How near"].replace("\u00a0", " ")
+    assert said == "mine lies 12.0 mm from the reference, with an energy gap of 0.250 J."
+
+
 def test_changed_networks_are_networks_where_a_run_has_no_others():
     rows = on_two_scenes("snug-springs", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
     changed = [dataclasses.replace(r, role="ablation", base="snug") for r in rows[:2]] + rows[2:]
