@@ -46,6 +46,8 @@ KNOWN = {
     "pbns-paper": Style("", "#00725A", "^", "--"),
     "tailornet": Style("", "#661100", "H", ":"),
     "santesteban2019": Style("", "#AA4499", "d", (0.0, (1.0, 1.0))),
+    "nearest-poses": Style("", "#882255", "8", ":"),
+    "pose-regression": Style("", "#999933", "h", ":"),
     "supervised": Style("", "#E69F00", "s", (0.0, (6.0, 1.5))),
     "snug": Style("", "#0072B2", "o"),
     "snug-paper": Style("", "#94A000", "o", "-."),
@@ -72,6 +74,8 @@ KNOWN = {
     "supervised-data": Style("Supervised", "", "s", (0.0, (6.0, 1.5))),
     "santesteban2019-data": Style("Santesteban 2019", "", "d", (0.0, (1.0, 1.0))),
     "tailornet-data": Style("TailorNet", "", "H", ":"),
+    "nearest-poses-data": Style("Nearest poses", "", "8", ":"),
+    "pose-regression-data": Style("Ridge on principal components", "", "h", ":"),
 }
 LEADING = ("reference", "baseline", "network")  # roles that a figure shows when it has no room for all
 ROOM = 8  # methods that a figure shows whatever they are

@@ -15,8 +15,9 @@ from numba.extending import overload
 
 from reference_sim.kernels.kernel_cache import njit
 
-# Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU).
-PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL = range(5)
+# Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU); a cell;
+# squared distances of x from the rows of W; the mean of the rows of W that have the least distances.
+PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, DISTANCES, NEAREST = range(7)
 ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
 VERTEX_BLOCK = 64  # vertices that are skinned together
 FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
@@ -86,9 +87,9 @@ def run_frame(
 
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
     begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where its
-    recurrent part begins. terms: mean and spread of the features (D,), which are normalised
-    into work[:D], then factors and biases of each matrix. The offsets are the last of `work`. The others
-    are those of skin_frame.
+    recurrent part begins; of NEAREST the terms begin with the number of rows that share, and what is added to
+    each distance. terms: mean and spread of the features (D,), which are normalised into work[:D], then
+    factors and biases of each matrix. The offsets are the last of `work`. The others are those of skin_frame.
     """
     inputs = len(features)
     for i in range(inputs):
@@ -98,6 +99,10 @@ def run_frame(
         source, y = work[operations[i, 5] :], work[operations[i, 6] :]
         if kind == CELL:
             _cell(source, work[columns:], y, rows)
+        elif kind == DISTANCES:
+            _distances(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
+        elif kind == NEAREST:
+            _nearest(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
         else:
             matrix, affine = weights[operations[i, 3] :], terms[operations[i, 4] :]
             _multiply(kind, matrix, affine, source, y, rows, columns)
@@ -148,6 +153,37 @@ def _multiply(
             elif kind == SMOOTH:
                 value *= _sigmoid(value)
             y[j] = value
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def _distances(
+    weights: np.ndarray, factors: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int
+) -> None:
+    for j in range(rows):
+        w, squared = weights[j * columns :], _ZERO
+        for k in range(columns):
+            difference = factors[j] * _value(w[k]) - x[k]
+            squared += difference * difference
+        y[j] = squared
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def _nearest(
+    weights: np.ndarray, terms: np.ndarray, distances: np.ndarray, y: np.ndarray, rows: int, columns: int
+) -> None:
+    """Write the mean of the rows with the least distances, each by the inverse of its own, into y."""
+    total = _ZERO
+    y[:columns] = _ZERO
+    for _ in range(int(terms[0])):
+        j = np.argmin(distances[:rows])
+        share = _ONE / (distances[j] + terms[1])
+        w, factor = weights[j * columns :], share * terms[2 + j]
+        for k in range(columns):
+            y[k] += factor * _value(w[k])
+        total += share
+        distances[j] = np.inf
+    for k in range(columns):
+        y[k] /= total
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")

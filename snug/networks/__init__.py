@@ -4,6 +4,7 @@
 | --- | --- |
 | garment_network | `GarmentNetwork`, the base of all architectures |
 | regressor, pbns, motion_perceptron, santesteban2019, tailornet | one architecture each |
+| fitted | two learners without training steps: nearest poses, ridge regression |
 | architectures | the table of kinds; `make_network` |
 | dressed_body, motion_features | `DressedBody`: a garment on a body, and the inputs of networks |
 | trained_model, tensor_file | `TrainedModel` and its file |
@@ -12,7 +13,7 @@
 
 >>> from snug.networks import ARCHITECTURES, make_network
 >>> list(ARCHITECTURES)
-['snug', 'dynamic', 'supervised', 'pbns', 'santesteban2019', 'tailornet']
+['snug', 'dynamic', 'supervised', 'pbns', 'santesteban2019', 'tailornet', 'nearest-poses', 'pose-regression']
 >>> from snug.recipes import DEFAULT
 >>> network = make_network("snug", 154, 1000, DEFAULT, seed=0)
 >>> f"{network.megabytes:.1f} MB, reads {network.feature_set}"

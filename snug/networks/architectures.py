@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor, nn
 
+from snug.networks.fitted import NearestPoses, PoseRegression
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.initialisation import initialise, zero
 from snug.networks.motion_perceptron import MotionPerceptron
@@ -23,6 +24,8 @@ ARCHITECTURES: dict[str, type[GarmentNetwork]] = {
     "pbns": PoseSpaceDeformation,
     "santesteban2019": FitAndWrinkles,
     "tailornet": FrequencyMixture,
+    "nearest-poses": NearestPoses,
+    "pose-regression": PoseRegression,
 }
 
 

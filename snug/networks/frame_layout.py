@@ -17,6 +17,8 @@ from snug.kernels.one_frame import (
     ADDED,
     CELL,
     COLUMNS,
+    DISTANCES,
+    NEAREST,
     PRODUCT,
     RECTIFIED,
     ROWS,
@@ -141,13 +143,34 @@ class FramePlan:
 
     def add_offsets(self, network: GarmentNetwork, *parts: tuple[nn.Linear, slice]) -> None:
         """Add the offsets (3 V,), the sum of linear layers of the numbers at places; to be called last."""
-        places, vertices = self._places.copy(), network.vertices
-        places[np.isin(places, network.pins)] = vertices  # as those behind: without offset
-        rows = (3 * places + np.arange(3)[:, None]).ravel()
+        rows = self._rows(network)
         for kind, (layer, x) in zip((PRODUCT, *[ADDED] * len(parts)), parts):
             matrix, bias = _numbers_of(layer)
             matrix, bias = np.pad(matrix, ((0, 3), (0, 0)))[rows], np.pad(bias, (0, 3))[rows]
             self._product(kind, matrix, bias, x, self._used, scale=network.output_scale)
+
+    def add_nearest(
+        self, network: GarmentNetwork, poses: Tensor, frames: Tensor, x: slice, neighbours: int, near: float
+    ) -> None:
+        """Add the offsets of the frames (F, 3V) whose poses (F, D) are nearest to x; to be called last.
+
+        They weigh 1 / (squared distance + near).
+        """
+        nothing = torch.zeros(len(poses)).numpy()
+        distances = self._place(len(poses))
+        self._product(DISTANCES, poses.detach().numpy(), nothing, x, distances.start)
+        matrix = np.pad(frames.detach().numpy(), ((0, 0), (0, 3)))[:, self._rows(network)]
+        first = sum(map(len, self._matrices)), sum(map(len, self._terms))
+        self._operations.append((NEAREST, *matrix.shape, *first, distances.start, self._used))
+        weights, factors = store_matrix(matrix, self._precision)
+        self._matrices.append(weights.ravel())
+        self._terms += [np.array([neighbours, near], np.float32), np.float32(network.output_scale) * factors]
+
+    def _rows(self, network: GarmentNetwork) -> np.ndarray:
+        """Return the offset of a network that each of the frame's is; 3 V to 3 V + 2 for none."""
+        places, vertices = self._places.copy(), network.vertices
+        places[np.isin(places, network.pins)] = vertices  # as those behind: without offset
+        return (3 * places + np.arange(3)[:, None]).ravel()
 
     def _place(self, size: int) -> slice:
         """Reserve a place for `size` numbers; those behind stay zero: matrices are read in whole vectors."""

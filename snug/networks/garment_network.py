@@ -21,6 +21,7 @@ class GarmentNetwork(nn.Module):
     Attributes:
         feature_set: inputs it reads, one of snug.networks.dressed_body.FEATURE_SETS.
         sequential: whether it carries a state from frame to frame.
+        fitted: whether `learn` teaches it, in one go, in place of training steps.
         closed_form: whether it trains by snug.kernels.gru, on a CPU; its next state then has no gradient.
         pins: vertices without offset, which the body carries; see snug.networks.architectures.make_network.
         output_scale: factor on the predicted offsets.
@@ -28,6 +29,7 @@ class GarmentNetwork(nn.Module):
 
     feature_set: ClassVar[str]
     sequential: ClassVar[bool]
+    fitted: ClassVar[bool] = False
     closed_form: bool = False
     pins: tuple[int, ...] = ()
     input_mean: Tensor
@@ -51,6 +53,10 @@ class GarmentNetwork(nn.Module):
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor | None:
         """Draw the state that a training window starts from; None for a network without one."""
         return None
+
+    def learn(self, features: Tensor, offsets: Tensor) -> None:
+        """Learn offsets (F, V, 3) [m] of frames with features (F, D), for a network that is `fitted`."""
+        raise NotImplementedError
 
     def last_layers(self) -> tuple[nn.Linear, ...]:
         """Return the layers whose sum the offsets are."""

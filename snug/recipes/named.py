@@ -68,6 +68,9 @@ TAILORNET = replace(
     output_scale=1.0,
     terms=(),
 )
+# Offsets as they are; everything else of a recipe is of steps, which these have not.
+NEAREST_POSES = replace(TAILORNET, name="nearest-poses")
+POSE_REGRESSION = replace(TAILORNET, name="pose-regression")
 # Twice the default's rate: at the default's the relative excess on validation motions was larger by a fifth.
 PBNS = replace(DEFAULT, name="pbns", learning_rate=2e-3)
 PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_samples="vertices")
@@ -114,6 +117,8 @@ RECIPE_OF_KIND = {
     "supervised": SUPERVISED,
     "santesteban2019": SANTESTEBAN2019,
     "tailornet": TAILORNET,
+    "nearest-poses": NEAREST_POSES,
+    "pose-regression": POSE_REGRESSION,
     "dynamic": DYNAMIC,
 }
 

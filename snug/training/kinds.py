@@ -44,6 +44,8 @@ KINDS = {
     "pbns": Kind(ARCHITECTURES["pbns"]),
     "santesteban2019": Kind(ARCHITECTURES["santesteban2019"], targets=VertexTargets, closed_form=True),
     "tailornet": Kind(ARCHITECTURES["tailornet"], targets=BandTargets),
+    "nearest-poses": Kind(ARCHITECTURES["nearest-poses"], targets=VertexTargets),
+    "pose-regression": Kind(ARCHITECTURES["pose-regression"], targets=VertexTargets),
 }
 
 

@@ -6,6 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+import torch
+
+from snug.body.skinning import skin, unskin_damped
 from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
@@ -14,12 +17,15 @@ from snug.recipes.recipe import DEFAULT, Recipe
 from snug.training.checkpoint import Checkpoint
 from snug.training.device import find_device
 from snug.training.kinds import find_kind
-from snug.training.losses.vertex_targets import Targets
+from snug.training.losses.vertex_targets import Targets, load_relative, match_targets, vertex_loss
 from snug.training.optimisation_step import Trainer
 from snug.training.process_group import ALONE, Group
 from snug.training.training_loop import TrainingLoop
 from snug.training.training_set import TrainingSet
 from snug.training.validation import Validation
+
+DAMPING = 0.01  # of the offsets that fitted networks learn, see unskin_damped
+PIECE = 256  # frames whose loss is taken at once
 
 
 def train_network(
@@ -42,6 +48,9 @@ def train_network(
     stop: Callable[[], bool] = lambda: False,
 ) -> TrainedModel:
     """Train one network for a number of steps; on a CPU equal arguments give equal weights, bit for bit.
+
+    Kinds that are fitted in one go (snug.networks.fitted) take no steps: of all that concerns steps, nothing
+    is used.
 
     Args:
         model_kind: one of snug.training.kinds.KINDS; `snug` and `pbns` learn from the energies, the others
@@ -77,6 +86,8 @@ def train_network(
     >>> model = train_network("snug", dressed, motions, steps=2000, seed=0)  # doctest: +SKIP
     """
     start = time.perf_counter()
+    if find_kind(model_kind).network.fitted:
+        return _fitted_model(model_kind, dressed, motions, trajectories, seed=seed, recipe=recipe)
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
         device=find_device(device), kernels=kernels, group=group,
@@ -86,6 +97,40 @@ def train_network(
         stop=stop, setup_seconds=time.perf_counter() - start,
     )  # fmt: skip
     return loop.run()
+
+
+def _fitted_model(
+    model_kind: str,
+    dressed: DressedBody,
+    motions: Sequence[Motion],
+    trajectories: Mapping[str, Targets] | None,
+    *,
+    seed: int,
+    recipe: Recipe,
+) -> TrainedModel:
+    """Fit a network to the offsets of simulated frames; its loss is the mean square of their offsets left."""
+    begun = time.perf_counter()
+    kind = find_kind(model_kind)
+    data = TrainingSet(dressed, motions, recipe, features=kind.network.feature_set, sequences=False)
+    vertices = load_relative(dressed, motions, match_targets(motions, trajectories, dressed.vertices))
+    weights = dressed.weights(recipe.smoothing)
+    pins = dressed.garment.pins
+    network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
+    ready = time.perf_counter()
+    network.learn(data.features, unskin_damped(vertices, data.rest, weights, data.transforms, DAMPING))
+    loss = 0.0
+    with torch.no_grad():
+        for rows in torch.arange(data.frames).split(PIECE):
+            posed = skin(
+                network(data.features[rows, None])[0][:, 0] + data.rest, weights, data.transforms[rows]
+            )
+            loss += float(vertex_loss(posed, vertices[rows]).sum()) / data.frames
+    seconds = time.perf_counter() - ready
+    return TrainedModel(
+        model_kind, network.eval(), recipe, seed=seed, steps=1, seconds=seconds, setup_seconds=ready - begun,
+        history=[{"step": 1, "seconds": seconds, "loss": loss}],
+        summary={"training_frames": data.frames}, unit=kind.unit,
+    )  # fmt: skip
 
 
 def untrained_model(

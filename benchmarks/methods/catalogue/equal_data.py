@@ -2,7 +2,8 @@
 
 The last training motion is held out of all of them. Those that simulated vertices teach get the same mixed
 clips with every seed, simulated once; the others mix as many anew. All have SNUG's number of steps, or go on
-until the held-out motion gets no better. Members of a family differ in their number of frames alone.
+until the held-out motion gets no better; learners without steps are fitted once. Members of a family differ
+in their number of frames alone.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ FAMILIES_OF_NETWORKS = (
     ("santesteban2019", "Santesteban 2019", ENDS),
     ("tailornet", "TailorNet", ENDS),
 )
+FITTED = (("nearest-poses", "Nearest poses"), ("pose-regression", "Ridge on principal components"))
 
 
 def _training(name: str, mixed: int, *, converged: bool) -> Training:
@@ -35,7 +37,7 @@ def _training(name: str, mixed: int, *, converged: bool) -> Training:
     return replace(training, recipe=recipe, steps_of="snug", held_out=1, converged=converged)
 
 
-def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry:
+def _entry(name: str, label: str, mixed: int, *, converged: bool = False, seeded: bool = True) -> MethodEntry:
     """Declare a network on equal data. Not timed: its run time is that of the network of the usual data."""
     family = f"{name}-data" + "-converged" * converged
     data = f"original data and {mixed} augmented frames for each" if mixed else "original data"
@@ -44,6 +46,7 @@ def _entry(name: str, label: str, mixed: int, *, converged: bool) -> MethodEntry
         f"{family}-{mixed}", title + ", converged" * converged,
         f"{name} that learns from {data}" + ", until a held-out motion gets no better" * converged,
         training=_training(name, mixed, converged=converged), role="ablation", batched=False, timed=False,
+        seeded=seeded,
         reporting=Reporting(
             family=family, level=float(mixed), base=f"{name}-data-{mixed}" if converged else name,
             pairing_group=name,
@@ -61,4 +64,4 @@ def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry
 
 EQUAL_DATA = tuple(
     entry for network_and_numbers in FAMILIES_OF_NETWORKS for entry in _block(*network_and_numbers)
-)
+) + tuple(_entry(name, label, mixed, seeded=False) for name, label in FITTED for mixed in ENDS)

@@ -11,9 +11,11 @@ from snug.recipes.deviations import exchange_deviations
 from snug.recipes.named import (
     ABLATIONS,
     DYNAMIC,
+    NEAREST_POSES,
     PAPER,
     PBNS,
     PBNS_SPRINGS,
+    POSE_REGRESSION,
     SANTESTEBAN2019,
     SUPERVISED,
     TAILORNET,
@@ -28,6 +30,8 @@ TRAININGS = {
     "supervised": Training("supervised", SUPERVISED, Simulated()),
     "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
     "tailornet": Training("tailornet", TAILORNET, Simulated()),
+    "nearest-poses": Training("nearest-poses", NEAREST_POSES, Simulated()),
+    "pose-regression": Training("pose-regression", POSE_REGRESSION, Simulated()),
     "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
     # Each deviation has as many steps as the recipe that it changes.
