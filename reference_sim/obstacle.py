@@ -13,7 +13,7 @@ import igl
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.contact.closest_point import Closest, FaceTree
+from reference_sim.contact.closest_point import Closest, FaceSearch, Listed
 from reference_sim.fingerprint import fingerprint
 from reference_sim.geometry.closed_mesh import check_closed
 from reference_sim.geometry.surface import carry, plane_normals, vertex_normals
@@ -30,14 +30,12 @@ class Planes:
         normals: (S, 3) unit, outward.
         faces: (S,) of the obstacle.
         barycentric: (S, 3) places on them.
-        far: (S,) samples known to touch nothing in this step, from an obstacle that is `bounded`; else None.
     """
 
     points: np.ndarray
     normals: np.ndarray
     faces: np.ndarray
     barycentric: np.ndarray
-    far: np.ndarray | None = None
 
 
 def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: float) -> np.ndarray:
@@ -87,8 +85,6 @@ class Obstacle:
         [0.11, -0.09]
     """
 
-    bounded = False  # whether planes are exact only within a reach that they are to be told
-
     def __init__(
         self,
         positions: np.ndarray,
@@ -114,10 +110,10 @@ class Obstacle:
         self._forget()
 
     def _forget(self) -> None:
-        self._tree: FaceTree | None = None
-        self._fitted = -1  # the frame that the tree is fitted to
-        # Of so many points, in regions or not: the faces found last, and an order to search in.
-        self._last: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray | None]] = {}
+        self._search: FaceSearch | None = None
+        self._fitted = -1  # the frame that the search is fitted to
+        # Of so many points, in regions or not: the faces found last, the lists to search, places at rest.
+        self._last: dict[tuple[int, bool], tuple[np.ndarray, Listed, np.ndarray | None]] = {}
 
     @property
     def frames(self) -> int:
@@ -147,37 +143,30 @@ class Obstacle:
     def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
         """Find closest points under the rule of regions.
 
-        Each search begins with the faces that the last one answered for as many points, in the order of
-        those of the first one: the solver asks for the same samples in every frame.
+        Each search begins with the faces that the last one answered for as many points, in groups made for
+        the first one: the solver asks for the same samples in every frame.
         """
         frame = min(frame, self.frames - 1)
-        if self._tree is None:
+        if self._search is None:
             centroids = self.rest_centroids
             if centroids is None:
                 centroids = self.at(0)[self.faces].mean(axis=1)
-            self._tree = FaceTree(self.faces, centroids)
+            self._search = FaceSearch(self.faces, centroids)
         if self._fitted != frame:
-            self._tree.refit(self.at(frame))
+            self._search.refit(self.at(frame))
             self._fitted = frame
         if self.rest_centroids is None:
             rest_points = None
         kind = len(points), rest_points is not None
-        hints, sequence = self._last.get(kind, (None, None))
-        closest = self._tree.nearest(
-            points, hints=hints, rest_points=rest_points, region=self.region, sequence=sequence
-        )
-        if sequence is None and rest_points is not None:
-            sequence = self._tree.in_sequence(closest.faces)
-        self._last[kind] = closest.faces, sequence
+        hints, samples, home = self._last.get(kind, (None, None, None))
+        if samples is None or not (home is rest_points or np.array_equal(home, rest_points)):  # type: ignore[arg-type]
+            home = rest_points
+            samples = self._search.listed(points) if home is None else self._search.listed(home, self.region)
+        closest = self._search.nearest(points, hints=hints, samples=samples)
+        self._last[kind] = closest.faces, samples, home
         return closest
 
-    def planes(
-        self,
-        points: np.ndarray,
-        frame: int,
-        rest_points: np.ndarray | None = None,
-        reach: np.ndarray | None = None,
-    ) -> Planes:
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Return contact planes at `frame`.
 
         The plane goes through the closest allowed point of the surface; its normal points from there to the
@@ -188,8 +177,6 @@ class Obstacle:
             points: (S, 3) [m] samples.
             frame: of the obstacle.
             rest_points: (S, 3) [m] the samples at rest, for the rule of regions.
-            reach: (S,) [m] that a sample may come near in this step. It is asked of obstacles that are
-                `bounded`; here every plane is exact.
         """
         closest = self._nearest(points, frame, rest_points)
         vertices = self.at(frame)

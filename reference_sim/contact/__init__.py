@@ -1,11 +1,11 @@
 """Search for contact: closest faces of a moving mesh, pairs of primitives that are close.
 
 >>> import numpy as np
->>> from reference_sim.contact import FaceTree
+>>> from reference_sim.contact import FaceSearch
 >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
->>> tree = FaceTree(np.array([[0, 2, 1]]), corners.mean(axis=0, keepdims=True))
->>> tree.refit(corners)
->>> tree.nearest(np.array([[0.25, 0.5, 0.25]])).points.tolist()
+>>> search = FaceSearch(np.array([[0, 2, 1]]), corners.mean(axis=0, keepdims=True))
+>>> search.refit(corners)
+>>> search.nearest(np.array([[0.25, 0.5, 0.25]])).points.tolist()
 [[0.25, 0.0, 0.25]]
 """
 

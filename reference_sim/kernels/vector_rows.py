@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 from reference_sim.kernels.training_lanes import TRAINING_LANES as L
 
 WIDE = ir.IntType(64)
+WIDTH = 16  # numbers of a row that `bits_at_most` compares
 _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
 
 
@@ -68,6 +69,35 @@ def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any
         return context.make_tuple(builder, signature.return_type, parts)
 
     return types.UniTuple(types.float32, 3)(rows, i, j, k, u, v, w), built
+
+
+@_intrinsic
+def bits_at_most(_: Any, rows: Any, i: Any, limit: Any) -> Any:
+    """Return an integer with a bit for each number of row i that is not above the limit.
+
+    rows: of WIDTH numbers in a flat float32 array.
+    """
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = _place(context, builder, signature.args[:2], args[:2], WIDTH, WIDTH)
+        numbers = builder.load(place, align=4)
+        limits = ir.Constant(numbers.type, ir.Undefined)
+        for lane in range(WIDTH):
+            limits = builder.insert_element(limits, args[2], ir.IntType(32)(lane))
+        within = builder.fcmp_unordered("<=", numbers, limits)
+        return builder.zext(builder.bitcast(within, ir.IntType(WIDTH)), WIDE)
+
+    return types.int64(rows, i, types.float32), built
+
+
+@_intrinsic
+def lowest_bit(_: Any, bits: Any) -> Any:
+    """Return the place of the lowest bit that is set in an integer other than zero."""
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(types.int64), built
 
 
 def _place(context: Any, builder: Any, kinds: Any, args: Any, size: int, loaded: int) -> Any:

@@ -10,7 +10,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_sim.contact.closest_point import FaceTree
+from reference_sim.contact.closest_point import FaceSearch
 from reference_sim.files.array_file import ArrayFileError, read_arrays
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
@@ -61,9 +61,9 @@ def find_weights(
     """
     followed = enclosed_limbs(body, positions, faces)
     skin = np.asarray(body.faces)[skin_following(body, followed)[body.faces].all(axis=1)]
-    tree = FaceTree(skin, body.template[skin].mean(axis=1))
-    tree.refit(body.template)
-    closest = tree.nearest(positions)
+    search = FaceSearch(skin, body.template[skin].mean(axis=1))
+    search.refit(body.template)
+    closest = search.nearest(positions)
     corners = skin[closest.faces]
     nearest = corners[np.arange(len(corners)), closest.barycentric.argmax(axis=1)]
     if authored is not None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from reference_sim import MeshError, Obstacle
-from reference_sim.minimise.compiled.sliding_obstacle import SlidingObstacle
 from tests.reference_sim.meshes import box, random_rotation, sphere
 
 RADIUS = 0.3
@@ -194,11 +193,10 @@ def heights(obstacle: Obstacle, points: np.ndarray, home: tuple[float, float, fl
     return np.einsum("si,si->s", planes.normals, points - planes.points)
 
 
-@pytest.mark.parametrize("kind", [lambda obstacle: obstacle, SlidingObstacle])
-def test_beside_the_border_of_its_faces_a_sample_meets_a_ball(kind):
+def test_beside_the_border_of_its_faces_a_sample_meets_a_ball():
     """Samples at the side of a column at rest may meet 20 cm of it up and down, and have moved along it."""
     rest, faces = column()
-    obstacle = kind(Obstacle(rest, faces, rest_positions=rest, region=0.2))
+    obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.2)
     home = 0.1, 0.003, 0.0  # its uppermost face ends at 0.2 m
 
     def at(along: float, depth: float) -> float:
@@ -275,6 +273,16 @@ def test_two_kinds_of_samples_do_not_disturb_each_other():
     assert np.linalg.norm(second.points - bent(rest), axis=1).max() < 1e-12
     place = np.einsum("sa,sai->si", second.barycentric, bent(rest)[faces[second.faces]])
     assert place == pytest.approx(second.points, abs=1e-12)
+
+
+def test_as_many_samples_from_elsewhere_meet_their_own_faces():
+    rest, faces = bar()
+    obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.15)
+    left, right = rest[rest[:, 0] < -0.3][:40], rest[rest[:, 0] > 0.3][:40]
+    for home in (left, right, left):
+        found = obstacle.planes(rest[:40], 0, home)
+        fresh = Obstacle(rest, faces, rest_positions=rest, region=0.15).planes(rest[:40], 0, home)
+        assert (found.faces == fresh.faces).all() and (found.points == fresh.points).all()
 
 
 def test_each_frame_has_its_own_surface_and_the_last_one_stays():

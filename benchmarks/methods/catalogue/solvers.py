@@ -161,7 +161,7 @@ SOLVERS = (
     ),
     *_truncated(
         "fast-lbfgs", "Fast L-BFGS", "iteration",
-        "L-BFGS compiled as a whole, float32, sliding contact planes, stopped after {}", (5, 10, 20, 40),
+        "L-BFGS compiled as a whole, float32, stopped after {}", (5, 10, 20, 40),
         module="benchmarks.methods.solvers.fast_lbfgs", dtype="float32", conserving=True,
     ),
     *_truncated(

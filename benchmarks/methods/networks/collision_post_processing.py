@@ -46,7 +46,7 @@ class CollisionPostProcessing:
         patch, skin = self.patch, self.body[frame]
         patch.tree.refit(skin)
         # Exact at any depth, unlike the anchors of training: what lies deep must find the near way out.
-        nearest = patch.tree.nearest(x, hints=self._faces, rest_points=patch.sample_rest, region=patch.region)
+        nearest = patch.tree.nearest(x, hints=self._faces, samples=patch.samples)
         self._faces = nearest.faces
         corners = vertex_normals(skin, patch.faces)[patch.faces[nearest.faces]]
         normals = np.einsum("va,vai->vi", nearest.barycentric, corners)

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.method import Method, posed_body
-from benchmarks.methods.solvers.fast_lbfgs import FastSimulation
 from benchmarks.methods.solvers.residual_transport import ResidualTransport
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
@@ -77,7 +76,7 @@ class WithResidual(FromElsewhere):
 class WarmStarted(Method):
     """Simulation whose steps start at frames of a network or of skinning and are cut short.
 
-    residual: whether the last frame's residual is carried. simulation: what does the steps.
+    residual: whether the last frame's residual is carried.
     Raises ValueError for a scene of several steps a frame: there is a start for its last alone.
     """
 
@@ -85,7 +84,7 @@ class WarmStarted(Method):
     path: Path
     solver: dict[str, Any]
     residual: bool = False
-    simulation: Simulation = field(default_factory=lambda: Simulation(options={}))
+    simulation: Simulation = field(init=False, default_factory=lambda: Simulation(options={}))
     of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -144,6 +143,6 @@ def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -
     options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
     path, fast = model_path(models, guess, seed), solver == "fast-lbfgs"
     if fast:
-        return WarmStarted(guess, path, options | {"method": CompiledLBFGS}, fast, FastSimulation(options={}))
+        return WarmStarted(guess, path, options | {"method": CompiledLBFGS}, fast)
     options |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
     return WarmStarted(guess, path, options)

@@ -109,18 +109,18 @@ class ContactPenalty(Energy):
         if step.obstacle is None:
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
         samples = self.sample_matrix @ step.guess
-        if step.obstacle.bounded:
-            planes = step.obstacle.planes(samples, step.frame, self.rest_samples, self._reach(step))
-        else:
-            planes = step.obstacle.planes(samples, step.frame, self.rest_samples)
+        planes = step.obstacle.planes(samples, step.frame, self.rest_samples)
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
         self.step = step
 
-    def _reach(self, step: Step) -> np.ndarray:
-        """Return how far (S,) [m] from the guess a sample may meet the body in this step.
+    def reach(self) -> np.ndarray:
+        """Return how far (S,) [m] above its plane at the guess a sample may meet it in this step.
 
         Left alone it flies to x + dt v, its weight pulls it another g dt^2 down, and a pin takes it along.
         """
+        step = self.step
+        if step is None:
+            return np.full(len(self.stencils), np.inf)
         way = step.previous + step.dt * step.velocity - step.guess
         flight = np.linalg.norm(self.sample_matrix @ way, axis=1)
         pulled = np.linalg.norm(way[self.cloth.pins], axis=1).max(initial=0.0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.contact.closest_point import by_cells
+from reference_sim.contact.closest_point import halved
 from reference_sim.kernels.float32_layout import (
     FAST,
     LANES_FLOAT32,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def lanes(term: ContactPenalty) -> Float32Lanes:
     """Lay the samples of the term out, those of a block near each other; a step freezes planes and depths."""
-    order = by_cells(term.rest_samples)
+    order = halved(term.rest_samples)
     stencils = term.stencils[order]
     vertices, constants = lay_out(stencils, term.weights[order], term.stiffness[order])
     weights = to_blocks(term.weights[order])  # in float64: a third of metres is no third in float32
@@ -35,24 +35,18 @@ def lanes(term: ContactPenalty) -> Float32Lanes:
 
     def freeze(x0: np.ndarray) -> tuple:
         near = _depths(
-            x0.ravel(), order, vertices, weights, term.points, term.normals, term.margin, _far(term), planes
+            x0.ravel(), order, vertices, weights, term.points, term.normals, term.margin, term.reach(), planes
         )
         return near, vertices, constants, planes
 
     return Float32Lanes(contact_gradient, freeze, contact_stiffness, stencils)
 
 
-def _far(term: ContactPenalty) -> np.ndarray:
-    """Return which samples (S,) the step has out of reach."""
-    planes = term.planes
-    return np.zeros(len(term.stencils), bool) if planes is None or planes.far is None else planes.far
-
-
 @njit(cache=True)
-def _depths(x, order, vertices, constants, points, normals, margin, far, state):
+def _depths(x, order, vertices, constants, points, normals, margin, reach, state):
     """Write normals and depths of the samples at x (3V,) into state, in blocks.
 
-    Returns the blocks (n,) with a sample that is not far.
+    Returns the blocks (n,) with a sample whose plane is within reach (S,) [m].
     """
     near, count = np.empty(len(state), np.int64), 0
     for place in range(len(order)):
@@ -73,7 +67,7 @@ def _depths(x, order, vertices, constants, points, normals, margin, far, state):
             depth -= normals[s, a] * (sample - points[s, a])
             state[block, a * LANES_FLOAT32 + lane] = normals[s, a]
         state[block, 3 * LANES_FLOAT32 + lane] = depth
-        if far[s] or (count > 0 and near[count - 1] == block):
+        if margin - depth > reach[s] or (count > 0 and near[count - 1] == block):
             continue
         near[count] = block
         count += 1

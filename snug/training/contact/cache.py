@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from reference_sim.contact.anchor_walk import WALK_SLACK, triangle_adjacency
-from reference_sim.contact.closest_point import FaceTree
+from reference_sim.contact.closest_point import FaceSearch, Listed
 from reference_sim.energies import ContactPenalty
 from reference_sim.kernels.training_lanes import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
@@ -40,6 +40,7 @@ class Patch:
         region: largest distance [m] in the T-pose from a sample to a face it may touch.
         adjacency: (Q, 3), see reference_sim.contact.anchor_walk.triangle_adjacency.
         tree: to search the faces with.
+        samples: lists of the faces that they may meet.
     """
 
     body_vertices: np.ndarray
@@ -49,7 +50,8 @@ class Patch:
     sample_rest: np.ndarray
     region: float
     adjacency: np.ndarray
-    tree: FaceTree
+    tree: FaceSearch
+    samples: Listed
 
     @classmethod
     def around(
@@ -71,6 +73,7 @@ class Patch:
         faces = flat.reshape(-1, 3).astype(np.int32)
         rest = body_positions[body_vertices].astype(np.float32)
         centroids = rest[faces].mean(axis=1)
+        tree = FaceSearch(faces, centroids)
         return cls(
             body_vertices=body_vertices,
             faces=faces,
@@ -79,7 +82,8 @@ class Patch:
             sample_rest=samples.astype(np.float32),
             region=region,
             adjacency=triangle_adjacency(faces),
-            tree=FaceTree(faces, centroids),
+            tree=tree,
+            samples=tree.listed(samples, region),
         )
 
     def search(
@@ -103,8 +107,7 @@ class Patch:
         nearest = self.tree.nearest(
             points,
             hints=anchor_faces,
-            rest_points=self.sample_rest,
-            region=self.region,
+            samples=self.samples,
             exact=np.inf if exact else EXACT,
         )
         return nearest.faces, nearest.barycentric[:, 1:]

@@ -1,15 +1,21 @@
-"""Closest points by the tree of boxes: against every face tried, against libigl, whatever is remembered."""
+"""Closest points: against every face tried, against libigl, whatever is remembered."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import igl
 import numpy as np
 import pytest
 
-from reference_sim.contact.closest_point import FaceTree
-from reference_sim.contact.closest_point_groups import GROUP_SIZE
+from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.presets import find_preset
+from benchmarks.scenes import of_garment
+from reference_sim.contact.closest_point import FaceSearch
+from reference_sim.contact.closest_point_lanes import LANES
 from reference_sim.geometry.surface import vertex_normals
 from reference_sim.geometry.triangle import closest_on_triangle
+from reference_sim.kernels.kernel_cache import njit
 from tests.reference_sim.meshes import grid, random_rotation, sphere
 
 
@@ -55,13 +61,13 @@ def samples(positions: np.ndarray, faces: np.ndarray, seed: int = 0) -> np.ndarr
     )
 
 
-def tree_of(positions: np.ndarray, faces: np.ndarray) -> FaceTree:
-    tree = FaceTree(faces, positions[faces].mean(axis=1))
+def tree_of(positions: np.ndarray, faces: np.ndarray) -> FaceSearch:
+    tree = FaceSearch(faces, positions[faces].mean(axis=1))
     tree.refit(positions)
     return tree
 
 
-def assert_closest(tree: FaceTree, positions: np.ndarray, points: np.ndarray) -> None:
+def assert_closest(tree: FaceSearch, positions: np.ndarray, points: np.ndarray) -> None:
     closest = tree.nearest(points)
     squared, _, _ = igl.point_mesh_squared_distance(
         points.astype(np.float64), positions.astype(np.float64), tree.faces
@@ -129,34 +135,12 @@ def test_what_is_remembered_changes_nothing(name):
     tree, points = tree_of(positions, faces), samples(positions, faces)
     generator = np.random.default_rng(1)
     home = points[generator.permutation(len(points))]
-    for rest in ({}, {"rest_points": home, "region": 1.0}):
+    for rest in ({}, {"samples": tree.listed(home, 1.0)}):
         cold = tree.nearest(points, **rest)
         for hints in (cold.faces, generator.integers(-1, len(faces), len(points))):
             warm = tree.nearest(points, hints=hints, **rest)
             assert (warm.faces == cold.faces).all()
             assert (warm.barycentric == cold.barycentric).all() and (warm.points == cold.points).all()
-
-
-@pytest.mark.parametrize("name", ["soup 400", "sphere", "sheet"])
-def test_within_reach_answers_are_exact_and_beyond_there_are_none(name):
-    """Bit for bit, each sample with a reach of its own, whatever is remembered."""
-    positions, faces = mesh(name)
-    tree, points = tree_of(positions, faces), samples(positions, faces)
-    generator = np.random.default_rng(7)
-    centroids = positions[faces].mean(axis=1)
-    home = centroids[generator.integers(0, len(faces), len(points))] + 0.1
-    for rest in ({}, {"rest_points": home, "region": 0.7}):
-        exact = tree.nearest(points, **rest)
-        distance = np.linalg.norm(points - exact.points, axis=1)
-        reach = distance * generator.uniform(0.5, 1.5, len(points))
-        reach[distance < 1e-9] = np.inf  # of these round-off decides
-        near = distance < reach
-        assert 0.3 < near.mean() < 0.95
-        for hints in (None, exact.faces, generator.integers(-1, len(faces), len(points))):
-            closest = tree.nearest(points, hints=hints, reach=reach, **rest)
-            assert (closest.faces[near] == exact.faces[near]).all() and (closest.faces[~near] == -1).all()
-            assert (closest.points[near] == exact.points[near]).all()
-            assert (closest.barycentric[near] == exact.barycentric[near]).all()
 
 
 @pytest.mark.parametrize("name", ["soup 400", "sphere", "sheet"])
@@ -178,14 +162,14 @@ def test_a_rough_answer_is_at_most_twice_as_far_and_exact_where_it_has_to_be(nam
 def test_only_faces_near_the_place_at_rest_are_met(name, region):
     positions, faces = mesh(name)
     centroids = positions[faces].mean(axis=1)
-    tree = FaceTree(faces, centroids)
+    tree = FaceSearch(faces, centroids)
     generator = np.random.default_rng(2)
     moved = positions[generator.permutation(len(positions))]  # nothing is where it was at rest
     tree.refit(moved)
     points, home = generator.normal(size=(2, 60, 3))
     offset = centroids[None] - home[:, None]
     allowed = np.einsum("sfi,sfi->sf", offset, offset) <= region**2
-    closest = tree.nearest(points, rest_points=home, region=region).faces
+    closest = tree.nearest(points, samples=tree.listed(home, region)).faces
     assert (closest == one_by_one(moved, faces, points, allowed)).all()
     assert name == "soup 7" or (closest != tree.nearest(points).faces).any()
 
@@ -203,16 +187,16 @@ def test_a_refitted_tree_answers_as_one_built_for_the_pose():
     assert_closest(tree, moved, points)
 
 
-@pytest.mark.parametrize("count", [1, GROUP_SIZE - 1, GROUP_SIZE, GROUP_SIZE + 1])
+@pytest.mark.parametrize("count", [1, LANES - 1, LANES, LANES + 1])
 def test_company_changes_nothing(count):
     """Samples are searched in groups: each gets what it would alone, with hints or without, in any order."""
     positions, faces = mesh("sphere")
     tree, points = tree_of(positions, faces), samples(positions, faces)
     home, hints = points[::-1], np.where(np.arange(len(points)) % 3, np.arange(len(points)) % len(faces), -1)
-    whole = tree.nearest(points, rest_points=home, region=0.8)
+    whole = tree.nearest(points, samples=tree.listed(home, 0.8))
     chosen = np.random.default_rng(8).permutation(len(points))[:count]
     for some in (None, hints[chosen]):
-        closest = tree.nearest(points[chosen], rest_points=home[chosen], region=0.8, hints=some)
+        closest = tree.nearest(points[chosen], samples=tree.listed(home[chosen], 0.8), hints=some)
         assert (closest.faces == whole.faces[chosen]).all() and (closest.points == whole.points[chosen]).all()
 
 
@@ -229,3 +213,49 @@ def test_the_direction_of_a_thin_gap_is_kept():
 def test_no_points_have_no_closest():
     closest = tree_of(*sphere(1)).nearest(np.empty((0, 3)))
     assert closest.faces.shape == (0,) and closest.points.shape == (0, 3)
+
+
+@njit(cache=False, error_model="numpy")
+def plain(corners, centroids, points, home, region, faces, distances):
+    """Try every face whose rest centroid is within the region of each sample."""
+    for s in range(len(points)):
+        faces[s], distances[s] = -1, np.inf
+        for f in range(len(corners)):
+            offset = centroids[f] - home[s]
+            if offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2 <= region**2:
+                squared = closest_on_triangle(corners, f, points[s, 0], points[s, 1], points[s, 2])[2]
+                if squared < distances[s]:
+                    faces[s], distances[s] = f, squared
+
+
+@pytest.mark.parametrize(
+    ("frames", "every"), [(3, 20), pytest.param(180, 1, marks=pytest.mark.slow)]
+)  # a million answers in the slow one
+def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search(frames, every):
+    """A T-shirt on a jumping and spinning body, thrown about by centimetres from frame to frame."""
+    preset = replace(find_preset("smoke"), frames=frames, garment_vertices=1000)
+    scene = of_garment("tshirt").scene("spin_jump").at(preset).build(
+        open_assets(preset, embedded_motions(["spin_jump"]), ["tshirt"])
+    )  # fmt: skip
+    obstacle, generator = scene.obstacle, np.random.default_rng(12)
+    (contact,) = (energy for energy in scene.energies if energy.name == "collision")
+    home, x = contact.rest_samples, scene.settle()
+    search, hints, count = FaceSearch(obstacle.faces, obstacle.rest_centroids), None, 0
+    samples, chosen = search.listed(home, obstacle.region), np.arange(0, len(home), every)
+    faces, distances = np.empty(len(chosen), np.int64), np.empty(len(chosen))
+    for frame in range(1, frames + 1):
+        x = obstacle.transported(x, frame, scene.cloth.rest_positions)
+        x += generator.normal(0, 0.01, (1, 3)) + generator.normal(0, 0.001, x.shape)
+        points, body = contact.sample_matrix @ x, obstacle.at(frame)
+        search.refit(body)
+        found = search.nearest(points, hints=hints, samples=samples)
+        hints = found.faces
+        corners = body[np.sort(obstacle.faces, axis=1)]
+        plain(
+            corners, obstacle.rest_centroids, points[chosen], home[chosen], obstacle.region, faces, distances
+        )
+        assert (found.faces[chosen] == faces).all()
+        distance = np.linalg.norm(points - found.points, axis=1)[chosen]
+        assert np.abs(distance - np.sqrt(distances)).max() < 1e-12
+        count += len(chosen)
+    assert frames < 180 or count > 1_000_000

@@ -16,9 +16,9 @@ from reference_sim.kernels.kernel_cache import KEPT
 ROOT = Path(__file__).resolve().parents[3]
 NEAREST = """
 import numpy as np
-from reference_sim.contact.closest_point import FaceTree
+from reference_sim.contact.closest_point import FaceSearch
 corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-tree = FaceTree(np.array([[0, 1, 2]]), corners.mean(axis=0)[None])
+tree = FaceSearch(np.array([[0, 1, 2]]), corners.mean(axis=0)[None])
 tree.refit(corners)
 print(*tree.nearest(np.array([[0.25, 0.25, 1.0]])).points[0])
 """
