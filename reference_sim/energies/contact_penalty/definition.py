@@ -22,7 +22,6 @@ import scipy.sparse as sp
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.material import GRAVITY
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 
 DEFAULT_STIFFNESS = 3.4e6  # [J/m^5]: 2500 J/m^3 on a vertex of a T-shirt with 1000 vertices
 DEFAULT_MARGIN = 4e-3  # [m]
-SLACK = 0.01  # [m] of a reach: neighbours pull too
 
 
 class ContactPenalty(Energy):
@@ -112,19 +110,6 @@ class ContactPenalty(Energy):
         planes = step.obstacle.planes(samples, step.frame, self.rest_samples)
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
         self.step = step
-
-    def reach(self) -> np.ndarray:
-        """Return how far (S,) [m] above its plane at the guess a sample may meet it in this step.
-
-        Left alone it flies to x + dt v, its weight pulls it another g dt^2 down, and a pin takes it along.
-        """
-        step = self.step
-        if step is None:
-            return np.full(len(self.stencils), np.inf)
-        way = step.previous + step.dt * step.velocity - step.guess
-        flight = np.linalg.norm(self.sample_matrix @ way, axis=1)
-        pulled = np.linalg.norm(way[self.cloth.pins], axis=1).max(initial=0.0)
-        return np.maximum(flight, pulled) + GRAVITY * step.dt**2 + self.margin + SLACK
 
     def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
         """Return E [J] of each sample: x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S).

@@ -34,21 +34,21 @@ def lanes(term: ContactPenalty) -> Float32Lanes:
     planes = empty_state(vertices, 4)
 
     def freeze(x0: np.ndarray) -> tuple:
-        near = _depths(
-            x0.ravel(), order, vertices, weights, term.points, term.normals, term.margin, term.reach(), planes
+        deepest = _depths(
+            x0.ravel(), order, vertices, weights, term.points, term.normals, term.margin, planes
         )
-        return near, vertices, constants, planes
+        return deepest, vertices, constants, planes
 
     return Float32Lanes(contact_gradient, freeze, contact_stiffness, stencils)
 
 
 @njit(cache=True)
-def _depths(x, order, vertices, constants, points, normals, margin, reach, state):
+def _depths(x, order, vertices, constants, points, normals, margin, state):
     """Write normals and depths of the samples at x (3V,) into state, in blocks.
 
-    Returns the blocks (n,) with a sample whose plane is within reach (S,) [m].
+    Returns the largest depth (B,) [m] of each block, below zero where none of its samples touches.
     """
-    near, count = np.empty(len(state), np.int64), 0
+    deepest = np.full(len(state), np.float32(-np.inf))
     for place in range(len(order)):
         s, block, lane = order[place], place // LANES_FLOAT32, place % LANES_FLOAT32
         i, j, k = (
@@ -67,24 +67,33 @@ def _depths(x, order, vertices, constants, points, normals, margin, reach, state
             depth -= normals[s, a] * (sample - points[s, a])
             state[block, a * LANES_FLOAT32 + lane] = normals[s, a]
         state[block, 3 * LANES_FLOAT32 + lane] = depth
-        if margin - depth > reach[s] or (count > 0 and near[count - 1] == block):
-            continue
-        near[count] = block
-        count += 1
-    return near[:count]
+        deepest[block] = max(deepest[block], np.float32(depth))
+    return deepest
+
+
+@njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
+def _longest(u):
+    """Return a bound on the longest of the displacements u (3V,) [m], rounding included."""
+    most = np.float32(0.0)
+    for i in range(0, len(u) - 2, 3):
+        most = max(most, u[i] * u[i] + u[i + 1] * u[i + 1] + u[i + 2] * u[i + 2])
+    return np.float32(1.00001) * np.sqrt(most) + np.float32(1e-7)
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
 def contact_gradient(data, u, gradient, s):
     """Return the energy [J] of the contact penalty and add to gradient (3V,) [N].
 
-    near: the blocks that are looked at. With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the vertex.
-    constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the depth of x_0 under the
-    margin [m], below zero above it.
+    deepest (B,): largest depth of a block at x_0 [m]. With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the
+    vertex. constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the depth of x_0 under
+    the margin [m], below zero above it. No sample moves farther than the vertex that moves most, so a block
+    that is higher than that is not visited.
     """
-    near, vertices, constants, planes = data
-    total = 0.0
-    for b in near:
+    deepest_at_start, vertices, constants, planes = data
+    total, height = 0.0, -_longest(u)
+    for b in range(len(planes)):
+        if deepest_at_start[b] < height:
+            continue
         at, c, n = vertices[b], constants[b], planes[b]
         for g in range(LANES_FLOAT32):
             i, j, k = at[g], at[LANES_FLOAT32 + g], at[2 * LANES_FLOAT32 + g]
@@ -123,8 +132,8 @@ def contact_gradient(data, u, gradient, s):
 @njit(cache=True, error_model="numpy")
 def contact_stiffness(data, values):
     """Add the stiffness [N/m] of the samples that touch at x_0; returns 0."""
-    near, _, constants, planes, places = data
-    for b in near:
+    deepest, _, constants, planes, places = data
+    for b in np.flatnonzero(deepest > 0.0):
         for g in range(LANES_FLOAT32):
             depth = planes[b, 3 * LANES_FLOAT32 + g]
             if depth <= 0.0:

@@ -58,9 +58,7 @@ def in_float32(solver: CompiledLBFGS, x0: np.ndarray, u: np.ndarray) -> tuple[np
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("size", [0.0, 1e-3, 2e-2])
-def test_each_energy_and_its_gradient_is_that_of_its_definition(seed, size, monkeypatch):
-    # What is out of a step's reach is left out, and 2 cm are more than that.
-    monkeypatch.setattr(ContactPenalty, "reach", lambda term: np.full(len(term.stencils), np.inf))
+def test_each_energy_and_its_gradient_is_that_of_its_definition(seed, size):
     potential, x0 = pressed(seed)
     u = np.random.default_rng(seed).normal(0, size, x0.shape).astype(np.float32).astype(float)
     energies, gradient = in_float32(CompiledLBFGS(potential, max_iterations=1), x0, u)
@@ -132,9 +130,7 @@ def test_the_factor_solves(cells, pinned):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("iterations", [1, 5, 10])
-def test_iterations_are_those_of_the_exact_solver(seed, iterations, monkeypatch):
-    # The pressed sheet is flung farther than a step's reach, beyond which contact is left out.
-    monkeypatch.setattr(ContactPenalty, "reach", lambda term: np.full(len(term.stencils), np.inf))
+def test_iterations_are_those_of_the_exact_solver(seed, iterations):
     potential, guess = pressed(seed)
     exact = LBFGS(potential, max_iterations=iterations, finish=False, switch=1e-9).minimise(guess)
     found = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
