@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from benchmarks.declarations import DeclarationError
-from benchmarks.external.roll_out_option import RollOutError
+from benchmarks.external.roll_out_option import RollOutFileError
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import PROGRAM, make_parser, request_of_run, split
 from benchmarks.plan.plan import Plan
@@ -60,7 +60,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         assets = check_roll_outs(plan)
         with held(plan.folder), heeded_interrupts():
             return execute(plan, assets, report=report)
-    except (HeldError, DeclarationError, RollOutError) as error:
+    except (HeldError, DeclarationError, RollOutFileError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
     except (RunStopped, OSError) as error:

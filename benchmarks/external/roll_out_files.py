@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.external.roll_out_option import RollOutError
+from benchmarks.external.roll_out_option import RollOutFileError
 from reference_sim.files.mesh_files import MESH_SUFFIXES, Surface, read_mesh, read_sequence
 
 KEYS = {  # of an npz, and of a pickle
@@ -61,7 +61,7 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
     """Read a file, a folder or a pattern of files; a process reads it once, until it changes.
 
     Raises:
-        RollOutError: one line with the file, for whatever is wrong.
+        RollOutFileError: one line with the file, for whatever is wrong.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -103,7 +103,7 @@ def _read_mesh(path: str, state: object) -> Surface:
 def _read(path: str, state: object) -> StoredRollOut:
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES and not (Path(path).is_dir() or "*" in path):
-        raise RollOutError(
+        raise RollOutFileError(
             f"{path}: unknown kind of roll-out: give one of {', '.join(SUFFIXES)}, or a folder"
         )
     reader = _READERS.get(suffix, _meshes)
@@ -112,7 +112,7 @@ def _read(path: str, state: object) -> StoredRollOut:
     except Exception as error:  # a damaged file can fail in nearly every way, and none is this program's own
         why = " ".join(str(error).split())[:300] or type(error).__name__
         named = why if path in why else f"{path}: {why}"
-        raise RollOutError(named) from None
+        raise RollOutFileError(named) from None
 
 
 def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:

@@ -17,7 +17,7 @@ HELP = (
 )
 
 
-class RollOutError(ValueError):
+class RollOutFileError(ValueError):
     """A roll-out that cannot be read or does not belong to the scene; the message names file and remedy."""
 
 
@@ -39,11 +39,11 @@ class FileConventions:
 
         for what, value, known in (("units", self.units, tuple(METRES)), ("up", self.up, UP_AXES)):
             if value not in known:
-                raise RollOutError(f"--{what} {value}: choose from {', '.join(known)}")
+                raise RollOutFileError(f"--{what} {value}: choose from {', '.join(known)}")
         if self.fps is not None and not 0.0 < self.fps < 1e6:
-            raise RollOutError(f"--fps {self.fps}: give a positive number of frames per second")
+            raise RollOutFileError(f"--fps {self.fps}: give a positive number of frames per second")
         if self.match_vertices and self.other_mesh:
-            raise RollOutError(
+            raise RollOutFileError(
                 "--match-vertices and --other-mesh: another mesh has no vertex to match, give one"
             )
 
@@ -60,7 +60,7 @@ class RollOutOption:
 
     def __post_init__(self) -> None:
         if not re.fullmatch(rf"\w[{CHARACTERS}]*", self.name):
-            raise RollOutError(
+            raise RollOutFileError(
                 f"{self.path}: the name '{self.name}' has other than letters, digits and _-+., or "
                 "begins with one of -+."
             )
@@ -76,7 +76,7 @@ class RollOutOption:
 
 
 def parse_roll_out(text: str) -> RollOutOption:
-    """Parse NAME=FILE[,key=value...]. Raises RollOutError.
+    """Parse NAME=FILE[,key=value...]. Raises RollOutFileError.
 
     >>> parse_roll_out("mine=out.npz,units=cm,ms=2.2").declared_ms
     2.2
@@ -84,25 +84,25 @@ def parse_roll_out(text: str) -> RollOutOption:
     given, *pairs = text.split(",")
     name, equals, path = (part.strip() for part in given.partition("="))
     if not (name and equals and path):
-        raise RollOutError(f"--rollout {text}: give NAME=FILE, with ,units=cm and the like behind it")
+        raise RollOutFileError(f"--rollout {text}: give NAME=FILE, with ,units=cm and the like behind it")
     fields: dict[str, Any] = {}
     for pair in pairs:
         key, _, value = (part.strip() for part in pair.partition("="))
         if key not in _WORDS:
-            raise RollOutError(f"--rollout {text}: unknown word '{key}'; there are {', '.join(_WORDS)}")
+            raise RollOutFileError(f"--rollout {text}: unknown word '{key}'; there are {', '.join(_WORDS)}")
         field, convert = _WORDS[key]
         try:
             fields[field] = convert(value)
         except ValueError:
-            raise RollOutError(f"--rollout {text}: {key}={value} is no number") from None
+            raise RollOutFileError(f"--rollout {text}: {key}={value} is no number") from None
     declared = fields.pop("declared_ms", None)
     return RollOutOption(name, path, FileConventions(**fields), check_declared_ms(declared))
 
 
 def check_declared_ms(value: float | None) -> float | None:
-    """Return a declared time [ms] a frame. Raises RollOutError where it is no time."""
+    """Return a declared time [ms] a frame. Raises RollOutFileError where it is no time."""
     if value is not None and not 0.0 < value < 1e9:
-        raise RollOutError(f"declared time {value} ms: give a positive number of milliseconds a frame")
+        raise RollOutFileError(f"declared time {value} ms: give a positive number of milliseconds a frame")
     return value
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.external.roll_out_files import StoredRollOut
-from benchmarks.external.roll_out_option import FileConventions, RollOutError
+from benchmarks.external.roll_out_option import FileConventions, RollOutFileError
 from benchmarks.external.vertex_correspondence import nearest_order, same_faces, same_topology
 from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 
@@ -47,7 +47,7 @@ def fit_to_scene(
         The roll-out, and each change that was made, in words.
 
     Raises:
-        RollOutError: with the remedy, without the file's name.
+        RollOutFileError: with the remedy, without the file's name.
 
     >>> stored, changes = fit_to_scene(read_roll_out("mine.npz"), scene, FileConventions())  # doctest: +SKIP
     """
@@ -55,13 +55,13 @@ def fit_to_scene(
     if stated.other_mesh:
         _check_other_mesh(stored, scene)
     elif count != cloth.vertex_count:
-        raise RollOutError(
+        raise RollOutFileError(
             f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for "
             "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex; or "
             "give --other-mesh, to have surfaces compared alone"
         )
     if not np.isfinite(stored.positions[0]).all():
-        raise RollOutError("its first frame, the scene's start, is not finite")
+        raise RollOutFileError("its first frame, the scene's start, is not finite")
     expected, changes = expected_positions(scene), list[str]()
     in_metres = replace(stored, positions=to_metres_y_up(stored.positions, units=stated.units, up=stated.up))
     _check_axes(stored, expected[0], stated)
@@ -83,14 +83,14 @@ def fit_to_scene(
 
 
 def _check_other_mesh(stored: StoredRollOut, scene: BuiltScene) -> None:
-    """Raise RollOutError for a roll-out without triangles, or with as many as the scene's own mesh."""
+    """Raise RollOutFileError for a roll-out without triangles, or with as many as the scene's own mesh."""
     if stored.faces is None:
-        raise RollOutError(
+        raise RollOutFileError(
             "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"
         )
     count, triangles = stored.positions.shape[1], len(stored.faces)
     if (count, triangles) == (scene.cloth.vertex_count, len(scene.cloth.faces)):
-        raise RollOutError(
+        raise RollOutFileError(
             f"has {count} vertices and {triangles} triangles as the scene's mesh: leave out "
             "--other-mesh, or give --match-vertices where they are in another order"
         )
@@ -115,14 +115,14 @@ def expected_positions(scene: BuiltScene) -> np.ndarray:
 
 
 def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: FileConventions) -> None:
-    """Raise RollOutError unless the first frame fits best with the stated unit and up axis."""
+    """Raise RollOutFileError unless the first frame fits best with the stated unit and up axis."""
     first, size = stored.positions[0], _diagonal(expected)
     alike = [
         units for units in METRES if 1 / SIZE_RATIO < METRES[units] * _diagonal(first) / size < SIZE_RATIO
     ]
     if not alike:
         across = METRES[stated.units] * _diagonal(first)
-        raise RollOutError(
+        raise RollOutFileError(
             f"its first frame is {across:.3g} m across, the scene's cloth {size:.3g} m, in whatever unit of "
             f"{', '.join(METRES)}: write metres"
         )
@@ -140,19 +140,19 @@ def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: FileConvent
     ):
         pairs = zip(("units", "up"), best, given)
         remedy = [f"--{name} {value}" for name, value, stated_value in pairs if value != stated_value]
-        raise RollOutError(
+        raise RollOutFileError(
             f"its first frame fits the scene's cloth in {best[0]}, {best[1]} up, {apart[best]:.2g} m off, "
             f"and not in {stated.units}, {stated.up} up: give {' '.join(remedy)}"
         )
     if here > FARTHEST * size:
-        raise RollOutError(
+        raise RollOutFileError(
             f"its first frame lies {here:.3g} m from where the scene's cloth starts: write world coordinates "
             "(not relative to the pelvis), from the scene's first frame on"
         )
 
 
 def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
-    """Raise RollOutError unless the cloth's centre stays with the body in most of the frames.
+    """Raise RollOutFileError unless the cloth's centre stays with the body in most of the frames.
 
     A roll-out that explodes in the end is a result, one of another motion is none.
     """
@@ -164,7 +164,7 @@ def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
     far = np.flatnonzero(~(away <= FARTHEST * _diagonal(expected[0])))
     if 2 * len(far) > frames:
         frame = far[0]
-        raise RollOutError(
+        raise RollOutFileError(
             f"from frame {frame} on its centre lies {away[frame]:.2g} m from where the body carries it: "
             "another motion, another frame rate (--fps), or coordinates that are not the world's"
         )
@@ -196,13 +196,13 @@ def _order(
         if same_faces(stored.faces, ours):
             return None, ""
         if not stated.match_vertices:
-            raise RollOutError(
+            raise RollOutFileError(
                 f"its {len(stored.faces)} triangles join other vertices than the scene's {len(ours)}: "
                 f"vertices are missing or reordered{remedy}"
             )
         order = same_topology(stored.faces, ours, first, expected)
         if order is None:
-            raise RollOutError(
+            raise RollOutFileError(
                 f"its {len(stored.faces)} triangles are another mesh than the scene's {len(ours)}, whatever "
                 "the order: no vertex can be matched; export the scene's mesh and use that"
             )
@@ -210,14 +210,14 @@ def _order(
     shuffled = _stretch(first, scene) > LONGEST_STRETCH
     if not stated.match_vertices:
         if shuffled:
-            raise RollOutError(
+            raise RollOutFileError(
                 "neighbours in the scene's mesh are no neighbours in its first frame: vertices are reordered"
                 f"{remedy}"
             )
         return None, ""
     order = nearest_order(first, scene.start, reach=0.5 * float(np.median(_lengths(scene.start, scene))))
     if order is None:
-        raise RollOutError(
+        raise RollOutFileError(
             "has no triangles, and its first frame is not the scene's start to within half an edge: vertices "
             "cannot be matched one to one; add its triangles (faces of an npz, .obj beside a point cache)"
         )
@@ -247,7 +247,7 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: FileConventions) 
     rate = 1.0 / scene.dt
     stated_rate, frames = stored.fps, len(stored.positions)
     if stated.fps is None and stated_rate is not None and abs(stated_rate - rate) > RATE_TOLERANCE * rate:
-        raise RollOutError(
+        raise RollOutFileError(
             f"states {stated_rate:g} frames a second, the scene has {rate:g}: give --fps {stated_rate:g} to "
             "re-time it"
         )
@@ -258,7 +258,7 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: FileConventions) 
     if spare < 0.0 or spare > (0.0 if file_rate == rate else max(file_rate / rate, 1.0)):
         seconds = (frames - 1) / file_rate
         hint = _rate_hint(frames, scene.frames, rate) if stated.fps is None else ""
-        raise RollOutError(
+        raise RollOutFileError(
             f"has {frames} frames, {seconds:.3g} s at {file_rate:g} a second; the scene has "
             f"{scene.frames} with its start, {(scene.frames - 1) / rate:.3g} s{hint}"
         )

@@ -12,7 +12,7 @@ from benchmarks.external.roll_out_option import (
     CHARACTERS,
     PLACE,
     FileConventions,
-    RollOutError,
+    RollOutFileError,
     RollOutOption,
     check_declared_ms,
 )
@@ -43,7 +43,7 @@ def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:
     option = RollOutOption(name, options.roll_out, stated, check_declared_ms(options.declared_ms))
     fields, scenes = scene_fields(options), split([options.scene or ""])
     if options.rest_mesh and options.other_mesh:
-        raise RollOutError("--other-mesh compares with a scene: give --scene, not --rest-mesh")
+        raise RollOutFileError("--other-mesh compares with a scene: give --scene, not --rest-mesh")
     if options.rest_mesh:
         from benchmarks.scenes.from_roll_out import declared  # loads the simulator
 
@@ -78,7 +78,7 @@ def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
     stored = RollOutOption("reference", options.reference, FileConventions(), role="reference")
     entry = entry_of(stored, cell.scene.name)
     if entry is None:
-        raise RollOutError(f"--reference {stored.path_for(cell.scene.name)}: no such file")
+        raise RollOutFileError(f"--reference {stored.path_for(cell.scene.name)}: no such file")
     return replace(cell, entry=replace(entry, label="Reference, from a file"))
 
 

@@ -18,7 +18,7 @@ def roll_out_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) ->
 
     Raises:
         PlanError: a name that a method has, or a file of one scene where several are asked for.
-        RollOutError: a file that cannot be read.
+        RollOutFileError: a file that cannot be read.
     """
     if not roll_outs:
         return []

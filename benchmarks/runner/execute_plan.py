@@ -80,7 +80,7 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
 def check_roll_outs(plan: Plan) -> Assets | None:
     """Compare every stored roll-out with its scene before anything is written; return the assets made for it.
 
-    Raises RollOutError.
+    Raises RollOutFileError.
     """
     stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
     if not stored:

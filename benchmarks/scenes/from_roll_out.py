@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.external.roll_out_files import StoredRollOut, read_rest_mesh, read_roll_out
-from benchmarks.external.roll_out_option import RollOutError, RollOutOption
+from benchmarks.external.roll_out_option import RollOutFileError, RollOutOption
 from benchmarks.fingerprint.digest import digest
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth, MeshError
@@ -27,12 +27,12 @@ MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 
 def declared(option: RollOutOption, rest_mesh: str) -> Scene:
-    """Declare the scene of that roll-out. Raises RollOutError for an unreadable file, or half a body."""
+    """Declare the scene of that roll-out. Raises RollOutFileError for an unreadable file, or half a body."""
     stated, stored = option.stated, read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
     gone = [name for name, half in halves.items() if half is None]
     if len(gone) == 1:
-        raise RollOutError(
+        raise RollOutFileError(
             f"{option.path}: holds half a body: {gone[0]} is absent; give obstacle (T,B,3) and "
             "obstacle_faces (G,3), or neither"
         )
@@ -52,15 +52,15 @@ def build(
     scene: Scene, assets: object = None, *, path: str, rest_mesh: str, units: str, up: str, fps: float | None,
     digests: tuple[str, str],
 ) -> BuiltScene:  # fmt: skip
-    """Build the scene; it starts at rest in the file's first frame. Raises RollOutError."""
+    """Build the scene; it starts at rest in the file's first frame. Raises RollOutFileError."""
     stored = read_roll_out(path)
     positions = to_metres_y_up(stored.positions, units=units, up=up)
     if len(positions) < MIN_FRAMES:
-        raise RollOutError(f"{path}: {len(positions)} frames; at least {MIN_FRAMES} are needed")
+        raise RollOutFileError(f"{path}: {len(positions)} frames; at least {MIN_FRAMES} are needed")
     try:
         rest = read_rest_mesh(rest_mesh)
         if len(rest.positions) != positions.shape[1]:
-            raise RollOutError(
+            raise RollOutFileError(
                 f"{rest_mesh}: {len(rest.positions)} vertices, {path} has {positions.shape[1]}: give the "
                 "mesh that the roll-out was made with"
             )
@@ -68,7 +68,7 @@ def build(
         _demand_a_size(cloth.rest_positions, rest_mesh, units)
         obstacle = _obstacle(stored, units, up)
     except MeshError as error:
-        raise RollOutError(f"{path} with {rest_mesh}: {error}") from None
+        raise RollOutFileError(f"{path} with {rest_mesh}: {error}") from None
     energies: list[Energy] = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
     return BuiltScene(
         name=scene.name,
@@ -82,12 +82,12 @@ def build(
 
 
 def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> None:
-    """Raise RollOutError for a cloth (V,3) [m] that is a garment in a smaller unit."""
+    """Raise RollOutFileError for a cloth (V,3) [m] that is a garment in a smaller unit."""
     across = float(np.linalg.norm(np.ptp(rest_positions, axis=0)))
     low, high = GARMENT
     fit = [f"--units {unit}" for unit, m in METRES.items() if low <= across / METRES[units] * m <= high]
     if across > LARGEST and fit:
-        raise RollOutError(
+        raise RollOutFileError(
             f"{rest_mesh}: the cloth is {across:.3g} m across in --units {units}: say {' or '.join(fit)}"
         )
 

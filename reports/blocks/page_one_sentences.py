@@ -77,7 +77,7 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
 
 
 def _distances(run: Run, rows: pd.DataFrame) -> str:
-    """Say how far the subjects are from the reference, for a run without relative excess: no skinning there."""
+    """Say how far the subjects are from the reference, for a run without skinning."""
     parts = []
     for method in subjects(run, set(rows[rows["usable"]]["method"])):
         distance, gap = (value_of(rows, method, name) for name in (DISTANCE, GAP))

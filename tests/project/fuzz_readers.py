@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.external.roll_out_files import read_roll_out
-from benchmarks.external.roll_out_option import RollOutError
+from benchmarks.external.roll_out_option import RollOutFileError
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory, TrajectoryError
@@ -288,8 +288,8 @@ READERS: tuple[Reader, ...] = (
     Reader("body pickle", ".pkl", pickled(smpl_arrays), read_body, (BodyError,), bytes_of),
     Reader("motion pickle", ".pkl", pickled(amass_arrays), read_clip, (MotionError,), bytes_of),
     Reader("BVH", ".bvh", lambda: bvh_text(), read_clip, (MotionError,), bytes_of),
-    Reader("roll-out", ".npz", arrays(**roll_out()), read_roll_out, (RollOutError,), bytes_of),
-    Reader("roll-out pickle", ".pkl", pickled(hood_arrays), read_roll_out, (RollOutError,), bytes_of),
+    Reader("roll-out", ".npz", arrays(**roll_out()), read_roll_out, (RollOutFileError,), bytes_of),
+    Reader("roll-out pickle", ".pkl", pickled(hood_arrays), read_roll_out, (RollOutFileError,), bytes_of),
     Reader("PC2", ".pc2", lambda: point_cache(), read_point_cache, (TrajectoryError,), bytes_of),
     Reader("amc", ".amc", lambda: clip_text(), read_amc, (MotionError,), bytes_of),
     Reader("asf", ".asf", lambda: cmu_like().encode(), read_asf, (MotionError,), bytes_of),

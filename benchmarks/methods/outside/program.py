@@ -84,7 +84,7 @@ class Program(Stored):
         Raises:
             RuntimeError: the program fails.
             WorkerDied: it takes too long.
-            RollOutError: what it has written does not belong to the scene.
+            RollOutFileError: what it has written does not belong to the scene.
         """
         with tempfile.TemporaryDirectory(prefix="program-") as folder:
             exported, out, output = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))

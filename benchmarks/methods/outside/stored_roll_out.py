@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
-from benchmarks.external.roll_out_option import MODULE, FileConventions, RollOutError, RollOutOption
+from benchmarks.external.roll_out_option import MODULE, FileConventions, RollOutFileError, RollOutOption
 from benchmarks.external.scene_fit import fit_to_scene
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import Method, MethodEntry
@@ -25,12 +25,14 @@ class Stored(Method):
     stated: FileConventions
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Read the file and compare it with the scene. Raises RollOutError."""
+        """Read the file and compare it with the scene. Raises RollOutFileError."""
         self.scene = scene
         try:
             self.stored, self.done = fit_to_scene(read_roll_out(self.path), scene, self.stated)
-        except RollOutError as error:
-            raise RollOutError(str(error) if self.path in str(error) else f"{self.path}: {error}") from None
+        except RollOutFileError as error:
+            raise RollOutFileError(
+                str(error) if self.path in str(error) else f"{self.path}: {error}"
+            ) from None
 
     def run(self) -> Trajectory:
         """Return the roll-out of the file."""
@@ -62,7 +64,7 @@ def make(*, models: Path, seed: int, path: str, digest: str, **stated: object) -
 
 
 def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
-    """Return the entry of that scene; None where it has no file. Raises RollOutError."""
+    """Return the entry of that scene; None where it has no file. Raises RollOutFileError."""
     path = option.path_for(scene)
     if option.places and not Path(path).exists() and not glob.glob(path):
         return None

@@ -84,10 +84,10 @@ def _longest(u):
 def contact_gradient(data, u, gradient, s):
     """Return the energy [J] of the contact penalty and add to gradient (3V,) [N].
 
-    deepest (B,): largest depth of a block at x_0 [m]. With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the
-    vertex. constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the depth of x_0 under
-    the margin [m], below zero above it. No sample moves farther than the vertex that moves most, so a block
-    that is higher than that is not visited.
+    deepest (B,): largest depth of a block at x_0 [m]. With L for LANES_FLOAT32: vertices (B, 3 L): 3 times
+    the vertex. constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the depth of x_0
+    under the margin [m], below zero above it. No sample moves farther than the vertex that moves most, so a
+    block that is higher than that is not visited.
     """
     deepest_at_start, vertices, constants, planes = data
     total, height = 0.0, -_longest(u)

@@ -11,7 +11,12 @@ import pytest
 
 from benchmarks.external import roll_out_files as files
 from benchmarks.external.roll_out_files import read_roll_out
-from benchmarks.external.roll_out_option import FileConventions, RollOutError, RollOutOption, parse_roll_out
+from benchmarks.external.roll_out_option import (
+    FileConventions,
+    RollOutFileError,
+    RollOutOption,
+    parse_roll_out,
+)
 from benchmarks.external.vertex_correspondence import same_topology
 from benchmarks.meshes import torus
 from benchmarks.methods.catalogue.all_methods import find_method
@@ -120,7 +125,7 @@ def test_half_an_obstacle_is_refused(kept, tmp_path):
     held = {"obstacle": X, "obstacle_faces": FACES}
     np.savez(tmp_path / "mine.npz", positions=X, faces=FACES, **{kept: held[kept]})
     gone = next(name for name in held if name != kept)
-    with pytest.raises(RollOutError, match=rf"mine.npz: holds half a body: {gone} is absent"):
+    with pytest.raises(RollOutFileError, match=rf"mine.npz: holds half a body: {gone} is absent"):
         declared(RollOutOption("mine", str(tmp_path / "mine.npz"), FileConventions()), "rest.obj")
 
 
@@ -169,7 +174,7 @@ def test_what_does_not_belong_to_the_scene_is_refused_with_the_remedy(name, tmp_
     positions, faces, stated, remedy = WRONG[name]
     given = {} if faces is None else {"faces": faces}
     np.savez(tmp_path / "mine.npz", positions=positions, **given)
-    with pytest.raises(RollOutError, match=remedy) as refused:
+    with pytest.raises(RollOutFileError, match=remedy) as refused:
         rows(str(tmp_path / "mine.npz"), **stated)
     assert str(refused.value).count("mine.npz") == 1 and "\n" not in str(refused.value)
 
@@ -216,9 +221,9 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
 )  # fmt: skip
 def test_another_mesh_has_to_be_in_the_scenes_place_and_time(given, remedy, tmp_path):
     np.savez(tmp_path / "mine.npz", **given)
-    with pytest.raises(RollOutError, match=remedy):
+    with pytest.raises(RollOutFileError, match=remedy):
         rows(str(tmp_path / "mine.npz"), other_mesh=True)
-    with pytest.raises(RollOutError, match="give one"):
+    with pytest.raises(RollOutFileError, match="give one"):
         FileConventions(match_vertices=True, other_mesh=True)
 
 
@@ -227,14 +232,14 @@ def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
     fine = np.concatenate([halves, X[-1:]])
     path = str(tmp_path / "mine.npz")
     np.savez(path, positions=fine, fps=60.0)
-    with pytest.raises(RollOutError, match=r"states 60 .* give --fps 60"):
+    with pytest.raises(RollOutFileError, match=r"states 60 .* give --fps 60"):
         rows(path)
     assert rows(path, fps=60.0) == direct(X)  # every second frame, as it is
     np.savez(path, positions=X[::2])
-    with pytest.raises(RollOutError, match="has 4 frames"):
+    with pytest.raises(RollOutFileError, match="has 4 frames"):
         rows(path)
     method = Stored(path, FileConventions(fps=15.0))
-    with pytest.raises(RollOutError, match="scene has 8"):
+    with pytest.raises(RollOutFileError, match="scene has 8"):
         method.prepare(SCENE)  # its last frame comes before the scene's
     np.savez(path, positions=np.concatenate([X[::2], 2 * X[-1:] - X[-2:-1]]))
     method.prepare(SCENE)
@@ -248,7 +253,7 @@ def test_vertices_without_triangles_are_matched_by_the_start_alone(tmp_path):
     np.savez(path, positions=at_rest[:, ORDER])
     assert rows(path, match_vertices=True) == direct(at_rest)
     np.savez(path, positions=at_rest[:, ORDER] + 0.1)
-    with pytest.raises(RollOutError, match="add its triangles"):
+    with pytest.raises(RollOutFileError, match="add its triangles"):
         rows(path, match_vertices=True)
 
 
@@ -292,7 +297,7 @@ def test_a_damaged_file_is_one_line(kind, tmp_path):
         target.write_bytes(bytes(data))
         try:
             read_roll_out(path)
-        except RollOutError as error:
+        except RollOutFileError as error:
             refused += 1
             assert "\n" not in str(error) and str(tmp_path) in str(error)
     assert refused > 5
@@ -303,7 +308,7 @@ def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_
     head = np.array([1, 2**30], "<i4").tobytes() + np.array([0, 1], "<f4").tobytes()
     path.write_bytes(SIGNATURE + head + np.array([2**30], "<i4").tobytes() + bytes(36))
     assert HEADER_SIZE == 32
-    with pytest.raises(RollOutError, match="the file has 68"):
+    with pytest.raises(RollOutFileError, match="the file has 68"):
         read_roll_out(path)
     import h5py
 
@@ -312,7 +317,7 @@ def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_
     with h5py.File(tmp_path / "a.vtkhdf", "r+") as file:
         del file["VTKHDF/Points"]
         file.create_dataset("VTKHDF/Points", (10**12, 3), chunks=(10**4, 3), dtype="f8")
-    with pytest.raises(RollOutError, match="more than its file can hold"):
+    with pytest.raises(RollOutFileError, match="more than its file can hold"):
         read_roll_out(tmp_path / "a.vtkhdf")
 
 
@@ -322,7 +327,7 @@ def test_a_pickle_that_would_run_code_does_not(tmp_path):
             return (Path.touch, (tmp_path / "ran",))
 
     (tmp_path / "mine.pkl").write_bytes(pickle.dumps({"pred": Wicked()}))
-    with pytest.raises(RollOutError, match=r"mine\.pkl"):
+    with pytest.raises(RollOutFileError, match=r"mine\.pkl"):
         read_roll_out(tmp_path / "mine.pkl")
     assert not (tmp_path / "ran").exists()
 
@@ -345,6 +350,6 @@ def test_an_option_says_everything_of_a_roll_out():
      ("m=a.npz,fps=-1", "positive"), ("m=a.npz,ms=0", "positive")],
 )  # fmt: skip
 def test_a_wrong_option_is_one_line(text, hint):
-    with pytest.raises(RollOutError, match=hint) as refused:
+    with pytest.raises(RollOutFileError, match=hint) as refused:
         parse_roll_out(text)
     assert "\n" not in str(refused.value)
