@@ -170,7 +170,7 @@ def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tm
     cells = tuple(Cell(scene, entry, 0, ("garments",)) for entry in BLOCK)
     plan = plan_of(tmp_path, motions=Motions(train=("walk", "run", "bow"), test=("kick",)), cells=cells)
     tasks = {task.training: task for task in tasks_of(plan) if isinstance(task, TrainNetwork)}
-    assert len(BLOCK) == 44 and len(tasks) == 24
+    assert len(BLOCK) == 48 and len(tasks) == 28
     for entry in BLOCK:
         task, training = tasks[entry.trained], entry.training
         mixed = training.simulated.mixed if training.simulated else training.recipe.mixed
@@ -184,7 +184,7 @@ def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tm
     families = {entry.reporting.family for entry in BLOCK}
     assert (
         len({(entry.reporting.family, entry.reporting.level) for entry in BLOCK}) == len(BLOCK)
-        and len(families) == 20
+        and len(families) == 22
     )
     alone = dataclasses.replace(plan, motions=Motions(train=("walk",), test=("kick",)))
     network = Network("snug", 0, "tshirt", find_method("snug-data-converged-0").training)
