@@ -45,8 +45,6 @@ class RoundBody:
         if axis is not None:
             self.keep[axis] = 0.0
 
-    bounded = False
-
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Return tangent planes below points (S, 3); faces and places on them do not exist."""
         radial = points * self.keep
