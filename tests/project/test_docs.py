@@ -16,10 +16,11 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 EXTEND = ROOT / "docs" / "extend.md"
 FILE = re.compile(r"File `([^`]+)`:$")
-SHORT = ("A method", "An energy", "A network from elsewhere", "A scene", "A metric")
+SHORT = ("A method", "An energy", "A scene", "A metric")
 LONG = (
     "How to add something",
     "A program",
+    "A network from elsewhere",
     "A recipe",
 )  # tests/benchmarks/plan/test_user_files.py: the first two
 

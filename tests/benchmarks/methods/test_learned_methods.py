@@ -76,11 +76,12 @@ CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
 
 def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.tasks.training.CHECKPOINT_MINUTES", 1e-9)
+    monkeypatch.setattr("benchmarks.tasks.training.LOG_EVERY", 4)
     dressed, motion = tube_dress(), swaying(30)
     assets = assets_of(dressed, motion)
 
     def trained(folder, key, tell):
-        task = training("snug", motion.name, steps=60, key=key)
+        task = training("snug", motion.name, steps=12, key=key)
         task.clear(RunFolder(folder))
         return task.run(context(folder, assets, tell=tell), {})
 
@@ -95,9 +96,9 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         told.clear()
         with pytest.raises(KeyboardInterrupt):
             trained(tmp_path, key, killed)
-        assert told == [20, 20] and [path.name for path in models.iterdir()] == [CHECKPOINT]
+        assert told == [4, 4] and [path.name for path in models.iterdir()] == [CHECKPOINT]
     result = trained(tmp_path, "now", went_on.append).result
-    assert sum(went_on) == result["steps"] == 60 and len(went_on) < 3  # of three reports
+    assert sum(went_on) == result["steps"] == 12 and len(went_on) < 3  # of three reports
     (tmp_path / "damaged" / "models").mkdir(parents=True)
     (tmp_path / "damaged" / "models" / CHECKPOINT).write_bytes(b"half")
     trained(tmp_path / "damaged", "now", print)

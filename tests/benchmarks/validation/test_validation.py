@@ -19,7 +19,13 @@ from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import Step
 
 
-@pytest.mark.parametrize("case", KNOWN_ANSWERS, ids=lambda case: case.name)
+def marked(case):
+    """A case for the tests; those of the slit plate take half a minute."""
+    marks = [pytest.mark.slow] if case.name.startswith("slit_annulus") else []
+    return pytest.param(case, id=case.name, marks=marks)
+
+
+@pytest.mark.parametrize("case", map(marked, KNOWN_ANSWERS))
 def test_a_known_answer_is_found(case):
     row = case.run()
     assert row.status == "ok", row.reason

@@ -90,6 +90,7 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(source.replace(old, new))
 
 
+@pytest.mark.slow
 def test_an_edit_two_files_away_from_the_searching_kernel_is_seen(tmp_path):
     shutil.copytree(
         ROOT / "reference_sim", tmp_path / "reference_sim", ignore=shutil.ignore_patterns("__pycache__")

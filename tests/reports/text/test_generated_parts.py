@@ -13,8 +13,14 @@ from reports.text.generated_parts import BEGIN, END, fill
 from reports.text.published_parts import published_part
 
 
-def test_every_generated_part_is_what_the_published_runs_give():
-    for path, text, made in documents(ROOT):
+@pytest.fixture(scope="module")
+def project():
+    """(path, text, text made anew) of each document of the project."""
+    return list(documents(ROOT))
+
+
+def test_every_generated_part_is_what_the_published_runs_give(project):
+    for path, text, made in project:
         assert text == made, f"{path}: run python -m reports.docs"
 
 
@@ -58,12 +64,17 @@ def test_each_part_of_a_merged_run_has_its_command_and_a_metric_its_definition()
     assert f"| `distance/rms` | mm | {find_metric('distance/rms').definition} |" in published_part("metrics")
 
 
-def test_the_command_checks_and_says_so(capsys):
+def test_the_command_checks_and_says_so(project, monkeypatch, capsys):
+    monkeypatch.setattr("reports.docs.documents", lambda: iter(project))
     assert main(["--check"]) == 0 and capsys.readouterr().err == ""
+    (path, text, made), *others = project
+    monkeypatch.setattr("reports.docs.documents", lambda: iter([(path, text, f"{made}\n"), *others]))
+    assert main(["--check"]) == 1
+    assert capsys.readouterr().err == f"{path}: not what the published runs give; run python -m reports.docs\n"
 
 
-def test_documents_are_readme_and_docs_alone():
-    assert {path.relative_to(Path(ROOT)).parts[0] for path, *_ in documents(ROOT)} == {"README.md", "docs"}
+def test_documents_are_readme_and_docs_alone(project):
+    assert {path.relative_to(Path(ROOT)).parts[0] for path, *_ in project} == {"README.md", "docs"}
 
 
 def test_earlier_runs_judge_what_current_ones_cannot_and_nothing_else():
