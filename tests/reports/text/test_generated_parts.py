@@ -70,7 +70,7 @@ def test_the_command_checks_and_says_so(project, monkeypatch, capsys):
     (path, text, made), *others = project
     monkeypatch.setattr("reports.docs.documents", lambda: iter([(path, text, f"{made}\n"), *others]))
     assert main(["--check"]) == 1
-    assert capsys.readouterr().err == f"{path}: not what the published runs give; run python -m reports.docs\n"
+    assert capsys.readouterr().err.startswith(f"{path}: not what the published runs give")
 
 
 def test_documents_are_readme_and_docs_alone(project):
