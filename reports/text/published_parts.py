@@ -1,8 +1,9 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
-`headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN,
-...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`, `metrics`; RUN
-is a folder of reports/published. Earlier runs judge claims that the runs before them cannot.
+`headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
+`claims exploratory of RUN, ...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`,
+`runs of RUN, ...`; RUN is a folder of reports/published. Earlier runs judge claims that the runs before them
+cannot. `metrics`, `rooms of PACKAGE`, `clips of the library`, `distances of the library` come from the code.
 """
 
 from __future__ import annotations
@@ -25,14 +26,17 @@ from reports.text.claim_rows import (
     judge_in_first,
     rows_of_earlier_runs,
 )
+from reports.text.rooms import room_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
+from snug.motion.composition import clip_rows, distance_rows
 
 FORMS = (
     "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
     "claims exploratory of RUN, ...; claims earlier of RUN, ...; EARLIER RUN, ...; counts of RUN, ...; "
-    "runs of RUN, ...; metrics"
+    "runs of RUN, ...; metrics; rooms of PACKAGE; clips of the library; distances of the library"
 )
 
+LIBRARY_TABLES = {"clips": clip_rows, "distances": distance_rows}
 METRIC = ("Metric", "Unit", "Definition")  # heads
 ORIGIN = ("Run", "Day", "Commit", "Processor (2 cores)", "Command")  # heads
 
@@ -45,6 +49,10 @@ def published_part(words: str) -> str:
     kind, _, name = what.partition(" ")
     if words == "metrics":
         return markdown_table([METRIC, *((f"`{m.name}`", m.unit, m.definition) for m in declared().values())])
+    if kind == "rooms":
+        return markdown_table(room_rows(source))
+    if source == "the library" and kind in LIBRARY_TABLES:
+        return markdown_table(LIBRARY_TABLES[kind]())
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(_read(folders[0])))
     if kind == "table":

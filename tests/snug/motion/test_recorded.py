@@ -10,7 +10,6 @@ import pytest
 
 from benchmarks.presets import find_preset
 from snug.body.skeleton import rotation_matrices, sole_points
-from snug.motion.composition import composition
 from snug.motion.library import (
     CONTROL,
     DYNAMIC_TEST,
@@ -136,12 +135,6 @@ def test_the_notice_is_shipped_and_the_file_is_small():
     assert NOTICE in project["project"]["license-files"]
     assert NOTICE in (ROOT / "README.md").read_text(encoding="utf-8")
     assert CLIPS_FILE.stat().st_size < 2.5e6
-
-
-def test_the_protocol_has_the_tables_of_the_library():
-    protocol = (ROOT / "docs/protocol.md").read_text(encoding="utf-8")
-    for table in composition().split("\n\n"):
-        assert table in protocol, "print them anew: python -m snug.motion.composition"
 
 
 def test_the_notice_lists_every_repair():
