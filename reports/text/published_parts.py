@@ -52,7 +52,7 @@ def published_part(words: str) -> str:
     if kind == "rooms":
         return markdown_table(room_rows(source))
     if source == "the library" and kind in LIBRARY_TABLES:
-        return markdown_table(LIBRARY_TABLES[kind]())
+        return markdown_table(list(LIBRARY_TABLES[kind]()))
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(_read(folders[0])))
     if kind == "table":
@@ -90,7 +90,7 @@ def _claims(*folders: Path) -> JudgedClaims:
 
 def _table(folder: Path, name: str) -> Table:
     """Return a table of a run, having made no more tables than it takes to meet it."""
-    names = []
+    names: list[str] = []
     for place in range(len(TABLES)):
         made = {table.name: table for table in _made(folder, place)}
         if name in made:
