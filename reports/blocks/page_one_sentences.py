@@ -15,7 +15,6 @@ from reports.statistics.means_and_spreads import pair, value_of
 from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads, subjects
 from reports.statistics.pareto import (
     SMALLER_STEPS,
-    Point,
     beaten_by,
     fastest,
     indistinct,
@@ -25,7 +24,7 @@ from reports.statistics.pareto import (
 )
 from reports.statistics.published import published_beside
 from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_relative_excess
-from reports.statistics.verdicts import LESS, MORE, TIED, compare_methods, standing
+from reports.statistics.verdicts import LESS, MORE, TIED, compare_methods, measure_of, standing
 from reports.tables.number_texts import duration, number
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
@@ -48,7 +47,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
 
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
-    """Say which share of skinning's excess energy each network of page one leaves."""
+    """Say which relative excess energy each network of page one has, and which of the first two has less."""
     names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
@@ -58,22 +57,23 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     excess = known[first]
     unseen = "" if set(worn["scene"]) <= set(run.trained_on) else "unseen "
     count = len(excess.by_motion)
-    motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
-    text = (
-        f"On {motions} {run.label(first)} has a relative excess energy of {_share(excess)}, where the "
-        f"reference solver has 0 % and skinning alone 100 %: {_stands(excess)}"
-    )
     beside = published_beside(run, first)
-    text += f" ({beside})" if beside else ""
-    text += "".join(f"; {run.label(name)} has {_share(known[name])}" for name in others)
+    sentences = [
+        f"On {count} {unseen}motion{'' if count == 1 else 's'} {run.label(first)} has a relative excess "
+        f"energy of {_share(excess)}{f', {beside}' if beside else ''}, where the reference simulation has "
+        "0 % and skinning alone 100 %",
+        _against_reference(excess),
+        *(f"{run.label(name)} has {_share(known[name])}" for name in others),
+        *(_less_of(run, worn, first, name) for name in others[:1]),
+    ]
     if count > 1:
         scene, worst = excess.worst
-        low, high = (number(share, 2) for share in excess.without_each_motion)
-        text += (
-            f". {run.label(first)}: mean {number(excess.mean, 2)} %, worst motion {number(worst, 2)} % "
-            f"({scene.partition('/')[2] or scene}), {low} to {high} % when any one motion is left out"
+        sentences.append(
+            f"These numbers are geometric means over motions; the arithmetic mean of {run.label(first)} is "
+            f"{number(excess.mean, 2)} %, and its worst motion, {scene.partition('/')[2] or scene}, has "
+            f"{number(worst, 2)} %"
         )
-    return f"{text}."
+    return _joined(sentences)
 
 
 def _distances(run: Run, rows: pd.DataFrame) -> str:
@@ -87,38 +87,73 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
     return f"{'; '.join(parts)}." if parts else ""
 
 
+def _joined(sentences: Sequence[str]) -> str:
+    """Return the sentences, each with a full stop, those that are empty left out."""
+    return " ".join(f"{sentence[:1].upper()}{sentence[1:]}." for sentence in sentences if sentence)
+
+
 def _share(excess: Excess) -> str:
-    """Return a relative excess as "6.1 % (2.3 to 14)"."""
+    """Return a relative excess as "6.1 % (95 % interval 2.3 to 14)"."""
     interval = excess.effect.interval
-    ends = f" ({' to '.join(number(end, 2) for end in interval)})" if interval else ""
+    ends = f" (95 % interval {' to '.join(number(end, 2) for end in interval)})" if interval else ""
     return f"{number(excess.typical, 2)} %{ends}"
 
 
-def _stands(excess: Excess) -> str:
-    """Say how the method stands to the reference."""
+def _against_reference(excess: Excess) -> str:
+    """Say how the energy of a method compares with the reference's."""
     stands = standing(excess.effect, excess.effect.p_value())
-    words = {TIED: "a tie", MORE: "more energy than the reference", LESS: "less energy than the reference"}
-    return words.get(stands, "inconclusive")
+    return {
+        TIED: "this is a tie with the reference",
+        MORE: "this is more than the reference has, beyond all uncertainty that was measured",
+        LESS: "this is less than the reference has, which is no better: cloth that moves less has less",
+    }.get(stands, "whether this differs from the reference is inconclusive")
+
+
+def _less_of(run: Run, rows: pd.DataFrame, one: str, other: str) -> str:
+    """Say which of two methods has less total energy; empty where they cannot be compared."""
+    compared = compare_methods(run, rows, run.metrics[TOTAL], one, other)
+    if compared.effect is None:
+        return ""
+    first, second = run.label(one), run.label(other)
+    return {
+        TIED: f"in a paired comparison {first} and {second} tie",
+        MORE: f"in a paired comparison {second} has less than {first}",
+        LESS: f"in a paired comparison {first} has less than {second}",
+    }.get(
+        standing(compared.effect, compared.effect.p_value()),
+        f"which of {first} and {second} has less is inconclusive",
+    )
 
 
 def _moves(run: Run, worn: pd.DataFrame) -> str:
     """Say what each subject lacks of the simulation's motion, and how much of it lies inside the body."""
-    parts = []
+    sentences: list[str] = []
     reference = value_of(worn, run.reference, INSIDE)
     for method in subjects(run, set(worn[worn["usable"]]["method"])):
         swing, alike, inside = (value_of(worn, method, name) for name in (SWING, ALIKE, INSIDE))
         if swing is not None:
-            share = number(100.0 * swing, 2)
-            parts.append(
-                f"the hem of {run.label(method)} has {share} % of the simulation's dynamic amplitude"
+            sentence = (
+                f"{run.label(method)} has {_secondary_motion(swing)} secondary motion: its hem has "
+                f"{number(100.0 * swing, 2)} % of the simulation's dynamic amplitude"
             )
-            parts[-1] += "" if alike is None else f", correlation {number(alike, 2)}"
+            same = ", where 1 is the same motion" if not sentences else ""
+            correlated = "" if alike is None else f", with a correlation of {number(alike, 2)}{same}"
+            sentences.append(f"{sentence}{correlated}")
         if inside is not None:
-            beside = "" if reference is None else f", of the simulation {number(reference, 2)} %"
-            whose = f" of {run.label(method)}" if swing is None else ""
-            parts.append(f"{number(inside, 2)} % of the surface{whose} lies inside the body{beside}")
-    text = "; ".join(parts)
-    return f"{text[:1].upper()}{text[1:]}." if text else ""
+            beside = "" if reference is None else f", against {number(reference, 2)} % of the simulation's"
+            sentences.append(
+                f"{number(inside, 2)} % of the surface of {run.label(method)} lies inside the body{beside}"
+            )
+    return _joined(sentences)
+
+
+def _secondary_motion(amplitude: float) -> str:
+    """Return how much of the simulation's secondary motion there is, in words."""
+    if amplitude < 0.2:
+        return "almost no"
+    if amplitude < 0.8:
+        return "less"
+    return "about as much" if amplitude < 1.25 else "more"
 
 
 def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
@@ -130,40 +165,54 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     ends = compared.effect.interval
     times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
     own = number(compared.other.value)
-    text = f"{run.label(network)} takes {own} ms a frame, the simulation {times} times as long"
     training = value_of(run.garment_rows, network, "cost/train")
-    text += f"; training takes {duration(training)}" if training else ""
-    more = _rivals(run, run.cells("speed", "garments"), scenes) if scenes else ""
-    return f"{text}; {more}" if more else f"{text}."
+    return _joined([
+        f"{run.label(network)} takes {own} ms a frame on one core, the simulation {times} times as long",
+        f"its training took {duration(training)}" if training else "",
+        *(_rivals(run, run.cells("speed", "garments"), scenes) if scenes else ()),
+    ])  # fmt: skip
 
 
 def _trust(run: Run, timed: pd.DataFrame) -> str:
     """Say how uncertain the reference itself is, what its time step leaves out, and how claims came out."""
-    parts = []
-    apart = [indistinct(run, timed, metric) for metric in (CURVATURE, DISTANCE)]
+    sentences = []
+    apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
-        parts.append(
-            f"equally valid simulations lie {number(apart[0], 2)} 1/m and {number(apart[1], 2)} mm apart, "
-            "and what is nearer is inconclusive"
+        sentences.append(
+            f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
+            f"{number(apart[1], 2)} 1/m in mean curvature, so smaller errors in these two rank nobody"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
         count = int(run.methods[finest].level or 0)
         strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
         words = [
-            f"{what} is {number(one.value / other.value, 2)} times"
-            for what, (one, other) in (("strain", strain), ("the hem's amplitude", amplitude))
+            f"{what} {number(one.value / other.value, 2)} times"
+            for what, (one, other) in (("its strain is", strain), ("its hem's amplitude", amplitude))
             if one and other and other.value
         ]
-        parts.append(
-            "converged means that each time step of 1/30 s is minimised; with "
+        sentences.append(
+            "The reference is converged in each time step of 1/30 s and not in the size of the step: with "
             f"{count} steps a frame {' and '.join(words)} as large"
         )
     counted = paper_claims.counts(run)
     if counted:
-        parts.append(f"the primary claims of the paper: {paper_claims.in_words(counted)}")
-    text = "; ".join(parts)
-    return f"{text[:1].upper()}{text[1:]}." if parts else ""
+        total = counted.total()
+        claims = f"{total} primary claim{'' if total == 1 else 's'}"
+        sentences.append(f"of the paper's {claims} {paper_claims.in_words(counted)}")
+        sentences += _claims_that_fail(run)
+    return _joined(sentences)
+
+
+def _claims_that_fail(run: Run) -> list[str]:
+    """Return a sentence that names the primary claims that do not hold, none where there are none."""
+    failed = []
+    for line in paper_claims.judged(run):
+        if line.claim.primary and line.verdict == paper_claims.FAILS:
+            lower, higher = run.label(line.claim.lower), run.label(line.claim.higher)
+            measure = measure_of(line.compared).title.lower()
+            failed.append(f"{line.claim.says} ({measure}: {lower} {line.claim.relation} {higher})")
+    return [f"what does not hold: {'; '.join(failed)}"] if failed else []
 
 
 def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
@@ -172,30 +221,32 @@ def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
     return [name for name, method in run.methods.items() if method.family == SMALLER_STEPS and name in have]
 
 
-def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> str:
-    """Say by the energy gap what beats the network, and which solver stopped early is as accurate."""
+def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
+    """Say what beats the network by energy gap, and which solver stopped early is as accurate."""
     points = points_of(run, frame, scenes, GAP)
     network = next((p for p in points if p.method == NETWORK), None)
     if network is None:
-        return ""
+        return []
+    snug = run.label(network.method)
     best, solver = beaten_by(points, network), fastest(truncated(run, points), network.error)
-    text = f"by {run.metrics[GAP].title.lower()} ({_both(network)}) "
+    gap = f"{number(network.error)} J{network.fewer}"
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
-        text += "nothing as fast as SNUG is nearer"
-        text += ", of those that have it in all scenes" if partly_measured else ""
+        whole = " and was measured in all scenes" if partly_measured else ""
+        sentences = [f"no method that is as fast{whole} has an energy gap below the {gap} of {snug}"]
     else:
         within = " within repeats" if best.time > network.time else ""
         apart = network.error - best.error > network.error_spread + best.error_spread
-        near = "nearer" if apart else "as near, within the scatter of seeds and of right simulations,"
-        text += f"{run.label(best.method)} is {near} and no slower{within} ({_both(best)})"
-    text += f"; the fastest solver as near is {run.label(solver.method)}, " if solver else ""
-    return text + (f"{number(solver.time)} ms." if solver else ".")
-
-
-def _both(point: Point) -> str:
-    return f"{number(point.error)} in {number(point.time)} ms{point.fewer}"
+        scatter = "" if apart else ", by less than seeds and equally valid simulations scatter"
+        sentences = [
+            f"{run.label(best.method)} is no slower{within} and has an energy gap of {number(best.error)} J"
+            f"{best.fewer}, below the {gap} of {snug}{scatter}"
+        ]
+    if solver:
+        label, time = run.label(solver.method), number(solver.time)
+        sentences.append(f"the fastest solver with so small an energy gap is {label}, {time} ms a frame")
+    return sentences
 
 
 def _on_other_bodies(run: Run) -> str:

@@ -172,7 +172,7 @@ function makeErrors() {
   byId('error-said').textContent = panel
     ? `${sentence(panel.definition)} Circles are networks, diamonds baselines, squares solvers; a click shows or hides one.`
       + (plot.reference ? ' Dotted: the time of the simulation.' : '')
-      + (panel.band ? ' Shaded: as near as right simulations are to each other.' : '')
+      + (panel.band ? ' Shaded: as near as equally valid simulations are to each other.' : '')
     : '';
   const can = (method) => method in content.scenes[state.scene].methods;
   byId('errors').replaceChildren(

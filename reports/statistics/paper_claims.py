@@ -176,8 +176,12 @@ def counts(run: Run) -> Counter[str]:
 
 
 def in_words(verdicts: Counter[str]) -> str:
-    """Return the counts as "holds 3, tie 1"."""
-    return ", ".join(f"{word} {verdicts[word]}" for word in (HOLDS, FAILS, TIED, OPEN) if verdicts[word])
+    """Return the counts as "3 hold, 1 is a tie"."""
+    words = {
+        HOLDS: (HOLDS, "hold"), FAILS: (FAILS, "do not hold"),
+        TIED: ("is a tie", "are ties"), OPEN: (f"is {OPEN}", f"are {OPEN}"),
+    }  # fmt: skip
+    return ", ".join(f"{n} {words[word][n != 1]}" for word in words if (n := verdicts[word]))
 
 
 def judged(run: Run) -> list[Judged]:

@@ -49,11 +49,12 @@ def findings(run: Run) -> list[Table]:
 
 
 EXCESS_NOTE = (
-    "Typical: the mean over motions and seeds on a scale that is logarithmic above 1 % of skinning's excess "
-    "and linear below, taken back; below it the 95 % interval. Mean and worst are of motions. Left out: "
-    "smallest and largest typical value without any one motion. Uncertain by: the spread over the "
-    "reference's ensemble."
+    "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
+    "arithmetic well below; under it the 95 % interval. Mean, worst: over motions. Left out: smallest and "
+    "largest typical value without any one motion. Uncertain by: the spread over the reference's ensemble. "
+    "Energy against the reference: more or less where p < 0.05 and the difference exceeds that spread."
 )
+ONE_SEED = "not tested: one seed"
 
 
 def relative_excess(run: Run) -> list[Table]:
@@ -63,6 +64,8 @@ def relative_excess(run: Run) -> list[Table]:
         low, high = excess.without_each_motion
         worst, most = excess.worst
         stands = standing(excess.effect, excess.effect.p_value())
+        if excess.effect.one_seed:
+            stands = ONE_SEED
         lines.append((
             garment, method, excess.effect, excess.mean, most, worst.partition("/")[2] or worst, low, high,
             excess.uncertainty or None, len(excess.by_motion), stands,
@@ -72,9 +75,11 @@ def relative_excess(run: Run) -> list[Table]:
         Column("worst", "Worst", "%"), Column("worst_motion", "Worst motion", text=True),
         Column("left_out_low", "Left out, low", "%"), Column("left_out_high", "Left out, high", "%"),
         Column("uncertain_by", "Uncertain by", "%"), Column("motions", "Motions"),
-        Column("verdict", "Beside the reference", text=True),
+        Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
-    caption = "Relative excess: share of skinning's excess energy over the reference that a method leaves."
+    caption = (
+        "Relative excess energy, (E - E_reference) / (E_skinning - E_reference), over all motions and seeds."
+    )
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
 
 
@@ -116,7 +121,7 @@ def errors_in_spreads(run: Run) -> list[Table]:
                 lines.append((garment, method, *values))
     columns = (GARMENT, METHOD, *(Column(metric.name, metric.title) for metric in metrics))
     caption = (
-        "Distance from the reference in spreads of its ensemble: 1 is as near as another valid simulation. "
-        "Mean error of the motions over their mean spread."
+        "Errors relative to the spread of the reference ensemble, both root mean squares over seeds or "
+        "members and then means over motions: 1 is as near as another valid simulation."
     )
     return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))

@@ -117,8 +117,9 @@ def metric_tables(run: Run) -> list[Table]:
 def declared_pivots(name: str) -> tuple[Pivot, Pivot]:
     """Declare the table of means over the scenes of a garment, and the one of every scene in all suites."""
     title = name.replace("_", " ").capitalize()
+    caption = f"{title}: mean over the motions and seeds of each garment."
     by_garment = Pivot(
-        name, f"{title}: mean over the scenes of each garment.", ("garment", "method"), of_table=name,
+        name, caption, ("garment", "method"), of_table=name,
         select=lambda run: run.garment_rows, lines=_methods_of_garments, grouped_by=("garment",),
     )  # fmt: skip
     by_scene = Pivot(

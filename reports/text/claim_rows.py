@@ -56,7 +56,10 @@ def claim_counts(claims: JudgedClaims) -> str:
     for name, family in (("Primary", PRIMARY), ("Exploratory", EXPLORATORY)):
         counts = Counter(claims.verdicts[claim][1].verdict for claim in family if claim in claims.verdicts)
         absent = len(family) - counts.total()
-        texts = [in_words(counts), f"{NOT_MEASURED} {absent}" if absent else ""]
+        texts = [
+            in_words(counts),
+            f"{absent} {'is' if absent == 1 else 'are'} {NOT_MEASURED}" if absent else "",
+        ]
         lines.append(f"{name} claims: {', '.join(filter(None, texts))}.")
     return "\n".join(lines)
 

@@ -57,8 +57,9 @@ def published_part(words: str) -> str:
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(_read(folders[0])))
     if kind == "table":
         wanted = [column.strip() for column in columns.split(",") if column.strip()]
-        rows = text_rows(_read(folders[0]), _table(folders[0], name), wanted)
-        return "\n\n".join(filter(None, [markdown_table(rows), remarks_on(rows)]))
+        table = _table(folders[0], name)
+        rows = text_rows(_read(folders[0]), table, wanted)
+        return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
     if words.startswith("claims earlier"):
         earlier = [PUBLISHED / run.strip() for run in columns.split(",")]
         return markdown_table(rows_of_earlier_runs(_claims(*folders), _claims(*earlier)))
