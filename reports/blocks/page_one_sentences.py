@@ -180,7 +180,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
-            f"{number(apart[1], 2)} 1/m in mean curvature, so smaller errors in these two rank nobody"
+            f"{number(apart[1], 2)} 1/m in mean curvature, so smaller errors in these two rank no methods"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
