@@ -104,7 +104,7 @@ def _against_reference(excess: Excess) -> str:
     stands = standing(excess.effect, excess.effect.p_value())
     return {
         TIED: "this is a tie with the reference",
-        MORE: "this is more than the reference has, beyond all uncertainty that was measured",
+        MORE: "the excess exceeds the uncertainty of the reference",
         LESS: "this is less than the reference has, which is no better: cloth that moves less has less",
     }.get(stands, "whether this differs from the reference is inconclusive")
 
@@ -180,7 +180,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
-            f"{number(apart[1], 2)} 1/m in mean curvature, so smaller errors in these two rank no methods"
+            f"{number(apart[1], 2)} 1/m in mean curvature, so differences below these rank no methods"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -229,23 +229,25 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         return []
     snug = run.label(network.method)
     best, solver = beaten_by(points, network), fastest(truncated(run, points), network.error)
-    gap = f"{number(network.error)} J{network.fewer}"
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
-        whole = " and was measured in all scenes" if partly_measured else ""
-        sentences = [f"no method that is as fast{whole} has an energy gap below the {gap} of {snug}"]
+        whole = ", of what was measured in all scenes," if partly_measured else ""
+        sentences = [
+            f"nothing{whole} is as fast and nearer to the minimum of its own time steps, which {snug} "
+            f"exceeds by {number(network.error)} J{network.fewer} (energy gap)"
+        ]
     else:
         within = " within repeats" if best.time > network.time else ""
         apart = network.error - best.error > network.error_spread + best.error_spread
         scatter = "" if apart else ", by less than seeds and equally valid simulations scatter"
         sentences = [
             f"{run.label(best.method)} is no slower{within} and has an energy gap of {number(best.error)} J"
-            f"{best.fewer}, below the {gap} of {snug}{scatter}"
+            f"{best.fewer}, below the {number(network.error)} J{network.fewer} of {snug}{scatter}"
         ]
     if solver:
         label, time = run.label(solver.method), number(solver.time)
-        sentences.append(f"the fastest solver with so small an energy gap is {label}, {time} ms a frame")
+        sentences.append(f"the fastest solver stopped early that is as near is {label}, {time} ms a frame")
     return sentences
 
 

@@ -28,7 +28,7 @@ WORN_SHARE = 0.1
 SIZE_RANGE = 0.1, 1.2  # largest extent of a garment [heights of the body]
 ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_ankle", "right_ankle",
         "left_foot", "right_foot")  # fmt: skip
-# A wide dress has a cost of .2, a shirt around the knees of .5 and a tenth of that in its place.
+# A wide dress has a cost of 0.2, a shirt around the knees of 0.5 and a tenth of that in its place.
 DOUBTFUL, BETTER = 0.3, 0.4
 SHIFT_SAMPLES = 250  # vertices that a shift is sought with
 SHIFT_STEPS = 20
