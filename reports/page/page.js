@@ -15,7 +15,7 @@ const COLOURS = {
 const BRIGHTEST = 0.98; // share of the values of all panes below the end of the scale
 const HOLD = 500; // at the end, before it starts again [ms]
 const byId = (id) => document.getElementById(id);
-const state = { scene: '', methods: [], frame: 0, colour: 'plain', playing: false };
+const state = { scene: '', methods: [], frame: 0, colour: 'distance', playing: false, opened: false };
 let content;
 let view = null;
 let times = new Float32Array(1);
@@ -53,7 +53,7 @@ function firstMethods(available) {
   return available.filter((method) => kept.includes(method));
 }
 
-function chooseScene(name) {
+function chooseScene(name, frame = -1) {
   state.scene = name;
   byId('scene').value = name;
   const available = Object.keys(content.scenes[name].methods);
@@ -66,7 +66,7 @@ function chooseScene(name) {
   }));
   const panels = Object.entries((content.plots[name] || { panels: {} }).panels);
   options(byId('error'), panels.map(([key, panel]) => [key, panel.title]), byId('error').value);
-  state.frame = -1;
+  state.frame = frame;
   return load();
 }
 
@@ -110,6 +110,7 @@ async function load() {
   makeCurves();
   makeErrors();
   goTo(state.frame);
+  if (state.opened) rememberAddress();
 }
 
 function makePanes(scene) {
@@ -204,7 +205,10 @@ function play(on) {
   state.playing = on;
   byId('play').textContent = on ? '❚❚' : '▶';
   byId('play').setAttribute('aria-label', on ? 'Pause' : 'Play');
-  if (!on) return;
+  if (!on) {
+    rememberAddress();
+    return;
+  }
   if (state.frame >= times.length - 1) goTo(0);
   [since, from] = [performance.now(), times[state.frame]];
   requestAnimationFrame(tick);
@@ -221,9 +225,15 @@ function tick() {
   if (frame >= times.length - 1) [since, from] = [now + HOLD, times[0]];
 }
 
+// The address bar says what is shown; while it plays, what was shown before.
+function rememberAddress() {
+  history.replaceState(null, '', `#${addressOf(state)}`);
+}
+
 // The frame to go to; playing goes on from there.
 function seek(frame) {
   goTo(frame);
+  rememberAddress();
   [since, from] = [performance.now(), times[state.frame]];
 }
 
@@ -252,6 +262,7 @@ function listen() {
     if (view) colourScale();
     goTo(state.frame);
     redraw();
+    rememberAddress();
   };
   on('controls', 'submit', (event) => event.preventDefault());
   on('scene', 'change', () => chooseScene(byId('scene').value));
@@ -260,6 +271,10 @@ function listen() {
   on('body', 'change', redraw);
   on('follow', 'change', redraw);
   on('play', 'click', () => play(!state.playing));
+  on('picture', 'click', () => savePicture(
+    byId('canvas'), [...byId('panes').children], `${state.scene}-${state.frame + 1}`.replaceAll('/', '-'),
+  ));
+  on('address', 'click', () => copyText(location.href));
   on('time', 'input', () => seek(Number(byId('time').value)));
   on('speed', 'change', () => seek(state.frame));
   on('curve', 'change', drawCurves);
@@ -276,13 +291,29 @@ function listen() {
   redraw();
 }
 
+// Tables of means first, then those with a row of each scene or motion.
 function listTables() {
   const select = byId('table');
-  options(select, content.tables.map((table, k) => [String(k), table.caption]), '0');
+  const groups = { 'Means': [], 'Each scene or motion': [] };
+  content.tables.forEach((table, k) => {
+    groups[/_by_(scene|motion)$/.test(table.name) ? 'Each scene or motion' : 'Means'].push([String(k), table.caption]);
+  });
+  select.replaceChildren(...Object.entries(groups).filter(([, pairs]) => pairs.length).map(([label, pairs]) => element(
+    'optgroup', { label }, ...pairs.map(([value, text]) => element('option', { value }, text)),
+  )));
+  for (const button of document.querySelectorAll('[data-copy]')) {
+    button.addEventListener('click', async () => {
+      await copyText(tableText(content.tables[Number(select.value)], button.dataset.copy));
+      byId('copied').textContent = `Copied as ${button.textContent}.`;
+    });
+  }
   const show = () => showTable(
     content.tables[Number(select.value)], document.querySelector('#scroll table'), byId('definition'), byId('note'),
   );
-  select.addEventListener('change', show);
+  select.addEventListener('change', () => {
+    byId('copied').textContent = '';
+    show();
+  });
   if (content.tables.length) show();
   byId('numbers').hidden = !content.tables.length;
 }
@@ -303,7 +334,11 @@ async function start() {
   }
   listen();
   options(byId('scene'), scenes.map((name) => [name, name]), scenes[0]);
-  await chooseScene(scenes[0]);
+  const asked = readAddress(location.hash, content.scenes);
+  if (asked) [state.methods, state.colour] = [asked.methods, asked.colour];
+  await chooseScene(asked ? asked.scene : scenes[0], asked ? asked.frame : -1);
+  state.opened = true; // the address is that of a choice, not of what a page opens with
+  if (!asked && !matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
 }
 
 start().catch(complain);

@@ -20,7 +20,7 @@ from reports.page.page_data import methods_of, plots_of, sentences_of, tables_of
 from reports.page.roll_out_choice import BUDGET, RULE
 
 HERE = Path(__file__).parent
-SCRIPTS = ("data", "draw", "view", "plots", "tables", "page")  # in this order: each uses those before
+SCRIPTS = ("data", "draw", "view", "plots", "tables", "share", "page")  # in this order
 MOST_LINES = 60  # on cells that did not run; tables/unfinished.csv has all
 
 

@@ -36,6 +36,9 @@
 
   async function act() {
     await until(() => panes().length && byId('clock').textContent && distinct() > 8);
+    found.opens = [byId('play').getAttribute('aria-label'), byId('colour').value, location.hash];
+    await key(' ');
+    await set('time', '2', 'input');
     found.panes = panes();
     found.shades = distinct();
     found.first = frame();
@@ -75,13 +78,25 @@
     await set('colour', 'curvature');
     found.scale = byId('scale-title').textContent;
     const heads = [...document.querySelectorAll('#scroll thead button')];
-    const last = heads.length - 1;
+    const last = heads.findIndex((head) => head.textContent.startsWith('Frame'));
     heads[last].click();
     found.up = [document.querySelectorAll('#scroll th')[last].getAttribute('aria-sort'), column(last)];
     heads[last].click();
     found.down = [document.querySelectorAll('#scroll th')[last].getAttribute('aria-sort'), column(last)];
     heads[last].focus();
     found.definition = byId('definition').textContent;
+    found.copied = {};
+    let kind = '';
+    Object.defineProperty(navigator, 'clipboard', { value: { writeText: async (text) => { found.copied[kind] = text; } } });
+    for (const button of document.querySelectorAll('[data-copy]')) {
+      kind = button.dataset.copy;
+      button.click();
+      await wait(50);
+    }
+    HTMLAnchorElement.prototype.click = function saved() { found.picture = [this.download, this.href.slice(0, 22), this.href.length > 3000]; };
+    byId('picture').click();
+    found.groups = [...byId('table').querySelectorAll('optgroup')].map((group) => group.label);
+    found.address = decodeURIComponent(location.hash);
     await set('scene', byId('scene').options[byId('scene').options.length - 1].value);
     found.scene = byId('scene').value;
     await until(() => panes().length === 4 && document.querySelectorAll('#curves path[stroke]').length === 4);

@@ -333,7 +333,7 @@ def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(t
     assert run.page_path.read_bytes() == first
 
 
-def in_browser(path: Path, script: str, folder: Path) -> dict:
+def in_browser(path: Path, script: str, folder: Path, address: str = "") -> dict:
     """Open the page from disk in a headless browser and return the result of the script."""
     page = path.read_text(encoding="utf-8")
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
@@ -345,7 +345,7 @@ def in_browser(path: Path, script: str, folder: Path) -> dict:
         "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
         "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",
         "--disable-sync", f"--user-data-dir={folder / 'profile'}", "--virtual-time-budget=400000",
-        "--window-size=1400,1000", "--dump-dom", copy.as_uri(),
+        "--window-size=1400,1000", "--dump-dom", copy.as_uri() + address,
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=170)
     (text,) = re.findall(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
@@ -359,6 +359,7 @@ def in_browser(path: Path, script: str, folder: Path) -> dict:
 def test_a_person_can_use_it(folder, tmp_path):
     found = in_browser(folder.page_path, ACTIONS.read_text(encoding="utf-8"), tmp_path)
     assert found["wrong"] == [] and not found["hacked"]
+    assert found["opens"] == ["Pause", "distance", ""]
     assert found["panes"] == ["Simulation", "Skinning alone", "SNUG", "PBNS"]
     assert found["shades"] > 8
     assert (found["first"], found["right"], found["home"]) == (2, 3, 0)
@@ -372,7 +373,42 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert found["unjudged"] == ["step not judged"] * 4 and found["judged"] == [""] * 4
     directions, columns = zip(found["up"], found["down"])
     assert directions == ("ascending", "descending")
-    numbers = [[float(text) for text in column] for column in columns]
+    numbers = [[float(text.strip("×#")) for text in column] for column in columns]
     assert numbers[0] == numbers[1][::-1] == sorted(numbers[0]) and len(set(numbers[0])) == len(METHODS)
     assert found["definition"] == "Frame: definition of cost/frame."
+    lines = {kind: text.split("\n") for kind, text in found["copied"].items()}
+    count = len(METHODS) + 1
+    assert lines["csv"][0].startswith("Method,Relative excess [%],") and len(lines["csv"]) == count
+    assert lines["markdown"][1].startswith("| --- | --- |") and len(lines["markdown"]) == count + 1
+    assert lines["latex"][0] == "\\begin{tabular}{lrrrr}" and len(lines["latex"]) == count + 5
+    assert lines["latex"][2].startswith("Method & Relative excess [\\%] & ")
+    assert found["picture"] == ["tshirt-walk@clip-4.png", "data:image/png;base64,", True]
+    assert found["groups"] == ["Means", "Each scene or motion"]
+    assert (
+        found["address"].startswith(f"#scene={CLIPS[0]}&methods=simulation,")
+        and "colour=curvature" in found["address"]
+    )
     assert found["scene"] == WHOLE and len(found["panesThere"]) == 4 and found["curves"] == 4
+
+
+OPENED = """addEventListener('DOMContentLoaded', () => setTimeout(() => {
+  const text = (id) => document.getElementById(id).value;
+  const chosen = [...document.querySelectorAll('#methods input:checked')].map((box) => box.value);
+  const note = Object.assign(document.createElement('pre'), { id: 'found' });
+  const playing = document.getElementById('play').getAttribute('aria-label') === 'Pause';
+  const [scene, frame, colour] = ['scene', 'time', 'colour'].map(text);
+  note.textContent = JSON.stringify({ scene, chosen, frame, colour, playing });
+  document.body.append(note);
+}, 3000));"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not (shutil.which("chromium") or shutil.which("chromium-browser")), reason="no chromium on this machine"
+)
+def test_an_address_opens_what_it_names(folder, tmp_path):
+    address = f"#scene={WHOLE}&methods=snug,moon,pbns&colour=area&frame=3"
+    found = in_browser(folder.page_path, OPENED, tmp_path, address)
+    assert found == {
+        "scene": WHOLE, "chosen": ["snug", "pbns"], "frame": "3", "colour": "area", "playing": False,
+    }  # fmt: skip
