@@ -27,6 +27,7 @@ from reports.text.claim_rows import (
     rows_of_earlier_runs,
 )
 from reports.text.rooms import room_rows
+from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.motion.composition import clip_rows, distance_rows
 
@@ -68,20 +69,9 @@ def published_part(words: str) -> str:
     if kind == "counts":
         return claim_counts(_claims(*folders))
     if kind == "runs":
-        return markdown_table([ORIGIN, *(line for folder in folders for line in _origins(folder))])
+        rows = [(folder, part) for folder in folders for part in origins(RunFolder(folder).read_config())]
+        return markdown_table([ORIGIN, *((folder.name, *part[:3], f"`{part[-1]}`") for folder, part in rows)])
     raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
-
-
-def _origins(folder: Path) -> list[tuple[str, ...]]:
-    """Return name, day, commit, processor and command of a run, of each part of a merged one."""
-    config = RunFolder(folder).read_config()
-    return [
-        (
-            folder.name, str(part.get("finished", ""))[:10], part["commit"], part["hardware"]["processor"],
-            f"`{part['command']}`",
-        )
-        for part in config.get("merged", [config])
-    ]  # fmt: skip
 
 
 @cache

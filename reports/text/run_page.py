@@ -55,16 +55,21 @@ def run_page(folder: Path, link: str) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
+def origins(config: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Return day, commit, processor, cores and command of a run, of each part of a merged one."""
+    return [
+        (
+            str(part.get("finished", ""))[:10], part["commit"], part["hardware"]["processor"],
+            str(part["hardware"]["cores"]), part["command"],
+        )
+        for part in config.get("merged", [config])
+    ]  # fmt: skip
+
+
 def _origin(config: dict[str, Any]) -> str:
-    """Return day, commit, processor and command of a run, of each part of a merged one."""
-    parts = config.get("merged", [config])
-    rows: list[tuple[str, ...]] = [ORIGIN]
-    for part in parts:
-        hardware = part["hardware"]
-        day = str(part.get("finished", ""))[:10]
-        rows.append((day, part["commit"], hardware["processor"], str(hardware["cores"])))
-    commands = "\n".join(part["command"] for part in parts)
-    return f"{markdown_table(rows)}\n\n```\n{commands}\n```"
+    parts = origins(config)
+    commands = "\n".join(command for *_, command in parts)
+    return f"{markdown_table([ORIGIN, *(row for *row, _ in parts)])}\n\n```\n{commands}\n```"
 
 
 def _files(folder: Path, link: str) -> str:

@@ -23,6 +23,7 @@ from reports.figures import FIGURES
 from reports.figures.figure import Picture
 from reports.pictures import PICTURES
 from reports.run.finished_run import make_run
+from reports.statistics import paper_claims
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.statistics.outcomes import map_points
@@ -291,6 +292,15 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     assert "PBNS has 15 %. Which of SNUG and PBNS has less is inconclusive. These" in near(rows)
     # A member of the reference's ensemble is no rival, however near it is.
     assert near(rows + on_two_scenes("simulation-perturbed-1e-4", 0.5, 7.0)) == near(rows)
+
+
+def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
+    rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
+    assert "What does not hold" not in dict(headline(run_of(rows))).get("How certain", "")
+    monkeypatch.setattr(paper_claims, "verdict", lambda claim, far, p: paper_claims.FAILS)
+    said = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
+    assert "Of the paper's 1 primary claim 1 does not hold. What does not hold: Figure 7: close to" in said
+    assert said.endswith("(relative excess: SNUG ≤ Simulation).")
 
 
 def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
