@@ -58,10 +58,11 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     unseen = "" if set(worn["scene"]) <= set(run.trained_on) else "unseen "
     count = len(excess.by_motion)
     beside = published_beside(run, first)
+    motions = f"{count} {unseen}motion{'' if count == 1 else 's'}{_independent(excess)}"
     sentences = [
-        f"On {count} {unseen}motion{'' if count == 1 else 's'} {run.label(first)} has a relative excess "
-        f"energy of {_share(excess)}{f', {beside}' if beside else ''}, where the reference simulation has "
-        "0 % and skinning alone 100 %",
+        f"On {motions} {run.label(first)} has a "
+        f"relative excess energy of {_share(excess)}{f', {beside}' if beside else ''}, where the reference "
+        "simulation has 0 % and skinning alone 100 %",
         _against_reference(excess),
         *(f"{run.label(name)} has {_share(known[name])}" for name in others),
         *(_less_of(run, worn, first, name) for name in others[:1]),
@@ -85,6 +86,12 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
             above = "" if gap is None else f", with an energy gap of {number(gap)} J"
             parts.append(f"{run.label(method)} lies {number(distance)} mm from the reference{above}")
     return f"{'; '.join(parts)}." if parts else ""
+
+
+def _independent(excess: Excess) -> str:
+    """Return ", 11 of them independent," where some motions are segments of one recording."""
+    count = excess.effect.motions
+    return f", {count} of them independent," if count < len(excess.by_motion) else ""
 
 
 def _joined(sentences: Sequence[str]) -> str:
@@ -166,8 +173,11 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
     own = number(compared.other.value)
     training = value_of(run.garment_rows, network, "cost/train")
+    whole = " end to end" if compared.metric.name == "cost/whole" else ""
+    where = f" in {len(scenes)} scene{'' if len(scenes) == 1 else 's'}" if scenes else ""
     return _joined([
-        f"{run.label(network)} takes {own} ms a frame on one core, the simulation {times} times as long",
+        f"{run.label(network)} takes {own} ms a frame{whole} on one core{where}, the simulation {times} "
+        "times as long",
         f"its training took {duration(training)}" if training else "",
         *(_rivals(run, run.cells("speed", "garments"), scenes) if scenes else ()),
     ])  # fmt: skip
@@ -180,7 +190,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
-            f"{number(apart[1], 2)} 1/m in mean curvature, so differences below these rank no methods"
+            f"{number(apart[1], 2)} 1/m in mean curvature: smaller errors are as small as a right answer's"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:

@@ -8,7 +8,8 @@ a range.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -55,13 +56,13 @@ class Effect:
     """Difference of two methods on a scale, with the uncertainty that motions, seeds and the reference leave.
 
     Attributes:
-        value: the first less the second on the scale, mean over motions and seeds.
+        value: the first less the second on the scale, mean over recordings and seeds.
         scale: RATIO, EXCESS or DIFFERENCE.
         second: mean of the second on the scale.
         error: standard error of the value; None where nothing was repeated, and of costs.
         freedom: degrees of freedom of Student's t.
         covers: the resampled factors: "motions and seeds", "motions", "seeds" or nothing; RANGE of costs.
-        motions: how many scenes both methods have.
+        motions: how many independent motions both methods have: segments of one recording are one.
         limits: of costs, the least and the greatest of what was measured, on the scale.
         uncertainty: standard deviation of the value over the reference's ensemble; 0 where no member changes
             it, or none ran.
@@ -157,6 +158,8 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         scale: RATIO where both are positive, else DIFFERENCE, unless it is given.
         unit: see Effect; the larger mean where none is given.
 
+    Segments of one recording are one motion, the mean of its segments on the scale: they are alike, and
+    intervals over segments would cover too little.
     Positive numbers are compared by their logarithms, cell by cell: a violent motion has more of every energy
     with every method, and what came out a million times as large with one seed is told apart all the same.
 
@@ -171,7 +174,7 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
     number and was not repeated; so with seeds.
     """
     scale = scale or (RATIO if _positive(one) and _positive(other) else DIFFERENCE)
-    first, second = (np.asarray(on_scale(_grid(mean), scale)) for mean in (one, other))
+    first, second = (_grid(mean, scale) for mean in (one, other))
     grids = _drawn_alike(one, other, first, second)
     repeated = {
         "motions": any((grid != grid[:1]).any() for grid in grids),
@@ -243,20 +246,38 @@ def _slope(mean: Mean, scale: str) -> float:
 
 def _moved_by(mean: Mean, name: str, scale: str) -> float:
     """Return by how much a member of the ensemble changes the mean on the scale."""
-    changes = []
+    changes: dict[tuple[str, int], float] = {}
     for cell, value in mean.cells.items():
         moved = value + mean.moved.get(cell, {}).get(name, 0.0)
         if scale == RATIO and moved <= 0.0:  # no logarithm: to first order
-            changes.append(moved / value - 1.0)
+            changes[cell] = moved / value - 1.0
         else:
-            changes.append(float(on_scale(moved, scale)) - float(on_scale(value, scale)))
-    return float(np.mean(changes))
+            changes[cell] = float(on_scale(moved, scale)) - float(on_scale(value, scale))
+    return float(np.mean(list(_by_recording(changes).values())))
 
 
-def _grid(mean: Mean) -> np.ndarray:
-    """Return (M,S): value of each motion with each seed, both in order."""
-    scenes, seeds = (sorted(set(names)) for names in zip(*mean.cells))
-    return np.array([[mean.cells[scene, seed] for seed in seeds] for scene in scenes])
+def recording_of(scene: str) -> str:
+    """Return the name of a scene, for a segment of a recording that of the whole: without its letter.
+
+    >>> recording_of("tshirt/01_01_a@clip"), recording_of("tshirt/06_15"), recording_of("tshirt/kick")
+    ('tshirt/01_01@clip', 'tshirt/06_15', 'tshirt/kick')
+    """
+    return re.sub(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)", r"\1", scene)
+
+
+def _by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:
+    """Return (recording, seed) -> mean over the segments of the recording."""
+    values: dict[tuple[str, int], list[float]] = {}
+    for (scene, seed), value in cells.items():
+        values.setdefault((recording_of(scene), seed), []).append(value)
+    return {cell: float(np.mean(of_cell)) for cell, of_cell in values.items()}
+
+
+def _grid(mean: Mean, scale: str) -> np.ndarray:
+    """Return (M,S): value of each recording with each seed on the scale, both in order."""
+    cells = _by_recording({cell: float(on_scale(value, scale)) for cell, value in mean.cells.items()})
+    recordings, seeds = (sorted(set(names)) for names in zip(*cells))
+    return np.array([[cells[recording, seed] for seed in seeds] for recording in recordings])
 
 
 def _drawn_alike(one: Mean, other: Mean, first: np.ndarray, second: np.ndarray) -> list[np.ndarray]:

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from reports.run.finished_run import Metric, Run
-from reports.statistics.effects import EXCESS, SOFTENING, Effect, effect, off_scale, on_scale
+from reports.statistics.effects import EXCESS, SOFTENING, Effect, effect, off_scale, on_scale, recording_of
 from reports.statistics.means_and_spreads import Mean, pair
 
 TOTAL = "energy/total"
@@ -126,8 +126,16 @@ class Excess:
 
     @property
     def mean(self) -> float:
-        """Arithmetic mean over motions."""
-        return float(np.mean(list(self.by_motion.values())))
+        """Arithmetic mean over recordings, of a recording over its segments."""
+        return float(np.mean([np.mean(values) for values in self.by_recording]))
+
+    @property
+    def by_recording(self) -> list[list[float]]:
+        """Values of the segments of each recording; of a motion that is no segment, its own."""
+        values: dict[str, list[float]] = {}
+        for scene, value in self.by_motion.items():
+            values.setdefault(recording_of(scene), []).append(value)
+        return list(values.values())
 
     @property
     def worst(self) -> tuple[str, float]:
@@ -136,9 +144,9 @@ class Excess:
         return scene, self.by_motion[scene]
 
     @property
-    def without_each_motion(self) -> tuple[float, float]:
-        """Smallest and largest typical value when one motion is left out."""
-        cells = np.asarray(on_scale(np.array(list(self.by_motion.values())), EXCESS))
+    def without_each_recording(self) -> tuple[float, float]:
+        """Smallest and largest typical value when one recording is left out."""
+        cells = np.array([np.mean(on_scale(np.array(values), EXCESS)) for values in self.by_recording])
         if len(cells) < 2:
             return self.typical, self.typical
         left = (cells.sum() - cells) / (len(cells) - 1)

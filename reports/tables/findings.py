@@ -50,9 +50,10 @@ def findings(run: Run) -> list[Table]:
 
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
-    "arithmetic well below; under it the 95 % interval. Mean, worst: over motions. Left out: smallest and "
-    "largest typical value without any one motion. Uncertain by: the spread over the reference's ensemble. "
-    "Energy against the reference: more or less where p < 0.05 and the difference exceeds that spread."
+    "arithmetic well below; under it the 95 % interval. Segments of a recording count as one motion. Mean: "
+    "arithmetic. Left out: smallest and largest typical value without any one motion. Uncertain by: the "
+    "spread over the reference's ensemble. Energy against the reference: more or less where p < 0.05 and the "
+    "difference exceeds that spread."
 )
 ONE_SEED = "not tested: one seed"
 
@@ -61,7 +62,7 @@ def relative_excess(run: Run) -> list[Table]:
     """Tabulate the relative excess of each method over the motions of a garment."""
     lines: list[tuple[Cell, ...]] = []
     for garment, method, excess in _measured(run):
-        low, high = excess.without_each_motion
+        low, high = excess.without_each_recording
         worst, most = excess.worst
         stands = standing(excess.effect, excess.effect.p_value())
         if excess.effect.one_seed:

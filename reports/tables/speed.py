@@ -125,6 +125,6 @@ def reference_uncertainty(run: Run) -> list[Table]:
     columns = (Column("of", "Simulation or network", text=True), *map(metric_column, metrics))
     caption = (
         f"Reference, simulations with smaller time steps, and SNUG in {', '.join(scenes)}. Errors below the "
-        "root mean square of the reference ensemble rank no methods."
+        "ensemble's are as small as those of another valid simulation."
     )
     return table("reference_uncertainty", columns, lines, caption)

@@ -69,8 +69,9 @@ def published_part(words: str) -> str:
     if kind == "counts":
         return claim_counts(_claims(*folders))
     if kind == "runs":
-        rows = [(folder, part) for folder in folders for part in origins(RunFolder(folder).read_config())]
-        return markdown_table([ORIGIN, *((folder.name, *part[:3], f"`{part[-1]}`") for folder, part in rows)])
+        parts = [(folder, part) for folder in folders for part in origins(RunFolder(folder).read_config())]
+        lines = [(folder.name, *part[:3], f"`{part[-1]}`") for folder, part in parts]
+        return markdown_table([ORIGIN, *lines])
     raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
 
 

@@ -127,6 +127,35 @@ def test_of_four_motions_and_three_seeds_95_percent_of_the_intervals_hold_the_tr
     assert covered(paired, spread) < 0.9
 
 
+SEGMENTS = [f"tshirt/01_01_{letter}" for letter in "abcdefg"] + [
+    f"tshirt/02_07_{letter}" for letter in "abcdef"
+]
+MOTIONS = [*SEGMENTS, *(f"tshirt/{k:02d}_03" for k in range(3, 8)), "tshirt/kick", "tshirt/punch"]
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.5, 1.0])
+def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
+    recordings = [effects.recording_of(scene) for scene in MOTIONS]
+    _, place = np.unique(recordings, return_inverse=True)
+    assert place.max() == 8 and effects.recording_of("tshirt/01_01_a@clip") == "tshirt/01_01@clip"
+    random = np.random.default_rng(5)
+
+    def interval():
+        values = alike**0.5 * random.normal(size=9)[place] + (1 - alike) ** 0.5 * random.normal(size=20)
+        cells = {(scene, 0): float(value) for scene, value in zip(MOTIONS, values)}
+        one = Mean(float(values.mean()), None, 20, 1, 20, seeded=False, cells=cells)
+        far = effect(one, replace(one, value=0.0, cells=dict.fromkeys(cells, 0.0)), DIFFERENCE)
+        return far.interval
+
+    def held():
+        return np.mean([low <= 0.0 <= high for low, high in (interval() for _ in range(400))])
+
+    assert 0.93 <= held() <= 0.98
+    if alike:
+        monkeypatch.setattr(effects, "recording_of", lambda scene: scene)
+        assert held() < 0.85
+
+
 def test_the_same_numbers_give_the_same_interval_and_the_interval_agrees_with_the_p_value():
     random = np.random.default_rng(5)
     spread = {"motions": 1.0, "seeds": 1.0, "rest": 0.2}
