@@ -61,8 +61,11 @@ def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:
         **fields,
     )
     plan = make_plan(request)
-    cells = tuple(_solved_again(_reference(cell, options)) for cell in plan.cells)
-    return replace(plan, cells=cells, suites=tuple(dict.fromkeys((*plan.suites, SOLVED_AGAIN))))
+    cells = (_reference(cell, options) for cell in plan.cells)
+    if option.declared_ms is None:  # no time to compare others with
+        cells = (replace(cell, entry=replace(cell.entry, timed=False)) for cell in cells)
+    cells = (_solved_again(cell) if cell.method == name else cell for cell in cells)
+    return replace(plan, cells=tuple(cells), suites=tuple(dict.fromkeys((*plan.suites, SOLVED_AGAIN))))
 
 
 def _reference(cell: Cell, options: argparse.Namespace) -> Cell:
