@@ -1,5 +1,6 @@
-"""Kills inside trainings of benchmarks.run: python docs/notebook/killed_trainings.py KILLS [SEED INTERVAL STEPS].
+"""Kills inside trainings of benchmarks.run: python docs/notebook/killed_trainings.py KILLS [SEED [...]].
 
+Further arguments are INTERVAL and STEPS.
 SNUG is trained at preset smoke, with STEPS steps and a checkpoint every INTERVAL seconds. At a random time
 after the training began SIGKILL ends the command alone, whose workers have to end by themselves, or all of
 its processes at once; then the same command is begun again, until the model is there. Its weights are
@@ -26,7 +27,7 @@ from snug.networks.tensor_file import read_tensors
 
 LIFE = 10.0  # checkpoint intervals that a training lives at most
 PATIENCE = 20.0  # [s] for workers to end after their command
-METHOD = '''"""SNUG with a number of steps and an interval of checkpoints of its own; says when a worker loads it."""
+METHOD = '''"""SNUG with a number of steps and an interval of checkpoints of its own."""
 
 from dataclasses import replace
 from multiprocessing import parent_process
@@ -114,7 +115,9 @@ def main(kills: int, seed: int = 0, interval: float = 3.0, steps: int = 1500) ->
         method = Path(name, "killed.py")
         method.write_text(METHOD.format(steps=steps, interval=interval))
         for number in range(kills):
-            whole, broken = (Training(method, Path(name, f"{n}-{number}"), number) for n in ("whole", "killed"))
+            whole, broken = (
+                Training(method, Path(name, f"{n}-{number}"), number) for n in ("whole", "killed")
+            )
             while True:
                 life = LIFE * interval * random.random() if len(done) < kills else float("inf")
                 if (kill := broken.live(life, of_all=bool(random.integers(2)))) is None:
@@ -125,12 +128,14 @@ def main(kills: int, seed: int = 0, interval: float = 3.0, steps: int = 1500) ->
             models = [read_tensors(training.model)[0] for training in (whole, broken)]
             differ = [key for key, value in models[0].items() if not torch.equal(value, models[1][key])]
             same = not differ and models[0].keys() == models[1].keys()
-            print(f"training {number}: {len(models[0])} tensors, equal bit for bit: {same} {differ}", flush=True)
+            print(
+                f"training {number}: {len(models[0])} tensors, equal bit for bit: {same} {differ}", flush=True
+            )
             if len(done) == kills:
                 break
     lost = np.array([kill.lost for kill in done])
     print(
-        f"{kills} kills, {sum(kill.of_all for kill in done)} of all processes; a checkpoint every {interval} s; "
+        f"{kills} kills, {sum(kill.of_all for kill in done)} of all processes; checkpoints every {interval} s; "
         f"lost {np.median(lost):.1f} s (median), {lost.max():.1f} s (most)"
     )
 

@@ -2,8 +2,8 @@
 
 Small valid files are damaged at random: bits flipped, cut off, blocks doubled or gone, lengths and counts
 made huge, pieces of text exchanged. Each is read in a process of its own under a cap of memory, beyond what
-is loaded, and a limit of CPU time. A reader may return, or refuse with an error of this project in one line; all
-else is a finding, and its file is kept.
+is loaded, and a limit of CPU time. A reader may return, or refuse with an error of this project in one line;
+all else is a finding, and its file is kept.
 """
 
 from __future__ import annotations
@@ -252,7 +252,10 @@ def main(count: int, seed: int = 0) -> None:
             path.write_bytes(whole)
     for suffix, counts in sorted(kinds.items()):
         print(suffix, dict(counts))
-    print(f"longest {longest[0]:.1f} s of CPU time ({longest[1]}), largest peak {peak[0]:.0f} MB ({peak[1]}); {kept}")
+    print(
+        f"longest {longest[0]:.1f} s of CPU time ({longest[1]}), "
+        f"largest peak {peak[0]:.0f} MB ({peak[1]}); {kept}"
+    )
 
 
 if __name__ == "__main__":
