@@ -135,7 +135,7 @@ def main(kills: int, seed: int = 0, interval: float = 3.0, steps: int = 1500) ->
                 break
     lost = np.array([kill.lost for kill in done])
     print(
-        f"{kills} kills, {sum(kill.of_all for kill in done)} of all processes; checkpoints every {interval} s; "
+        f"{kills} kills, {sum(kill.of_all for kill in done)} of all; checkpoints every {interval} s: "
         f"lost {np.median(lost):.1f} s (median), {lost.max():.1f} s (most)"
     )
 
