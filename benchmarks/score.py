@@ -70,7 +70,12 @@ def make_parser() -> argparse.ArgumentParser:
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
     reference.add_argument("--no-reference", action="store_true", help="leave out what needs a reference")
-    add("--no-report", action="store_true", help="make no figures, page and PDF, which takes longest")
+    add(
+        "--no-report",
+        action="store_true",
+        help="numbers of the roll-out alone: no figures, page and PDF, and no times and "
+        "gaps of what it is compared with",
+    )
     add("--json", action="store_true", help="print all numbers as one JSON object in place of the line")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     return parser
@@ -113,7 +118,8 @@ def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
     >>> score("mine.npz", "--scene", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
     0.031
     """
-    plan = plan_roll_out(make_parser().parse_args([str(roll_out), *options]), "benchmarks.score.score")
+    bare = make_parser().parse_args([str(roll_out), *options, "--no-report"])
+    plan = plan_roll_out(bare, "benchmarks.score.score")
     message = io.StringIO()
     with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(message):
         status = carry_out(plan, program=PROGRAM, report=False)

@@ -98,6 +98,8 @@ def demand_writable(path: Path) -> None:
     """Raise ValueError for a name or an installation that cannot be written, before anything is read."""
     from importlib.util import find_spec
 
+    from reference_sim.files.atomic_files import demand_new, demand_writable_folder
+
     if path.suffix in ARCHIVES:
         _, package, extra = ARCHIVES[path.suffix]
         if find_spec(package) is None:
@@ -110,9 +112,8 @@ def demand_writable(path: Path) -> None:
     if path.suffix != "" and path.is_dir():
         raise ValueError(f"{path}: is a folder; name a file")
     if path.suffix == "":
-        from reference_sim.files.atomic_files import demand_new
-
         demand_new(path)
+    demand_writable_folder(path.parent)
 
 
 def write(path: Path, meshes: Meshes) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
-from reference_sim.files.atomic_files import replacing
+from reference_sim.files.atomic_files import demand_writable_folder, replacing
 from reports.pictures.render import camera_axes, vertex_normals
 
 if TYPE_CHECKING:
@@ -242,6 +242,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
         raise ValueError("--speed is 0.01 to 10, --width 64 to 2000")
     demand_possible(path)
+    demand_writable_folder(path.parent)
     from reports.run.selected_roll_outs import select_roll_outs
 
     selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)

@@ -30,6 +30,7 @@ ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order ma
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("reference_sim", "snug", "benchmarks")
 NO_DATA = (".py", ".pyi", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
+BLOCKS = ("body", "handlers", "cases", "orelse", "finalbody")  # of statements within a statement
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
@@ -137,7 +138,7 @@ def _source(path: str) -> _Source:
     """Return what counts of a file, whose syntax tree is read for it."""
     tree = _parse(path)
     top, package = place_of(path)
-    imports = [pair for node in _running(tree) for pair in _imported(node, package)]
+    imports = [pair for node in _statements(tree, running=True) for pair in _imported(node, package)]
     roots = {base.split(".")[0] for base, _ in imports}
     tops = {root: _top_of(root, top, package) for root in roots}
     files = dict.fromkeys(
@@ -146,7 +147,7 @@ def _source(path: str) -> _Source:
         if (where := tops[base.split(".")[0]]) is not None
         for file in _files_behind(base, name, path, where)
     )
-    for node in ast.walk(tree):
+    for node in (tree, *_statements(tree)):
         if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             docstring = node.body[0]
             assert isinstance(docstring, ast.Expr) and isinstance(docstring.value, ast.Constant)
@@ -164,12 +165,13 @@ def _parse(path: str) -> ast.Module:
         raise DeclarationError(f"{path}: cannot be read: {error}") from None
 
 
-def _running(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield all nodes but those for the type checker alone."""
-    for child in ast.iter_child_nodes(node):
-        if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
-            yield child
-            yield from _running(child)
+def _statements(node: ast.AST, *, running: bool = False) -> Iterator[ast.AST]:
+    """Yield all statements below a node, in order; running: but for those for the type checker alone."""
+    for block in BLOCKS:
+        for child in getattr(node, block, ()):
+            if not (running and isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
+                yield child
+                yield from _statements(child, running=running)
 
 
 def _imported(node: ast.AST, package: list[str]) -> list[tuple[str, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,6 +19,7 @@ from benchmarks.provenance import usable_cores
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
+from reference_sim.files.atomic_files import demand_writable_folder
 from snug.garments.options import GarmentFile
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
@@ -187,11 +187,10 @@ def choose_folder(folder: Path | None) -> Path:
         _check_run(folder)
     elif folder.is_dir() and any(folder.iterdir()):
         raise PlanError(f"--out {folder}: is not empty and holds no run; name a new folder")
-    parent = folder
-    while not parent.exists():
-        parent = parent.parent
-    if not (parent.is_dir() and os.access(parent, os.W_OK | os.X_OK)):
-        raise PlanError(f"--out {folder}: {parent} cannot be written to; name another folder")
+    try:
+        demand_writable_folder(folder)
+    except ValueError as error:
+        raise PlanError(f"--out {error}") from None
     return folder
 
 

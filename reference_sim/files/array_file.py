@@ -70,14 +70,18 @@ def read_arrays(
     """
     path, name = Path(path), ""
     arrays: dict[str, np.ndarray] = {}
+    members: set[str] = set()
     try:
         with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
             for info in archive.infolist():
                 name = info.filename.removesuffix(".npy")
-                if name == info.filename or (names is not None and name not in names):
+                if names is not None and name not in names:
                     continue
-                if name in arrays:
+                if name in members:
                     raise ValueError("is there twice")
+                members.add(name)
+                if name == info.filename:  # no array, though numpy calls it by the name of one
+                    continue
                 _check_member(info)
                 with archive.open(info) as member:
                     arrays[name] = _array(member, info.file_size, limit)

@@ -44,6 +44,13 @@ def demand_new(folder: Path) -> None:
         raise ValueError(f"{folder}: is there already; name a new folder")
 
 
+def demand_writable_folder(folder: Path) -> None:
+    """Raise ValueError where nothing can be written into a folder, or the folder cannot be made."""
+    place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not (place.is_dir() and os.access(place, os.W_OK | os.X_OK)):
+        raise ValueError(f"{place}: cannot be written to; name another folder")
+
+
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
     """Give a folder to fill: under its name once the block ends well, gone when it does not.

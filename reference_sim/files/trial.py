@@ -7,7 +7,9 @@ damaged, is first read where that harms nobody.
 
 from __future__ import annotations
 
+import math
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,9 +19,11 @@ from pathlib import Path
 
 MEMORY = 2 << 30  # [bytes] of the trial, and FILES times the file
 FILES = 20
-SECONDS = 20.0  # of the trial, and those of reading at SPEED
+SECONDS = 20.0  # of CPU time of the trial, and those of reading at SPEED
+PATIENCE = 6.0  # times as many by the clock: on a busy machine a file is as good as on an idle one
 SPEED = 5e6  # [bytes/s] of the file
 NO_TRIAL = (1, 2)  # exit statuses of Python where it finds no such module: nothing is known then
+ENDLESS = -getattr(signal, "SIGXCPU", 256)  # exit status where CPU time was at its end; none on Windows
 REFUSED = 3  # exit status of a trial that has said why
 
 
@@ -31,17 +35,21 @@ def try_out(read: Callable[[Path], object], *paths: Path) -> str:
         paths: files that exist.
     """
     size = sum(path.stat().st_size for path in paths)
-    memory, seconds = MEMORY + FILES * size, SECONDS + size / SPEED
+    memory, seconds = MEMORY + FILES * size, math.ceil(SECONDS + size / SPEED)
     # Each thread of a linear algebra library takes addresses for itself: on many cores more than the cap.
     alone = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
-    words = [read.__module__, read.__name__, str(memory), *(str(path.absolute()) for path in paths)]
+    caps, names = (str(memory), str(seconds)), (str(path.absolute()) for path in paths)
+    words = [read.__module__, read.__name__, *caps, *names]
     try:
         done = subprocess.run(
             [sys.executable, "-m", __name__, *words],
-            env=os.environ | alone, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds,
+            env=os.environ | alone, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE * seconds,
         )  # fmt: skip
+        endless = done.returncode == ENDLESS
     except subprocess.TimeoutExpired:
-        return f"reading it does not end within {seconds:.0f} s"
+        endless = True
+    if endless:
+        return f"reading it does not end within {seconds} s"
     if done.returncode == REFUSED:
         return " ".join(done.stdout.decode(errors="replace").split())[:300]
     if done.returncode in (0, *NO_TRIAL):
@@ -49,10 +57,10 @@ def try_out(read: Callable[[Path], object], *paths: Path) -> str:
     return f"reading it crashes the reader, or takes more than {memory / 1e9:.0f} GB"
 
 
-def main(module: str, name: str, memory: str, *paths: str) -> int:
-    """Read the files by that function under a cap of memory [bytes]; return the exit status."""
+def main(module: str, name: str, memory: str, seconds: str, *paths: str) -> int:
+    """Read the files by that function under caps of memory [bytes] and CPU time [s]; return a status."""
     read = getattr(import_module(module), name)
-    _cap(int(memory))
+    _cap(int(memory), int(seconds))
     try:
         for path in paths:
             read(Path(path))
@@ -62,13 +70,14 @@ def main(module: str, name: str, memory: str, *paths: str) -> int:
     return 0
 
 
-def _cap(memory: int) -> None:
-    with suppress(ImportError):  # on Windows, where time alone is capped
+def _cap(memory: int, seconds: int) -> None:
+    with suppress(ImportError):  # on Windows, where time by the clock alone is capped
         import resource
 
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        soft = memory if hard == resource.RLIM_INFINITY else min(memory, hard)
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+        for what, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, seconds)):
+            _, hard = resource.getrlimit(what)
+            soft = most if hard == resource.RLIM_INFINITY else min(most, hard)
+            resource.setrlimit(what, (soft, hard))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 import pandas as pd
 
@@ -16,6 +18,8 @@ from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.pareto import compared_cells
 from reports.tables.number_texts import number, with_spread
 
+Item = TypeVar("Item")
+MOST = 5  # pictures in a row
 BELOW = ("step/distance", "distance/rms")  # the number below a picture: the first that is known
 
 
@@ -33,14 +37,15 @@ class LeadRow(Figure[PageOne]):
         roll_outs, methods = data
         frame, _ = roll_outs.chosen_frame(methods, run.reference)
         name, scale = next(iter(scales(roll_outs, methods, frame, run.reference).items()), ("", None))
-        wide = (PAGE_WIDTH - BAR) / max(len(methods), 3)
-        tile = (wide, 1.55)
+        columns = len(in_rows(methods)[0])
+        tile = (wide := (PAGE_WIDTH - BAR) / max(columns, 3), 1.55 if columns == len(methods) else 1.2)
         cells, _ = compared_cells(run)
         rows = cells[cells["scene"] == roll_outs.scene]
-        figure = sheet(
-            [shots(roll_outs, methods, frame, FRONT, tile, scale)], tile, heads_of(run, methods, wide),
-            below=[[error_below(run, rows, method) for method in methods]], bar=scale,
-        )  # fmt: skip
+        heads, below = heads_of(run, methods, wide), [error_below(run, rows, method) for method in methods]
+        if columns < len(methods):  # heads stand over the first row alone
+            heads, below = [], ["\n".join(filter(None, texts)) for texts in zip(heads, below)]
+        pictures = shots(roll_outs, methods, frame, FRONT, tile, scale)
+        figure = sheet(in_rows(pictures), tile, heads, below=in_rows(below), bar=scale)
         colour = {
             "step": "distance from the minimum of the frame's own time step; below: mean over frames",
             "distance": "distance from the simulation's vertex; below: mean over frames",
@@ -48,6 +53,16 @@ class LeadRow(Figure[PageOne]):
         time = float(roll_outs.series[methods[0]].times[frame])
         caption = f"{roll_outs.scene} at {number(time)} s. Colour: {colour}."
         yield Drawing(figure, self.name, caption, vector=False)
+
+
+def in_rows(items: Sequence[Item]) -> list[Sequence[Item]]:
+    """Return the items in as few rows of at most MOST as there can be, about equally long.
+
+    >>> [len(row) for row in in_rows("abcdefg")]
+    [4, 3]
+    """
+    columns = math.ceil(len(items) / math.ceil(len(items) / MOST))
+    return [items[first : first + columns] for first in range(0, len(items), columns)]
 
 
 def error_below(run: Run, rows: pd.DataFrame, method: str) -> str:

@@ -103,6 +103,9 @@ def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, cap
     strain = numbers(made, "newton-1")["energy/strain"]
     assert said["metrics"]["energy/strain"] == {"value": strain, "unit": "J"}
     assert not (tmp_path / "out" / "report.pdf").exists() and (tmp_path / "out" / "results.csv").is_file()
+    assert said["metrics"]["gap/energy"]["value"] == numbers(made, "newton-1")["gap/energy"]
+    beside = numbers(RunFolder(tmp_path / "out"), "reference")
+    assert "energy/total" in beside and "cost/frame" not in beside
     returned = score.score(files[0], *words, "-o", str(tmp_path / "again"))
     assert returned["metrics"]["energy/strain"]["value"] == strain
     with pytest.raises(ValueError, match="no such file"):

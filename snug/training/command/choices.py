@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from reference_sim.files.atomic_files import demand_writable_folder
 from snug.body.parametric_body import Body
 from snug.garments.garment import Garment
 from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
@@ -51,11 +51,12 @@ def output_files(out: Path, templates: Sequence[GarmentTemplate]) -> list[Path]:
     if duplicate := next((path for path in files if files.count(path) > 1), None):
         raise ValueError(f"--garment: two of them would be {duplicate}: rename a file")
     for path in files:
-        folder = next(folder for folder in path.absolute().parents if folder.exists())
         if path.is_dir():
             raise ValueError(f"--out {path}: is a folder; name a file")
-        if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
-            raise ValueError(f"--out {path}: {folder} cannot be written to; name another folder")
+        try:
+            demand_writable_folder(path.parent)
+        except ValueError as error:
+            raise ValueError(f"--out {path}: {error}") from None
     return files
 
 

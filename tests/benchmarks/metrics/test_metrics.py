@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from benchmarks.meshes import cylinder_patch, icosphere, right_grid, torus
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
@@ -47,6 +48,22 @@ def test_curvature_of_a_sphere_holds_at_its_five_valent_vertices_too():
     curvature, area = mean_curvature(x, faces)
     assert area.sum() == pytest.approx(4 * np.pi * 0.25**2, rel=0.02)
     assert np.abs(curvature * 0.25 - 1.0).max() < 1e-4
+
+
+def test_curvature_of_random_points_on_a_sphere_is_right_and_of_irregular_slivers_too_large():
+    """As the documents say of meshes that look so."""
+    random = np.random.default_rng(0)
+    x = random.normal(size=(500, 3))
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    curvature, areas = mean_curvature(x, ConvexHull(x).simplices.astype(np.int64))
+    assert np.average(curvature, weights=areas) == pytest.approx(1.002, abs=5e-4)
+    _, faces = right_grid(20, 20, 1.0, 1.0)
+    place = np.stack(np.unravel_index(np.arange(21 * 21), (21, 21)), axis=1)
+    across, along = ((place + random.uniform(-0.3, 0.3, place.shape)) * (0.03, 0.003)).T
+    x = np.stack([np.cos(along) * np.cos(across), np.cos(along) * np.sin(across), np.sin(along)], axis=1)
+    inside = ((place > 0) & (place < 20)).all(axis=1)
+    curvature, areas = mean_curvature(x, faces)
+    assert 2.5 < np.average(curvature[inside], weights=areas[inside]) < 3.5
 
 
 def test_curvature_of_a_torus_converges_at_second_order():

@@ -87,11 +87,12 @@ def test_a_declaration_that_the_file_does_not_bear_out_is_refused(tmp_path, shap
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_two_arrays_of_one_name_are_refused(tmp_path):
+@pytest.mark.parametrize("second", ["poses.npy", "poses"])
+def test_two_arrays_of_one_name_are_refused(tmp_path, second):
     """Readers differ in which of the two they take."""
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
-        for value in (b"1", b"2"):
-            archive.writestr("poses.npy", npy("(2,)", data=8 * value + bytes(8)))
+        for name, value in (("poses.npy", b"1"), (second, b"2")):
+            archive.writestr(name, npy("(2,)", data=8 * value + bytes(8)))
     with pytest.raises(ArrayFileError, match="array 'poses': is there twice"):
         read_arrays(tmp_path / "a.npz")
 
