@@ -35,6 +35,34 @@ def vertex_normals(positions, faces):
     return normals
 
 
+def faces_around(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the faces of (F, 3) around each of `count` vertices: around[starts[v] : starts[v + 1]]."""
+    order = np.argsort(faces, axis=None, kind="stable")
+    return np.searchsorted(faces.ravel()[order], np.arange(count + 1)), order // 3
+
+
+@njit(cache=True, error_model="numpy")
+def normals_of_corners(some, positions, faces, starts, around):
+    """Return the `vertex_normals` (B, 3) of the corners of some faces (n,); all others stay unset.
+
+    starts, around: see `faces_around`. Cloth meets a part of a body; to sum up all of it would take longer.
+    """
+    normals, known = np.empty_like(positions), np.zeros(len(positions), np.bool_)
+    for s in some:
+        for a in range(3):
+            v = faces[s, a]
+            if known[v]:
+                continue
+            known[v] = True
+            normals[v] = 0.0
+            for f in around[starts[v] : starts[v + 1]]:
+                n = cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
+                for c in range(3):
+                    normals[v, c] += n[c]
+            _normalise(normals[v])
+    return normals
+
+
 @njit(cache=True, error_model="numpy")
 def _normalise(v):
     length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 1e-30
