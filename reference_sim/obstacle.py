@@ -16,7 +16,7 @@ from reference_sim.cloth import MeshError
 from reference_sim.contact.closest_point import Closest, FaceSearch, Listed
 from reference_sim.fingerprint import fingerprint
 from reference_sim.geometry.closed_mesh import check_closed
-from reference_sim.geometry.surface import carry, faces_around, normals_of_corners, plane_normals
+from reference_sim.geometry.surface import carry, faces_around, plane_normals
 
 DEFAULT_REGION = 0.20  # [m]
 
@@ -187,7 +187,7 @@ class Obstacle:
         normals = np.empty_like(closest.points)
         plane_normals(
             points, closest.points, closest.faces, closest.barycentric, vertices, self.faces,
-            normals_of_corners(closest.faces, vertices, self.faces, *self._around), normals,
+            *self._around, normals,
         )  # fmt: skip
         return Planes(closest.points, normals, closest.faces, closest.barycentric)
 
