@@ -16,7 +16,7 @@ from reference_sim.cloth import MeshError
 from reference_sim.contact.closest_point import Closest, FaceSearch, Listed
 from reference_sim.fingerprint import fingerprint
 from reference_sim.geometry.closed_mesh import check_closed
-from reference_sim.geometry.surface import carry, plane_normals, vertex_normals
+from reference_sim.geometry.surface import carry, faces_around, plane_normals
 
 DEFAULT_REGION = 0.20  # [m]
 
@@ -140,6 +140,10 @@ class Obstacle:
         """Hash of everything that decides how it touches."""
         return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
+    @cached_property
+    def _around(self) -> tuple[np.ndarray, np.ndarray]:
+        return faces_around(self.faces, self.positions.shape[1])
+
     def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
         """Find closest points under the rule of regions.
 
@@ -183,7 +187,7 @@ class Obstacle:
         normals = np.empty_like(closest.points)
         plane_normals(
             points, closest.points, closest.faces, closest.barycentric, vertices, self.faces,
-            vertex_normals(vertices, self.faces), normals,
+            *self._around, normals,
         )  # fmt: skip
         return Planes(closest.points, normals, closest.faces, closest.barycentric)
 

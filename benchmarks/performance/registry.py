@@ -28,6 +28,16 @@ SIMULATOR = (
     ),
     *(
         Microbenchmark(
+            name=f"search/{motion}-{vertices}",
+            description=f"closest faces of contact samples, T-shirt of about {vertices} vertices: {motion}",
+            module=f"{_HERE}.search",
+            options={"motion": motion, "vertices": vertices, "frames": 40},
+        )
+        for motion in ("walk", "jump")
+        for vertices in (1000, 4400)
+    ),
+    *(
+        Microbenchmark(
             name=f"scaling/{side}x{side}",
             description=f"an iteration of L-BFGS and of Newton's method, memory: {side * side} vertices",
             module=f"{_HERE}.sheet",

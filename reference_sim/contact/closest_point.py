@@ -17,15 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference_sim.contact.closest_point_lanes import (
-    LANES,
-    QUANTITIES,
-    Listed,
-    Mesh,
-    Pose,
-    list_leaves,
-    search,
-)
+from reference_sim.contact.closest_point_lanes import Listed, list_leaves, search
+from reference_sim.contact.leaf_bounds import LANES, QUANTITIES, Mesh, Pose
 
 
 @dataclass(frozen=True)
@@ -60,13 +53,14 @@ class FaceSearch:
         order = np.append(order, np.repeat(order[-1], LANES * leaves - len(order)))
         # Corners by ascending vertex: faces then agree to the bit about a side or a corner that they share.
         ascending = np.argsort(self.faces[order], axis=1, kind="stable")
+        vertices = np.take_along_axis(self.faces[order], ascending, axis=1)
         kind, blocks = centroids.dtype, -(-leaves // LANES)
         self._mesh = Mesh(
-            order, np.take_along_axis(self.faces[order], ascending, axis=1), ascending, place,
+            order, vertices, _each_once(vertices.reshape(leaves, -1)), ascending, place,
             np.ascontiguousarray(centroids[order]), np.zeros((blocks, 6, LANES), np.float32),
             np.zeros(leaves, np.int64), np.zeros(leaves, np.int64), np.zeros((len(order), 3, 3), kind),
-            np.zeros((leaves, 5), np.float32), np.zeros((leaves, QUANTITIES * LANES), np.float32),
-            np.zeros(1),
+            np.zeros((9, LANES)), np.zeros((leaves, 5), np.float32),
+            np.zeros((leaves, QUANTITIES * LANES), np.float32), np.zeros(1),
         )  # fmt: skip
         self._pose = Pose(0, np.empty((0, 3), kind), np.zeros(3))
         everywhere, none, masks = np.arange(leaves), np.zeros((1, 3), kind), np.full(blocks, 2**LANES - 1)
@@ -132,6 +126,14 @@ class FaceSearch:
             closest,
         )  # fmt: skip
         return Closest(faces, barycentric, closest)
+
+
+def _each_once(vertices: np.ndarray) -> np.ndarray:
+    """Return the different numbers of each row (L, n), filled up with the least to the longest of them."""
+    rows = np.sort(vertices, axis=1)
+    again = rows[:, 1:] == rows[:, :-1]
+    rows[:, 1:][again] = np.broadcast_to(rows[:, :1], again.shape)[again]
+    return np.ascontiguousarray(np.sort(rows, axis=1)[:, again.sum(axis=1).min() :])
 
 
 def _boxes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

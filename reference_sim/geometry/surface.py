@@ -35,6 +35,34 @@ def vertex_normals(positions, faces):
     return normals
 
 
+def faces_around(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the faces of (F, 3) around each of `count` vertices: around[starts[v] : starts[v + 1]]."""
+    order = np.argsort(faces, axis=None, kind="stable")
+    return np.searchsorted(faces.ravel()[order], np.arange(count + 1)), order // 3
+
+
+@njit(cache=True, error_model="numpy")
+def normals_of_corners(some, positions, faces, starts, around):
+    """Return the `vertex_normals` (B, 3) of the corners of some faces (n,); all others stay unset.
+
+    starts, around: see `faces_around`. Cloth meets a part of a body; to sum up all of it would take longer.
+    """
+    normals, known = np.empty_like(positions), np.zeros(len(positions), np.bool_)
+    for s in some:
+        for a in range(3):
+            v = faces[s, a]
+            if known[v]:
+                continue
+            known[v] = True
+            normals[v] = 0.0
+            for f in around[starts[v] : starts[v + 1]]:
+                n = cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
+                for c in range(3):
+                    normals[v, c] += n[c]
+            _normalise(normals[v])
+    return normals
+
+
 @njit(cache=True, error_model="numpy")
 def _normalise(v):
     length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 1e-30
@@ -43,20 +71,17 @@ def _normalise(v):
 
 
 @njit(cache=True, error_model="numpy")
-def _beyond(offset, c, face, weights, vertices, faces):
-    """Return whether some face at c leads nearer along the unit offset; c is on a side or a corner of one.
-
-    Few samples ask: all faces are looked through for those that share the side or corner.
-    """
-    around, lowest = 0, 0.0
-    for f in range(len(faces)):
+def _beyond(offset, c, face, weights, vertices, faces, starts, around):
+    """Return whether some face at c leads nearer along the unit offset; c is on a side or a corner of one."""
+    sharing, lowest, corner = 0, 0.0, face[np.argmax(weights)]
+    for f in around[starts[corner] : starts[corner + 1]]:
         shared = True
         for a in range(3):
             v = face[a]
             shared &= weights[a] <= ON_SIDE or v == faces[f, 0] or v == faces[f, 1] or v == faces[f, 2]
         if not shared:
             continue
-        around += 1
+        sharing += 1
         for a in range(3):
             along, squared = 0.0, 0.0
             for i in range(3):
@@ -66,19 +91,20 @@ def _beyond(offset, c, face, weights, vertices, faces):
             if along > BEYOND * np.sqrt(squared):
                 return True
             lowest = min(lowest, along + BEYOND * np.sqrt(squared))
-    return around == 1 and lowest < 0.0  # over the border of the mesh itself
+    return sharing == 1 and lowest < 0.0  # over the border of the mesh itself
 
 
 @njit(cache=True, error_model="numpy")
-def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, of_vertices, normals):
+def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, starts, around, normals):
     """Write the normals (S, 3) from the closest points to the samples, turned outwards.
 
     A sample that looks along the surface, or is below it and beyond the border of the faces that it may meet
     (another face at the closest point c leads nearer), meets a ball that touches the surface in c from below:
     the normal points to the sample from the ball's point opposite to c. By Thales' theorem n.(x - c) is
     negative in that ball alone; where the sample is much nearer than the ball is wide, the plane is the
-    tangent.
+    tangent. starts, around: see `faces_around`.
     """
+    of_vertices = normals_of_corners(closest_faces, vertices, faces, starts, around)
     offset, smooth = np.empty(3), np.empty(3)
     for s in range(len(points)):
         i, j, k = faces[closest_faces[s], 0], faces[closest_faces[s], 1], faces[closest_faces[s], 2]
@@ -92,7 +118,8 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
         # Within a micrometre, or looking along the surface, the offset has no direction to trust.
         beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
-            beside |= _beyond(offset, closest[s], faces[closest_faces[s]], barycentric[s], vertices, faces)
+            face = faces[closest_faces[s]]
+            beside |= _beyond(offset, closest[s], face, barycentric[s], vertices, faces, starts, around)
         if beside:
             ball = max(TANGENT_BALL, 1.5 * length)  # below c is in it, however deep
             for c in range(3):

@@ -51,6 +51,12 @@ METRICS = (
         table="simulator",
     ),
     *_metrics(
+        _size("samples", "Samples", "contact samples of the garment"),
+        _clocked("search", "ms", "Search", "closest faces of all samples in a frame, median over frames"),
+        _clocked("search_worst", "ms", "Worst search", "the same in the frame that takes longest"),
+        table="search",
+    ),
+    *_metrics(
         _clocked("iteration", "ms", "Iteration", "time of an iteration of Newton's method"),
         _clocked("iteration_per_vertex", "us", "Per vertex", "the same over the number of vertices"),
         _clocked("lbfgs_iteration", "ms", "L-BFGS", "time of an iteration of L-BFGS alone"),

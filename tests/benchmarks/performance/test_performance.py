@@ -19,7 +19,7 @@ from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metrics import find_metric
 from benchmarks.metrics.cost.microbenchmarks import METRICS, PROCESS_MEMORY
-from benchmarks.performance import convergence, garment, inference, sheet, training_step
+from benchmarks.performance import convergence, garment, inference, search, sheet, training_step
 from benchmarks.performance.convergence import HELD_OUT
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.performance.registry import MICROBENCHMARKS
@@ -245,6 +245,9 @@ def test_the_shirt_is_cut_to_its_frames_and_measured(monkeypatch):
     assert found["converged_frames"] == 100.0 and found["vertices"] == scene.cloth.vertex_count
     assert 0 < found["iterations"] <= found["iterations_worst"]
     assert 0 <= found["deep_vertices"] <= found["penetrating_vertices"] < 100
+    monkeypatch.setattr(search, "dressed", lambda motion, vertices: scene)
+    found = values(search.measure(settings(), motion="walk", vertices=350, frames=3))
+    assert 0 < found["search"] <= found["search_worst"] and found["samples"] > 5 * found["vertices"]
 
 
 # --- networks -----------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 from reference_sim.contact.closest_point import FaceSearch
-from reference_sim.contact.closest_point_lanes import LANES
+from reference_sim.contact.leaf_bounds import LANES
 from reference_sim.geometry.surface import vertex_normals
 from reference_sim.geometry.triangle import closest_on_triangle
 from reference_sim.kernels.kernel_cache import njit
