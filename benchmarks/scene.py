@@ -127,11 +127,8 @@ class Specimen(Protocol):
     def measure(self, x: np.ndarray) -> dict[str, float]:
         """Return what the test reads off positions x (V, 3) [m], by the names of metrics fabric/*."""
 
-    def error(self, x: np.ndarray, reference: np.ndarray | None) -> float | None:
-        """Return the error [%] of what is read off x (V, 3) [m].
-
-        It is to the exact answer where there is one, else to the reference (V, 3) [m]; None without both.
-        """
+    def error(self, x: np.ndarray) -> float | None:
+        """Return how far that is from the exact answer, over it [%]; None where none is known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -72,7 +72,7 @@ class Strip:
         width, height = self.chord(x)
         return {BENDING_LENGTH: 1e3 * bending_length(self.length, float(np.arctan2(height, width)))}
 
-    def error(self, x: np.ndarray, reference: np.ndarray | None) -> float:
+    def error(self, x: np.ndarray) -> float:
         """Return how far the bending length at x (V, 3) [m] is from the exact one [%]."""
         exact = (self.stiffness / (self.cloth.material.areal_density * GRAVITY)) ** (1 / 3)
         return 100.0 * abs(self.measure(x)[BENDING_LENGTH] / (1e3 * exact) - 1.0)

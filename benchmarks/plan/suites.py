@@ -216,7 +216,7 @@ SUITES = (
         description="textile tests: bending length and drape by the reference and by every solver stopped "
         "early; only where it is named",
         scenes=lambda extent: [scene.name for scene in (*TEXTILE_TESTS, *extent.fabric_scenes)],
-        methods=lambda extent: ["simulation", *STOPPED_EARLY],
+        methods=lambda extent: ["simulation", *ENSEMBLE, *STOPPED_EARLY],
         default=False,
     ),
     Suite(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from benchmarks.metric import Metric
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from benchmarks.metric import RollOut
 
 METRICS = (
@@ -27,11 +29,24 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return what the specimen reads off the last frame, and its error; empty where the frame is missing."""
-    scene, reference = roll_out.scene, roll_out.reference
-    if scene.specimen is None or len(roll_out.positions) < scene.frames:
+    """Return what the specimen reads off the last frame, and its error where the exact answer is known."""
+    specimen, last = roll_out.scene.specimen, _last(roll_out)
+    if specimen is None or last is None:
         return {}
-    last = roll_out.positions[-1]
-    values = scene.specimen.measure(last)
-    error = scene.specimen.error(last, None if reference is None else reference.positions[-1])
-    return values if error is None else {**values, "fabric/error": error}
+    error = specimen.error(last)
+    return specimen.measure(last) | ({} if error is None else {"fabric/error": error})
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """Return the error to the reference, where no exact answer is known."""
+    specimen, last, rest = roll_out.scene.specimen, _last(roll_out), _last(reference)
+    if specimen is None or last is None or rest is None or specimen.error(last) is not None:
+        return {}
+    values, expected = specimen.measure(last), specimen.measure(rest)
+    return {"fabric/error": max(abs(values[name] - expected[name]) for name in values)}
+
+
+def _last(roll_out: RollOut) -> np.ndarray | None:
+    """Return the last frame (V, 3) [m]; None where the roll-out ended before it."""
+    whole = len(roll_out.positions) == roll_out.scene.frames
+    return roll_out.positions[-1] if whole else None
