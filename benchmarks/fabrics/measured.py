@@ -1,4 +1,4 @@
-"""Measured fabrics of a user's file, and where another fabric lies among them.
+"""Measured fabrics of a user's file.
 
 The file is a CSV table with a row of heads. Its columns are known by their heads, in any order; others are
 left alone, and a line without a name is called by its number:
@@ -15,7 +15,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.fabrics.fabric import Fabric
@@ -84,17 +84,6 @@ def _fabric(where: str, number: int, line: Sequence[str], columns: dict[str, tup
     name = line[columns["name"][0]].strip() if "name" in columns else ""
     name = re.sub(r"[^A-Za-z0-9_.+-]+", "_", name).strip("_") or f"line_{number}"
     return Fabric(name, **values)
-
-
-def percentile(bending_lengths: Iterable[float], length: float) -> float:
-    """Return the share of the bending lengths that are below `length` [%], half of those that equal it.
-
-    >>> percentile([1.0, 2.0, 3.0, 4.0], 3.0)
-    62.5
-    """
-    every = list(bending_lengths)
-    below = sum(other < length for other in every) + 0.5 * sum(other == length for other in every)
-    return 100.0 * below / len(every)
 
 
 def spread_sample(fabrics: Sequence[Fabric]) -> tuple[Fabric, ...]:

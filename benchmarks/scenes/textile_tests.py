@@ -40,12 +40,13 @@ def build(
     fabric: tuple[str, float, float, float],
 ) -> BuiltScene:  # fmt: skip
     """Build the scene; no assets are needed."""
-    from benchmarks.fabrics.disc import disc
-    from benchmarks.fabrics.strip import cantilever
+    from benchmarks.fabrics.disc import Disc, disc
+    from benchmarks.fabrics.strip import Strip, cantilever
     from reference_sim.energies.bend_hinge.definition import BendHinge
     from reference_sim.energies.gravity import Gravity
     from reference_sim.energies.stretch_stvk.definition import StretchStVK
 
+    specimen: Strip | Disc
     if test == "cantilever":
         specimen = cantilever(Fabric(*fabric), COLUMNS * sheet_cells)
     else:

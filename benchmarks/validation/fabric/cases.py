@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.fabrics.fabric import FABRICS
+from benchmarks.fabrics.fabric import FABRICS, Fabric
 from benchmarks.validation.case import Case, known_answer
 
 GAMMAS = tuple(round(10 ** (power / 2), 2) for power in range(-2, 7))  # four decades
@@ -85,3 +86,21 @@ DRAPE = (
 )  # fmt: skip
 
 TEXTILE_TESTS: tuple[Case, ...] = (*MASTER_CURVE, *CANTILEVER, *DRAPE)
+
+
+def percentiles(fabrics: Sequence[Fabric]) -> tuple[Case, ...]:
+    """Return the cases that say where SNUG's fabric lies among a user's, as scaled and as printed.
+
+    >>> [case.run().value for case in percentiles(FABRICS[:2])]
+    [100.0, 100.0]
+    """
+    lengths = tuple(fabric.bending_length for fabric in fabrics)
+    snug = {fabric.name: fabric for fabric in FABRICS}
+    return tuple(
+        _case(f"percentile_{fabric.name}",
+            f"share of {len(fabrics)} measured fabrics whose bending length is below "
+            f"{1e3 * fabric.bending_length:.1f} mm, SNUG's {title}",
+            "fabric.measured", "percentile", unit="%", smoke=True, reason=REPORTED,
+            options={"length": fabric.bending_length, "lengths": lengths})
+        for fabric, title in ((snug["snug"], "as scaled"), (snug["snug_printed"], "as printed"))
+    )  # fmt: skip
