@@ -38,8 +38,8 @@ class Selection:
 
     full: whether suites are named. scenes, methods: names or patterns; empty means all that the suites list.
     user_scenes, user_methods: entries that are not the project's, named among these. roll_outs: stored ones,
-    which meet each scene that is asked for. one_scene: as of a selection. fabric_scenes, fabric_cases: tests of
-    a user's fabrics, and where SNUG's lies among them.
+    which meet each scene that is asked for. one_scene: as of a selection. fabric_scenes, fabric_cases: of a
+    user's fabrics, textile tests and where SNUG's lies among them.
     """
 
     suites: tuple[str, ...]
