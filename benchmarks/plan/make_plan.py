@@ -99,10 +99,8 @@ def tests_of_fabrics(request: Request, suites: Sequence[str]) -> dict[str, Any]:
     from benchmarks.validation.fabric.cases import percentiles
 
     fabrics = read_fabrics(request.fabrics)
-    scenes = textile_tests(
-        replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)
-    )
-    return {"fabric_scenes": scenes, "fabric_cases": percentiles(fabrics)}
+    sample = [replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)]
+    return {"fabric_scenes": textile_tests(sample), "fabric_cases": percentiles(fabrics)}
 
 
 def choose_metrics(files: Sequence[str]) -> tuple[str, ...]:

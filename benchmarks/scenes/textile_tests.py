@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from benchmarks.fabrics.fabric import FABRICS, Fabric
 from benchmarks.scene import BuiltScene, Scene
@@ -12,7 +12,7 @@ RINGS = 2  # cells of the preset's sheets that make a ring of the disc
 COLUMNS = 2  # cells of the strip that make one of the preset's sheets
 
 
-def textile_tests(fabrics: Iterable[Fabric]) -> tuple[Scene, ...]:
+def textile_tests(fabrics: Sequence[Fabric]) -> tuple[Scene, ...]:
     """Declare both tests of each fabric."""
     return tuple(
         Scene(
