@@ -1,4 +1,4 @@
-"""Fabrics and their tests: materials, measured fabrics of a user's file, specimens, published targets.
+"""Fabrics and their tests: materials, measured fabrics of a user's file, specimens.
 
 | module | what lies there |
 | --- | --- |

@@ -12,9 +12,9 @@ from reports.run.finished_run import Run
 
 TESTS = {"cantilever": "fabric/bending_length", "drape": "fabric/drape_coefficient"}
 ERROR = "fabric/error"
-# Below, the order of two fabrics is not asked for: drape coefficients of one fabric differ by 3 points
+# Below, the order of two fabrics is not asked for: drape coefficients of one fabric differ by 4 points
 # between meshes and time steps, as the number of folds does.
-APART = {"cantilever": 0.5, "drape": 3.0}  # [mm], [%]
+APART = {"cantilever": 0.5, "drape": 5.0}  # [mm], [%]
 
 
 @dataclass(frozen=True)
