@@ -38,7 +38,8 @@ class Selection:
 
     full: whether suites are named. scenes, methods: names or patterns; empty means all that the suites list.
     user_scenes, user_methods: entries that are not the project's, named among these. roll_outs: stored ones,
-    which meet each scene that is asked for. one_scene: as of a selection.
+    which meet each scene that is asked for. one_scene: as of a selection. fabric_scenes, fabric_cases: of a
+    user's fabrics, textile tests and where SNUG's lies among them.
     """
 
     suites: tuple[str, ...]
@@ -52,6 +53,8 @@ class Selection:
     user_methods: tuple[MethodEntry, ...] = ()
     roll_outs: tuple[RollOutOption, ...] = ()
     one_scene: bool = False
+    fabric_scenes: tuple[Scene, ...] = ()
+    fabric_cases: tuple[Case, ...] = ()
 
     @cached_property
     def declared_scenes(self) -> dict[str, Scene]:
@@ -67,7 +70,7 @@ class Selection:
                     f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name: "
                     "give it another"
                 )
-        return by_name("scene", (*declared.values(), *self.user_scenes))
+        return by_name("scene", (*declared.values(), *self.fabric_scenes, *self.user_scenes))
 
     @cached_property
     def declared_methods(self) -> dict[str, MethodEntry]:
@@ -78,7 +81,7 @@ class Selection:
     def extent(self) -> Extent:
         """Naming scenes reaches all of each suite, and so does preset paper."""
         further = bool(self.scenes) or self.preset.further
-        return Extent(self.preset, self.motions, self.full or further, further)
+        return Extent(self.preset, self.motions, self.full or further, further, self.fabric_scenes)
 
 
 def choose_cells(
@@ -200,7 +203,7 @@ def _cases(selection: Selection) -> Iterator[Case]:
     are not long.
     """
     if named(METHOD, selection.methods):
-        for case in CASES:
+        for case in (*CASES, *selection.fabric_cases):
             small = case.smoke or selection.scenes or not selection.preset.smallest
             short = selection.extent.full or not case.long
             if small and short and case.suite in selection.suites and named(case.name, selection.scenes):

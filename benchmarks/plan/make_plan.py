@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from benchmarks.assets.inputs import LIBRARY, read_inputs
 from benchmarks.performance.microbenchmark import SUITE
@@ -20,6 +21,7 @@ from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
 from reference_sim.files.atomic_files import demand_writable_folder
+from benchmarks.scenes.textile_tests import textile_tests
 from snug.garments.options import GarmentFile
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
@@ -62,7 +64,7 @@ def make_plan(request: Request) -> Plan:
             suites=suites, full=bool(request.suites), preset=request.preset, motions=motions,
             scenes=tuple(scenes), methods=tuple(methods), seeds=request.seeds,
             user_scenes=tuple(user_scenes), user_methods=tuple(user_methods), roll_outs=request.roll_outs,
-            one_scene=request.one_scene,
+            one_scene=request.one_scene, **tests_of_fabrics(request, suites),
         )
     )  # fmt: skip
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
@@ -85,6 +87,20 @@ def make_plan(request: Request) -> Plan:
         scheduler=request.scheduler,
         command=request.command,
     )
+
+
+def tests_of_fabrics(request: Request, suites: Sequence[str]) -> dict[str, Any]:
+    """Return the fields of a Selection that a user's file of fabrics fills. Raises ValueError."""
+    if request.fabrics is None:
+        return {}
+    if "fabric" not in suites:
+        raise PlanError(f"--fabrics {request.fabrics}: only suite fabric tests fabrics: add --suite fabric")
+    from benchmarks.fabrics.measured import read_fabrics, spread_sample
+    from benchmarks.validation.fabric.cases import percentiles
+
+    fabrics = read_fabrics(request.fabrics)
+    sample = [replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)]
+    return {"fabric_scenes": textile_tests(sample), "fabric_cases": percentiles(fabrics)}
 
 
 def choose_metrics(files: Sequence[str]) -> tuple[str, ...]:

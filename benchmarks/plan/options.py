@@ -36,6 +36,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
   python -m benchmarks.run --motions library --motions mine.amc
   python -m benchmarks.run --motions mocap.bvh --motion-up z --repair
+  python -m benchmarks.run --suite fabric --fabrics measured.csv     textile tests, also of your fabrics
   python -m benchmarks.run --body mine.npz --suite garments
   python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
   python -m benchmarks.run --seeds 0,1,2 --scheduler tcp://10.0.0.1:8786
@@ -71,8 +72,8 @@ def make_parser() -> argparse.ArgumentParser:
     add_scene_options(parser)
     add = parser.add_argument
     add("--suite", action="append", default=[], metavar="NAME",
-        help="garments, speed, validation, extremes, shapes, performance or all, in full; repeat or separate "
-        "by commas (default: the quick subset of each but shapes and performance)")  # fmt: skip
+        help="garments, speed, validation, extremes, shapes, fabric, performance or all, in full; repeat or "
+        "separate by commas (default: the quick subset of each but shapes, fabric, performance)")  # fmt: skip
     file = "; a file (mine.py) means all that it declares"
     add(
         "--scenes",
@@ -87,6 +88,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("--rollout", action="append", default=[], metavar="NAME=FILE", help=ROLL_OUT_HELP)
     add("--split", choices=("test", "validation"), default="test",
         help="motions that the suites measure: test (default), or validation, to choose recipes")  # fmt: skip
+    add("--fabrics", metavar="FILE",
+        help="measured fabrics, a CSV of density and bending, for suite fabric (docs/fabric.md)")  # fmt: skip
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
@@ -148,6 +151,7 @@ def request_of_run(options: argparse.Namespace, command_line: Sequence[str]) -> 
         metrics=split(options.metrics),
         roll_outs=tuple(map(parse_roll_out, options.rollout)),
         split=options.split,
+        fabrics=Path(options.fabrics) if options.fabrics else None,
         seeds=parse_seeds(options.seeds),
         device=options.device,
         folder=Path(options.out) if options.out else None,

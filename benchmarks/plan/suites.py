@@ -11,7 +11,9 @@ from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import Preset
 from benchmarks.results.ensemble import MEMBERS
+from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES
+from benchmarks.scenes.textile_tests import TEXTILE_TESTS
 from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 from benchmarks.scenes.variations import FEW as FEW_OUT_OF_DISTRIBUTION
 from benchmarks.scenes.variations import FEWEST as FEWEST_OUT_OF_DISTRIBUTION
@@ -22,12 +24,14 @@ class Extent:
     """Extent to which a suite is asked for.
 
     full: more than its quick subset. further: all of the suite, and scenes that double the work.
+    fabric_scenes: textile tests of a user's fabrics.
     """
 
     preset: Preset
     motions: Motions
     full: bool = False
     further: bool = False
+    fabric_scenes: tuple[Scene, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,6 +153,11 @@ def _shapes(extent: Extent) -> list[str]:
     return [scene.name for motion in motions for scene in shapes(motion, extent.motions.first_garment)]
 
 
+# --- fabric -------------------------------------------------------------------------------------------------
+
+UNCERTAINTY = tuple(name for name in ENSEMBLE if name != "simulation-refrozen")  # there is no obstacle
+STOPPED_EARLY = tuple(entry.name for entry in METHODS if entry.role in ("solver", "external"))
+
 SUITES = (
     Suite(
         name="garments",
@@ -202,6 +211,14 @@ SUITES = (
         more_methods=(
             *(entry.name for entry in FURTHER_METHODS if entry.batched and entry.name != SHAPED), *PERTURBED,
         ),
+    ),
+    Suite(
+        name="fabric",
+        description="textile tests: bending length and drape by the reference and by every solver stopped "
+        "early; only where it is named",
+        scenes=lambda extent: [scene.name for scene in (*TEXTILE_TESTS, *extent.fabric_scenes)],
+        methods=lambda extent: ["simulation", *UNCERTAINTY, *STOPPED_EARLY],
+        default=False,
     ),
     Suite(
         name="performance",

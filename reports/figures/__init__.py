@@ -8,6 +8,7 @@ from reports.figures.break_even import BreakEven
 from reports.figures.dots import Dots
 from reports.figures.energy_series import EnergySeries
 from reports.figures.error_against_time import ErrorOfPageOne, ErrorsOfScene, ErrorsOfScenes
+from reports.figures.fabric.textile_errors import TextileErrors
 from reports.figures.figure import Figure
 from reports.figures.hem import Hem
 from reports.figures.histograms import Histograms
@@ -25,6 +26,7 @@ FIGURES: tuple[Figure, ...] = (
     Histograms(),
     Hem(),
     EnergySeries(),
+    TextileErrors(),
     KnownAnswers(),
     StabilityMaps(),
     TrainingCurves(),

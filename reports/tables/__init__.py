@@ -13,6 +13,7 @@ from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
 from reports.tables.dictionary import dictionary
 from reports.tables.equal_data import EQUAL_DATA
+from reports.tables.fabric.textile_tests import fabric_bands, fabric_drape, fabric_order
 from reports.tables.findings import (
     errors_in_spreads,
     findings,
@@ -43,6 +44,9 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     SPEED,
     shapes,
     SHAPES_BY_SCENE,
+    fabric_order,
+    fabric_drape,
+    fabric_bands,
     validation,
     extremes,
     endings,

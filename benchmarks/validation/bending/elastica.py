@@ -1,23 +1,21 @@
-"""Large bending: a clamped strip against Euler's elastica, which scipy integrates here.
+"""Large bending: a clamped strip against Euler's elastica, which scipy integrates.
 
-Hinges stand for a plate stiffness D that depends on the mesh (see plates.py). So D is calibrated once per
-mesh, from its small deflections, and what is judged is the shape at large ones; the spread of D over the
-families is a number of its own, the price of hinge bending.
+Hinges stand for a plate stiffness D that depends on the mesh (see plates.py). So D, and where the clamp acts,
+are calibrated once per mesh from small deflections (see benchmarks.fabrics.strip), and what is judged is the
+shape at large ones; the spread of D over the families is a number of its own, the price of hinge bending.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import scipy.sparse.linalg as spla
-from scipy.integrate import solve_bvp
 
-from benchmarks.meshes import FAMILIES, ROW, in_space, rectangle
+from benchmarks.fabrics.elastica import exact_elastica
+from benchmarks.fabrics.strip import FAMILY, Strip, clamped_strip
+from benchmarks.meshes import FAMILIES
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
-from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
@@ -29,87 +27,30 @@ from reference_sim.potential import Potential
 K = 1e-3  # [J] hinge stiffness
 # 330 N/m: at Gamma = 1000 the strip weighs 0.9 N per metre of width, and stretches by 0.3 %.
 MATERIAL = Material(young_modulus=700e3, poisson_ratio=0.0, bending_stiffness=K)
-ROWS = 2  # narrow, so that the cross-section never has to stay flat
 COLUMNS = 120
 SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
 
 
-@dataclass(frozen=True)
-class Strip:
-    """Horizontal strip of 1 m, clamped at x = 0; cell and width [m], plate stiffness D [J]."""
-
-    cloth: Cloth
-    cell: float
-    width: float
-    D: float
-
-
 @cache
-def strip(family: str, scaling: str = "length_area") -> Strip:
-    """Make a strip with two pinned columns, half a cell to each side of the clamp, and calibrate its D."""
-    h = 1 / (COLUMNS - 0.5)
-    width = ROWS * h * (ROW if family == "equilateral" else 1.0)
-    points, faces = rectangle(family, COLUMNS, ROWS, COLUMNS * h, width)
-    points[:, 0] -= h / 2
-    x = in_space(points)[:, [0, 2, 1]]  # the strip lies in the plane y = 0
-    cloth = Cloth(x, faces[:, ::-1], MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h))
-    return Strip(cloth, h, width, _calibrated(BendHinge(cloth, scaling=scaling), width))
+def strip(family: str, scaling: str = "length_area", columns: int = COLUMNS) -> Strip:
+    """Return a strip of 1 m, clamped at x = 0."""
+    return clamped_strip(family, columns, 1.0, MATERIAL, scaling=scaling)
 
 
-def _calibrated(bend: BendHinge, width: float) -> float:
-    """Return D from the tip's small deflection under a unit load per area: 1/(8 D)."""
-    cloth = bend.cloth
-    stiffness = Potential([bend]).hessian(cloth.rest_positions).tocsr()[1::3][:, 1::3]
-    free = np.setdiff1d(np.arange(cloth.vertex_count), cloth.pins)
-    w = np.zeros(cloth.vertex_count)
-    w[free] = spla.spsolve(stiffness[free][:, free].tocsc(), cloth.vertex_areas[free])
-    return 1 / (8 * float(w[tip(cloth)].mean()))
-
-
-def tip(cloth: Cloth) -> np.ndarray:
-    """Return the vertices of the free end."""
-    return np.flatnonzero(cloth.rest_positions[:, 0] > 1 - 1e-9)
-
-
-@cache
-def exact_elastica(weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
-    """Integrate the elastica of length 1 under its weight and a force at its end: s (n,), (x, drop) (2, n).
-
-    theta, downwards, obeys theta'' = -(weight (1 - s) + load) cos theta, theta(0) = 0, theta'(1) = 0; weight
-    is Gamma = rho_a g L^3 / D, load is P L^2 / D.
-    """
-    s = np.linspace(0, 1, 200)
-    y = np.zeros((4, len(s)))  # theta, theta', x, drop
-    for f in np.linspace(0.05, 1, 20):  # the load grows, each shape starting from the last
-
-        def slope(s, y, f=f):
-            force = f * (weight * (1 - s) + load)
-            return np.stack([y[1], -force * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
-
-        solution = solve_bvp(slope, _clamp_and_free_end, s, y, tol=1e-8, max_nodes=20000)
-        if not solution.success:
-            raise RuntimeError(f"the elastica could not be integrated: {solution.message}")
-        s, y = solution.x, solution.y
-    return s, y[2:]
-
-
-def _clamp_and_free_end(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    return np.array([start[0], end[1], start[2], start[3]])
-
-
-def bent_strip(family: str, weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tip of the strip and of the elastica, (x, drop) [m] each."""
-    made = strip(family)
-    cloth = made.cloth
-    acceleration = weight * made.D / MATERIAL.areal_density
+def bent_strip(
+    family: str, weight: float, load: float, columns: int = COLUMNS
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the chord of the strip and of the elastica, (width, height) each, over the length."""
+    made = strip(family, columns=columns)
+    cloth, length = made.cloth, made.length
+    acceleration = weight * made.stiffness / length**3 / MATERIAL.areal_density
     energies: list[Energy] = [StretchStVK(cloth), BendHinge(cloth)]
     if weight:
         energies.append(Gravity(cloth, acceleration=acceleration))
     if load:
-        end = tip(cloth)
         forces = np.zeros_like(cloth.rest_positions)
-        share = cloth.vertex_areas[end] / cloth.vertex_areas[end].sum()
-        forces[end, 1] = -load * made.D * made.width * share
+        share = cloth.vertex_areas[made.tip] / cloth.vertex_areas[made.tip].sum()
+        forces[made.tip, 1] = -load * made.stiffness / length**2 * made.width * share
         energies.append(DeadLoad(cloth, forces))
     s, (x, drop) = exact_elastica(weight, load)
     rest = cloth.rest_positions
@@ -117,11 +58,16 @@ def bent_strip(family: str, weight: float, load: float) -> tuple[np.ndarray, np.
     free = rest[:, 0] > made.cell
     guess[free, 0] = np.interp(rest[free, 0], s, x)
     guess[free, 1] = -np.interp(rest[free, 0], s, drop)
-    strength = (weight + load) * made.D / MATERIAL.areal_density / 9.81
+    strength = (weight + load) * made.stiffness / MATERIAL.areal_density / 9.81
     result = minimise(Potential(energies), guess, tolerance=1e-6 * strength)
     demand_converged(result, f"the strip of {family} triangles")
-    end = result.positions[tip(cloth)].mean(axis=0)
-    return np.array([end[0], -end[1]]), np.array([x[-1], drop[-1]])
+    return made.chord(result.positions) / length, np.array([x[-1], drop[-1]])
+
+
+def slenderness(gamma: float, columns: int) -> float:
+    """Return height over width of the chord at that Gamma, over the elastica's, on `columns` cells."""
+    ours, exact = bent_strip(FAMILY, gamma, 0.0, columns)
+    return float((ours[1] / ours[0]) / (exact[1] / exact[0]))
 
 
 def heavy(gamma: float) -> float:
@@ -146,5 +92,5 @@ def _tip_distance(family: str, weight: float, load: float) -> float:
 
 def stiffness_spread(scaling: str) -> float:
     """Return the largest over the smallest D of the five families at one k."""
-    stiffnesses = [strip(family, scaling).D for family in FAMILIES]
+    stiffnesses = [strip(family, scaling).stiffness for family in FAMILIES]
     return max(stiffnesses) / min(stiffnesses)

@@ -1,6 +1,8 @@
-"""Lateral buckling: a strip on edge, clamped at one end and loaded at the other, gives way sideways.
+"""Lateral buckling: a strip on edge, clamped at one end, gives way sideways under a load or its own weight.
 
-P = 4.0126 (EI GJ)^0.5 / L^2 (Michell 1899, Prandtl 1899). On equilateral triangles the hinges are an
+P = 4.0126 (EI GJ)^0.5 / L^2 at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread
+evenly over the length (Timoshenko and Gere, Theory of Elastic Stability), the limit of narrow strips of the
+test of Romero et al. 2021. On equilateral triangles the hinges are an
 isotropic plate (see plates.py) with D = k/4 and nu = -1/3, so for a narrow strip of width b
 EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
 """
@@ -24,33 +26,39 @@ from reference_sim.potential import Potential
 
 K = 1e-5  # [J] hinge stiffness: so small that the strip hardly sags in its own plane before it buckles
 MATERIAL = Material(poisson_ratio=0.3, bending_stiffness=K)
-MICHELL = 4.0126
-SLENDER = 0.04  # width over length
+CRITICAL = {"end": 4.0126, "weight": 12.85}  # total load, over (EI GJ)^0.5 / L^2
 ROWS = (4, 8)
 
 
-def critical_load() -> float:
+def critical_load(where: str = "end", slender: float = 0.04) -> float:
     """Return the load at which the tangent stiffness becomes singular, over the closed form.
+
+    Args:
+        where: the load acts, "end" or "weight".
+        slender: width over length.
 
     The free edges lack half a hinge, an error of first order in the cell: two meshes are extrapolated.
     """
-    coarse, fine = (_ratio(rows) for rows in ROWS)
+    coarse, fine = (_ratio(rows, where, slender) for rows in ROWS)
     return 2 * fine - coarse
 
 
-def _ratio(rows: int) -> float:
-    columns = round(rows * ROW / SLENDER)
+def _ratio(rows: int, where: str, slender: float) -> float:
+    columns = round(rows * ROW / slender)
     h = 1 / (columns - 0.5)  # the clamp lies half-way between the two pinned columns
     width = rows * h * ROW
     points, faces = rectangle("equilateral", columns, rows, columns * h, width)
     points -= [h / 2, width / 2]
     cloth = Cloth(in_space(points), faces, MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h))
     D, nu = K / 4, NU
-    exact = MICHELL * width * D * np.sqrt((1 - nu**2) * 2 * (1 - nu))
-    tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
+    exact = CRITICAL[where] * width * D * np.sqrt((1 - nu**2) * 2 * (1 - nu))
     forces = np.zeros((len(points), 3))
-    share = 1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2  # shear of a beam: least at the free edges
-    forces[tip, 1] = -exact * share / share.sum()
+    if where == "weight":
+        forces[:, 1] = -exact * cloth.vertex_areas / width
+    else:
+        tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
+        share = 1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2  # shear of a beam: least at the free edges
+        forces[tip, 1] = -exact * share / share.sum()
     strain, stiff = StretchStVK(cloth), BendHinge(cloth)
     stiff.stiffness = 1e5 * stiff.stiffness  # keeps the loaded strip in its plane, where hinges do no work
     in_plane = Potential([strain, stiff, DeadLoad(cloth, forces)])

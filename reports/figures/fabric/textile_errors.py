@@ -1,0 +1,52 @@
+"""Errors of textile tests against run time: solvers stopped early, members of a family joined."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from reports.figures.error_against_time import draw_legend, draw_points
+from reports.figures.figure import Drawing, Figure
+from reports.figures.plotting import PAGE_WIDTH, grid, new_figure
+from reports.run.finished_run import Run
+from reports.statistics.fabric.order import ERROR, rows_of_test
+from reports.statistics.means_and_spreads import value_of
+from reports.statistics.pareto import TIME, Point, indistinct, points_of
+
+PANELS = {
+    "cantilever": "Bending length: error [%]",
+    "drape": "Drape coefficient: error [points]",
+}
+VARIANTS = ("reference-variant",)  # of the reference, whose spread is the error bar
+
+
+class TextileErrors(Figure[dict[str, list[Point]]]):
+    """A panel for each textile test: mean error over the fabrics against run time."""
+
+    name = "textile_errors"
+
+    def needs(self, run: Run) -> dict[str, list[Point]]:
+        """Return test -> points of the methods that did it with every fabric."""
+        points = {}
+        for test in PANELS:
+            rows = rows_of_test(run, test)
+            rows = rows[~rows["role"].isin(VARIANTS)]
+            points[test] = points_of(run, rows, sorted(set(rows["scene"])), ERROR, TIME)
+        return {test: of_test for test, of_test in points.items() if len(of_test) > 1}
+
+    def draw(self, run: Run, data: dict[str, list[Point]]) -> Iterator[Drawing]:
+        """Draw the panels side by side."""
+        figure = new_figure(PAGE_WIDTH, 3.1)
+        reference = None
+        for axes, (test, points) in zip(figure.subplots(1, len(data), squeeze=False)[0], data.items()):
+            reference = value_of(rows_of_test(run, test), run.reference, TIME)
+            draw_points(axes, run, points, reference, indistinct(run, rows_of_test(run, test), ERROR))
+            axes.set(xlabel="run time [ms per frame]", title=PANELS[test])
+            grid(axes)
+        draw_legend(figure, run, [p for points in data.values() for p in points], reference)
+        caption = (
+            "Textile tests: mean error over the fabrics against run time; lower left is better. Bending "
+            "length: distance from the exact one. Drape coefficient: difference from the reference's; bars: "
+            "the change by a perturbed reference; grey: within it. Dotted: the reference. Joined: a family, "
+            "its first and last number beside."
+        )
+        yield Drawing(figure, self.name, caption)

@@ -1,0 +1,1 @@
+"""Tables of textile tests: drape on meshes and steps, published bands, solvers."""

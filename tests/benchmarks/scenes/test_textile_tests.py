@@ -1,0 +1,117 @@
+"""Suite fabric: its scenes, its metrics, its cases, and how a user's fabrics enter it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metrics.surface import textile_tests as metrics
+from benchmarks.plan.choose_cells import choose_suites
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import make_parser, request_of_run
+from benchmarks.plan.plan import PlanError
+from benchmarks.presets import find_preset
+from benchmarks.scenes.textile_tests import TEXTILE_TESTS
+from benchmarks.validation.fabric.cases import CANTILEVER, DRAPE, MASTER_CURVE
+from reference_sim import simulate
+from reference_sim.trajectory.trajectory import Trajectory
+
+TINY = replace(find_preset("smoke"), sheet_cells=6, sheet_frames=12)
+TABLE = "name,density[g/m2],bending warp[uN.m],bending weft[uN.m]\nvoile,62,2.1,1.4\n"
+
+
+def plan_of(*words):
+    return make_plan(request_of_run(make_parser().parse_args(list(words)), words))
+
+
+def test_the_suite_runs_only_where_it_is_named():
+    assert "fabric" not in choose_suites(()) and "fabric" in choose_suites(["all"])
+
+
+def test_every_solver_stopped_early_meets_every_fabric():
+    plan = plan_of("--suite", "fabric")
+    stopped = {entry.name for entry in METHODS if entry.role == "solver"}
+    assert len(stopped) > 10
+    for scene in TEXTILE_TESTS:
+        assert stopped < {cell.method for cell in plan.cells if cell.scene.name == scene.name}
+    assert {case.suite for case in plan.cases} == {"fabric"}
+
+
+def test_a_users_fabrics_are_tested_and_snug_is_placed_among_them(tmp_path):
+    path = tmp_path / "mine.csv"
+    path.write_text(TABLE)
+    plan = plan_of("--suite", "fabric", "--preset", "smoke", "--fabrics", str(path))
+    assert {"fabric/drape/measured/voile", "fabric/cantilever/measured/voile"} < {s.name for s in plan.scenes}
+    assert {"percentile_snug", "percentile_snug_printed"} < {case.name for case in plan.cases}
+    with pytest.raises(PlanError, match="add --suite fabric"):
+        plan_of("--fabrics", str(path))
+
+
+@pytest.fixture(scope="module")
+def cantilever():
+    built = next(s for s in TEXTILE_TESTS if s.name == "fabric/cantilever/snug").at(TINY).build()
+    moved = simulate(built.cloth, built.energies, dt=built.dt, frames=built.frames, start=built.start)
+    return built, moved
+
+
+def test_the_reference_reads_off_the_bending_length(cantilever):
+    built, moved = cantilever
+    values = metrics.measure(RollOut(SceneRollOuts(built), find_method("simulation"), moved))
+    assert values["fabric/error"] < 3.0 and 16.5 < values["fabric/bending_length"] < 17.8
+
+
+def test_a_roll_out_that_ended_early_has_no_reading(cantilever):
+    built, moved = cantilever
+    short = replace(moved, positions=moved.positions[:5], times=moved.times[:5],
+                    frame_seconds=moved.frame_seconds[:5], frame_fields={})  # fmt: skip
+    assert metrics.measure(RollOut(SceneRollOuts(built), find_method("vbd-5"), short)) == {}
+
+
+def test_a_drape_is_compared_with_the_references():
+    built = next(s for s in TEXTILE_TESTS if s.name == "fabric/drape/snug").at(TINY).build()
+    group = SceneRollOuts(built)
+
+    def roll_out(scale):
+        x = built.start * [scale, 1.0, scale]
+        frames = np.repeat(x[None], built.frames, axis=0)
+        made = Trajectory(
+            positions=frames, faces=built.cloth.faces, times=built.dt * np.arange(built.frames),
+            frame_seconds=np.zeros(built.frames), status="ok", reason="", provenance={}, frame_fields={},
+        )  # fmt: skip
+        return RollOut(group, find_method("simulation"), made)
+
+    assert "fabric/error" not in metrics.measure(roll_out(1.0))
+    flat, shrunk = roll_out(1.0), roll_out(0.9)
+    expected = (0.15**2 - 0.135**2) / (0.15**2 - 0.09**2)
+    assert metrics.compare(shrunk, flat)["fabric/error"] == pytest.approx(100 * expected, rel=0.03)
+    assert metrics.compare(flat, flat)["fabric/error"] == 0.0
+
+
+QUICK = ("master_curve_1_80", "master_curve_100_80", "master_curve_1000_160", "astm_d1388_angle",
+         "bending_length_14_cells_30_steps")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "case", [c for c in (*MASTER_CURVE, *CANTILEVER) if c.name in QUICK], ids=lambda c: c.name
+)
+def test_a_case_is_found(case):
+    row = case.run()
+    assert row.status == "ok" and row.suite == "fabric", row.reason
+
+
+def test_a_coarse_disc_drapes_more_the_limper_it_is():
+    coarse = {case.name: replace(case, options=case.options | {"rings": 3}) for case in DRAPE}
+    limp, stiff = (coarse[f"drape_{name}_5_rings_30_steps"].run().value for name in ("snug", "thick_stiff"))
+    assert 40.0 < limp < 65.0 and 80.0 < stiff < 95.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", (*MASTER_CURVE, *CANTILEVER, *DRAPE), ids=lambda case: case.name)
+def test_every_case_is_found(case):
+    row = case.run()
+    assert row.status == "ok", row.reason
+    assert case.expected is None or case.tolerance is None or abs(row.value - row.expected) <= case.tolerance
