@@ -189,7 +189,9 @@ def machines_of(trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes:
     """Return metric -> hardware that measured its seconds, of tasks other than the cell."""
     if trained is None:
         return {}
-    metrics = {"cost/data": taught_by or (trained,), "cost/setup": (trained,), "cost/train": (trained,)}
+    if trained in outcomes and PRETRAINED in outcomes[trained].result:
+        taught_by = (trained,)
+    metrics = {"cost/data": taught_by, "cost/setup": (trained,), "cost/train": (trained,)}
     origins = {
         metric: [outcomes[id].origin for id in ids if id in outcomes] for metric, ids in metrics.items()
     }
