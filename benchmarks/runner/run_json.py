@@ -22,6 +22,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import PRETRAINED
+from snug.trained import FOLDER
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
@@ -67,7 +68,7 @@ class RunLog:
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
             "scheduler": plan.scheduler or None,
-            "pretrained": plan.trained.name if plan.trained else None,
+            "pretrained": "of the package" if plan.trained == FOLDER else plan.trained and plan.trained.name,
             "commit": self.origin["commit"],
             "started": now(),
             "finished": None,
