@@ -28,7 +28,7 @@ html_css_files = ["wide_tables.css"]
 
 
 class NotebookParser(MystParser):
-    """Cells of a Jupyter notebook as a page: its text as it is, its code as blocks; outputs are not stored."""
+    """Cells of a Jupyter notebook as a page: text as it is, code as blocks; outputs are not stored."""
 
     supported = ("notebook",)
 
