@@ -21,7 +21,6 @@ from benchmarks.metrics import MODULE_OF, names_of
 from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.runner.cache import dependencies
-from benchmarks.runner.pretrained import take_network, without_machine
 from benchmarks.runner.task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
@@ -30,7 +29,7 @@ from benchmarks.tasks.cell_task import BatchCell, RepeatCell, RunCell, RunUntime
 from benchmarks.tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
 from benchmarks.tasks.metric_task import MeasureCell
 from benchmarks.tasks.microbenchmark import RunMicrobenchmark
-from benchmarks.tasks.pretrained_network import TakeNetwork
+from benchmarks.tasks.pretrained_network import TakeNetwork, take_network, without_machine
 from benchmarks.tasks.task import Task
 from benchmarks.tasks.training import LONGEST, TrainNetwork
 from benchmarks.training import Simulated

@@ -36,7 +36,7 @@ def test_a_network_is_loaded_by_its_name_with_its_origin(packaged, tmp_path, mon
 
 
 def test_an_unknown_name_lists_the_names(packaged):
-    with pytest.raises(ModelFileError, match="^snug-tube: neither a model file nor a network .*: pbns-tube$"):
+    with pytest.raises(ModelFileError, match=r"^snug-tube: neither a model file .*: pbns-tube$"):
         TrainedModel.load("snug-tube")
 
 

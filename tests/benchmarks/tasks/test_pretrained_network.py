@@ -8,22 +8,21 @@ from pathlib import Path
 import pytest
 import torch
 
-from benchmarks import networks
 from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.networks import __main__ as command
+from benchmarks.networks import training_run
 from benchmarks.plan.make_plan import check_trained
 from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import Motions, Network, Plan, PlanError
 from benchmarks.plan.request import Request
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner import pretrained
 from benchmarks.runner.console import remarks
-from benchmarks.runner.pretrained import take_network
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import described
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.tasks.pretrained_network import TakeNetwork
+from benchmarks.tasks.pretrained_network import TakeNetwork, take_network, without_machine
 from benchmarks.tasks.task import Outcome
 from benchmarks.tasks.training import TrainNetwork
 from benchmarks.training import Training
@@ -177,27 +176,29 @@ def test_the_option_takes_the_package_or_a_folder(tmp_path):
 
 def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp_path, monkeypatch, capsys):
     packaged = tmp_path / "packaged"
-    monkeypatch.setattr(networks, "FOLDER", packaged)
+    monkeypatch.setattr(training_run, "FOLDER", packaged)
     monkeypatch.setattr(
         "benchmarks.runner.execute_plan.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
     )
     monkeypatch.setattr(Plan, "open_assets", lambda plan: assets_of(tube_dress(), WALK))
-    monkeypatch.setattr(networks, "make_plan", lambda request: plan_with(request.folder, *request.methods))
+    monkeypatch.setattr(command, "make_plan", lambda request: plan_with(request.folder, *request.methods))
     words = ["--methods", "pbns", "-o", str(tmp_path / "nets")]
-    assert networks.main([*words, "--into-package"]) == 0
+    assert command.main([*words, "--into-package"]) == 0
     assert "the package has none" in capsys.readouterr().out
     first = (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes()
     assert (packaged / "pbns-tshirt.safetensors").read_bytes() == first
-    assert networks.main(words) == 0  # nothing to do
+    assert command.main(words) == 0  # nothing to do
     assert (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes() == first
     assert "the bits of the package's" in capsys.readouterr().out
     model = TrainedModel.load(packaged / "pbns-tshirt.safetensors")
     model.network.offsets.weight.data += 0.5
     model.save(packaged / "pbns-tshirt.safetensors")
-    assert networks.main(words) == 0
+    assert command.main(words) == 0
     assert "differs from the package's by up to 0.5" in capsys.readouterr().out
+    assert command.main([*words, "--preset", "smoke", "--into-package"]) == 2
+    assert "networks of preset quick" in capsys.readouterr().err
 
 
 def test_parts_of_simulations_do_not_depend_on_the_machine():
     parts = {"machine": "1", "package numba": "0.6", "reference_sim/cloth.py": "2", "benchmarks/cell.py": "3"}
-    assert pretrained.without_machine(parts) == {"reference_sim/cloth.py": "2"}
+    assert without_machine(parts) == {"reference_sim/cloth.py": "2"}

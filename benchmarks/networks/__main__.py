@@ -9,21 +9,21 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.networks.training_run import compared, packaged_file, train
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import add_scene_options, parse_seeds, scene_fields, split
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import PlanError
 from benchmarks.plan.request import Request
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.tasks.training import TrainNetwork
+from benchmarks.tasks.task import RunStopped
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
-from snug.trained import FOLDER, SUFFIX, network_name
 
 PROGRAM = "benchmarks.networks"
 METHODS = "snug,supervised,pbns"  # those that a run without options trains
+PRESET = "quick"  # of the package's networks
 OUT = Path("reports/runs/networks")
-KINDS = ("data", "clips", "network")  # of tasks: simulations to learn from, and trainings
 EXAMPLES = """examples:
   python -m benchmarks.networks                               the package's networks again
   python -m benchmarks.networks --seeds 0,1,2 -o nets         further seeds
@@ -69,8 +69,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         workers=options.workers,
         **scene_fields(options),
     )
+    if options.into_package and options.preset != PRESET:
+        raise PlanError(f"--into-package: the package has networks of preset {PRESET}")
     plan = make_plan(request)
-    folder, (trained, failures) = RunFolder(plan.folder), train(plan)
+    try:
+        folder, (trained, failures) = RunFolder(plan.folder), train(plan)
+    except RunStopped as error:  # as of a full disk
+        print(f"{PROGRAM}: {error}; the same command goes on from there", file=sys.stderr)
+        return 1
     for task in trained:
         path, packaged = task.path(folder), packaged_file(task)
         print(f"{path}: {path.stat().st_size / 1e6:.2f} MB; {compared(path, packaged)}")
@@ -80,42 +86,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for line in failures:
         print(line, file=sys.stderr)
     return 1 if failures else 0
-
-
-def train(plan: Plan) -> tuple[list[TrainNetwork], list[str]]:
-    """Train the networks of a plan that its folder lacks; return their tasks, and a line for each failure."""
-    from benchmarks.runner.execute_plan import executor_of
-    from benchmarks.runner.lock import held
-    from benchmarks.runner.loop import Runner
-    from benchmarks.runner.run_json import RunLog
-    from benchmarks.runner.schedule import tasks_of
-
-    tasks = [task for task in tasks_of(plan) if task.kind in KINDS]
-    with held(plan.folder):
-        log = RunLog(plan)
-        runner = Runner(tasks, log.cache)
-        runner.run(executor_of(plan, log.folder, log.open_assets()), log)
-    failures = [f"{label}: {reason}" for label, reason in runner.broken().items()]
-    trainings = [task for task in tasks if isinstance(task, TrainNetwork) and task.chosen]
-    return [task for task in trainings if not runner.outcomes[task.id].failed], failures
-
-
-def packaged_file(task: TrainNetwork) -> Path:
-    """Return the path of the package's network of that training, whether or not it is there."""
-    return FOLDER / f"{network_name(task.training, task.garment, task.seed)}{SUFFIX}"
-
-
-def compared(path: Path, packaged: Path) -> str:
-    """Return in words how the weights in a file differ from those in the package's."""
-    from snug.networks.trained_model import TrainedModel
-
-    if not packaged.is_file():
-        return "the package has none"
-    weights, other = (TrainedModel.load(file).network.state_dict() for file in (path, packaged))
-    if weights.keys() != other.keys() or any(weights[n].shape != other[n].shape for n in weights):
-        return "the package's has another architecture"
-    largest = max(float((weights[name] - other[name]).abs().max()) for name in weights)
-    return f"differs from the package's by up to {largest:.2g}" if largest else "the bits of the package's"
 
 
 if __name__ == "__main__":
