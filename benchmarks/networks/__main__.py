@@ -12,7 +12,7 @@ from pathlib import Path
 from benchmarks.networks.training_run import compared, packaged_file, train
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import add_scene_options, parse_seeds, scene_fields, split
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.plan import STATES, PlanError
 from benchmarks.plan.request import Request
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
@@ -67,6 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         seeds=parse_seeds(options.seeds),
         folder=Path(options.out),
         workers=options.workers,
+        only=STATES[1:],  # a training whose process was killed is done again too
         **scene_fields(options),
     )
     if options.into_package and options.preset != PRESET:
