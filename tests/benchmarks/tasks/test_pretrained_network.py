@@ -181,10 +181,17 @@ def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp
         "benchmarks.runner.execute_plan.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
     )
     monkeypatch.setattr(Plan, "open_assets", lambda plan: assets_of(tube_dress(), WALK))
-    monkeypatch.setattr(command, "make_plan", lambda request: plan_with(request.folder, *request.methods))
+    requests = []
+
+    def planned(request):
+        requests.append(request)
+        return plan_with(request.folder, *request.methods)
+
+    monkeypatch.setattr(command, "make_plan", planned)
     words = ["--methods", "pbns", "-o", str(tmp_path / "nets")]
     assert command.main([*words, "--into-package"]) == 0
     assert "the package has none" in capsys.readouterr().out
+    assert set(requests[0].only) == {"failed", "stale", "missing"}
     first = (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes()
     assert (packaged / "pbns-tshirt.safetensors").read_bytes() == first
     assert command.main(words) == 0  # nothing to do
