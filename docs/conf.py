@@ -1,8 +1,11 @@
 """Configuration of the site: `sphinx-build -W docs reports/runs/site` makes it."""
 
+import json
 import sys
 from pathlib import Path
 
+from docutils.nodes import document
+from myst_parser.parsers.sphinx_ import MystParser
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).resolve().parent
@@ -24,8 +27,23 @@ html_js_files = ["sort_tables.js"]
 html_css_files = ["wide_tables.css"]
 
 
+class NotebookParser(MystParser):
+    """Cells of a Jupyter notebook as a page: text as it is, code as blocks; outputs are not stored."""
+
+    supported = ("notebook",)
+
+    def parse(self, inputstring: str, document: document) -> None:
+        """Parse the cells as one text in Markdown."""
+        cells = json.loads(inputstring)["cells"]
+        texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
+        page = [f"```python\n{text}\n```" if kind == "code" else text for kind, text in texts]
+        super().parse("\n\n".join(page), document)
+
+
 def setup(app: Sphinx) -> None:
-    """Make the pages of the published runs before the sources are read."""
+    """Make the pages of the published runs before the sources are read; read notebooks too."""
     from reports.text.run_page import write_run_pages
 
     app.connect("builder-inited", lambda _: write_run_pages(DOCS.parent / "reports/published", DOCS / "runs"))
+    app.add_source_suffix(".ipynb", "notebook")
+    app.add_source_parser(NotebookParser)

@@ -29,7 +29,8 @@ from benchmarks.fingerprint.digest import digest, digest_of_file
 ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("reference_sim", "snug", "benchmarks")
-NO_DATA = (".py", ".pyi", ".pyc", ".md", ".nbi", ".nbc")  # source, prose, compiled kernels
+# Source, prose, compiled kernels; and trained networks: a task that reads one names its digest.
+NO_DATA = (".py", ".pyi", ".pyc", ".md", ".nbi", ".nbc", ".safetensors")
 BLOCKS = ("body", "handlers", "cases", "orelse", "finalbody")  # of statements within a statement
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 

@@ -85,6 +85,7 @@ def make_plan(request: Request) -> Plan:
         fresh=request.fresh,
         workers=workers,
         scheduler=request.scheduler,
+        trained=check_trained(request),
         command=request.command,
     )
 
@@ -169,6 +170,17 @@ def check_device(device: str) -> None:
         from snug.training.device import find_device  # loads torch
 
         find_device(device)
+
+
+def check_trained(request: Request) -> Path | None:
+    """Return the folder of pretrained networks, None without one. Raises PlanError where it is no folder."""
+    if request.trained is None:
+        return None
+    if not request.trained.is_dir():
+        raise PlanError(f"--trained {request.trained}: no such folder; without DIR the package's are taken")
+    if request.scheduler:
+        raise PlanError("--trained: its files lie on this machine alone; leave out --scheduler")
+    return request.trained
 
 
 def check_scheduler_fits(request: Request) -> None:

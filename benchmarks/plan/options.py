@@ -20,11 +20,13 @@ from benchmarks.presets import PRESETS, find_preset
 from reference_sim.command.command_line import Parser
 from snug.garments.options import add_garment_options, demand_garment_file, make_garment_file
 from snug.motion.options import add_motion_options, parse_motion_options
+from snug.trained import FOLDER
 
 PROGRAM = "benchmarks.run"
 LEAST_FRAMES = 3  # inertia needs two frames before
 EXAMPLES = """examples:
   python -m benchmarks.run                                    the quick run: every suite's quick subset
+  python -m benchmarks.run --trained                          the same without training
   python -m benchmarks.run --preset smoke                     everything once, tiny, about 3 minutes
   python -m benchmarks.run --suite garments -o reports/runs/mine
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
@@ -92,6 +94,9 @@ def make_parser() -> argparse.ArgumentParser:
         help="measured fabrics, a CSV of density and bending, for suite fabric (docs/fabric.md)")  # fmt: skip
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
+    add("--trained", nargs="?", const=FOLDER, metavar="DIR", help="measure without training: networks of the "
+        "package, or of the run in DIR; methods whose network is not there are skipped, those of your own "
+        "files trained")  # fmt: skip
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     add("--only", action="append", default=[], metavar="STATE,...",
         help="of what the folder holds already, do again what is failed, stale or missing (default "
@@ -159,6 +164,7 @@ def request_of_run(options: argparse.Namespace, command_line: Sequence[str]) -> 
         fresh=options.fresh,
         workers=options.workers,
         scheduler=options.scheduler or "",
+        trained=Path(options.trained) if options.trained else None,
         **scene_fields(options),
     )
 

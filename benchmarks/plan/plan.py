@@ -128,7 +128,8 @@ class Plan:
     inputs: the user's files, as read. only: states of what the folder holds in which a task is
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
     metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. scheduler: address
-    of a cluster that does what is not timed; empty: this machine does. Raises PlanError, see check_names.
+    of a cluster that does what is not timed; empty: this machine does. trained: folder whose networks take
+    the place of trainings; None: networks are trained. Raises PlanError, see check_names.
     """
 
     preset: Preset
@@ -147,6 +148,7 @@ class Plan:
     fresh: bool = False
     workers: int = 1
     scheduler: str = ""
+    trained: Path | None = None
 
     def __post_init__(self) -> None:
         check_names(self.cells)

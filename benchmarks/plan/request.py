@@ -29,7 +29,8 @@ class Request:
     body, garment: a user's own files; None: the package's. seeds: of trainings; device: where they run.
     folder: of the run; None: a new one. only: states of what the folder holds in which a task is done again;
     empty: the usual ones; fresh: nothing of the folder is reused. workers: processes side by side; None: as
-    many as usual. scheduler: address of a cluster; empty: this machine.
+    many as usual. scheduler: address of a cluster; empty: this machine. trained: folder of pretrained
+    networks; None: networks are trained.
     """
 
     command: str = ""
@@ -56,3 +57,4 @@ class Request:
     fresh: bool = False
     workers: int | None = None
     scheduler: str = ""
+    trained: Path | None = None

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.results.row import USABLE, Row
-from benchmarks.runner.rows import DECLARED, NOT_FALLING, SPREAD
+from benchmarks.runner.rows import DECLARED, NOT_FALLING, PRETRAINED, SPREAD
 
 COLUMNS = (
     ("energy/total", "total J"),
@@ -57,6 +57,8 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
     declared = dict.fromkeys(row.method for row in rows if row.reason == DECLARED)
     if declared:
         lines.append(f"run time {DECLARED}: {', '.join(declared)}")
+    pretrained = {row.reason[row.reason.index(PRETRAINED) :] for row in rows if PRETRAINED in row.reason}
+    lines += [f"not trained here: {remark}" for remark in sorted(pretrained)]
     rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(NOT_FALLING)]
     if rising:
         lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")

@@ -43,6 +43,7 @@ def _head(plan: Plan) -> list[str]:
     ]
     for garment in dict.fromkeys(network.garment for network in plan.networks):
         how = "simulated for networks that learn from it" if garment in plan.simulated else "not simulated"
+        how = f"networks of {plan.trained}" if plan.trained else how
         lines.append(f"training motions {', '.join(plan.motions.train)} ({how})")
     counts = f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"
     more = f", {len(plan.microbenchmarks)} microbenchmarks" * bool(plan.microbenchmarks)

@@ -20,6 +20,8 @@ MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
 GAP = "gap/energy"
 DECLARED = "declared by its author, not measured"
+PRETRAINED = "pretrained"  # in the result of a task, and first word of a remark: its network is of a file
+MOST_NAMED = 3  # names of what differs in a remark
 NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
 ROUND_OFF = 1e-6  # [J] a gap below it counts as none: who is called lower there is chance
 
@@ -63,7 +65,8 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
                 metrics["cost/frame"] = declared_ms
             if cell.scene.timed:
                 metrics |= model_costs(trained, taught_by, outcomes)
-            reason = reason or not_learned(trained, outcomes)
+            reasons = (reason or not_learned(trained, outcomes), taken(trained, outcomes))
+            reason = "; ".join(filter(None, reasons))
     batch = outcomes.get(cell.batch_id, Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
@@ -177,6 +180,8 @@ def model_costs(
         "cost/train_steps": "steps", "cost/train_frames": "frames",
     }  # fmt: skip
     costs = {metric: outcome.result[name] for metric, name in names.items()}
+    if PRETRAINED in outcome.result:
+        return {"cost/data": outcome.result["data_seconds"]} | costs
     return {"cost/data": sum(outcomes[id].seconds for id in taught_by if id in outcomes)} | costs
 
 
@@ -184,6 +189,8 @@ def machines_of(trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes:
     """Return metric -> hardware that measured its seconds, of tasks other than the cell."""
     if trained is None:
         return {}
+    if trained in outcomes and PRETRAINED in outcomes[trained].result:
+        taught_by = (trained,)
     metrics = {"cost/data": taught_by, "cost/setup": (trained,), "cost/train": (trained,)}
     origins = {
         metric: [outcomes[id].origin for id in ids if id in outcomes] for metric, ids in metrics.items()
@@ -201,6 +208,19 @@ def not_learned(trained: TaskId | None, outcomes: Outcomes) -> str:
     if outcome is None or not outcome.result.get("left_out"):
         return ""
     return f"its network learned without {', '.join(outcome.result['left_out'])}: no simulation is whole"
+
+
+def taken(trained: TaskId | None, outcomes: Outcomes) -> str:
+    """Return a remark where the cell's network is of a file, with what a training here would differ in."""
+    outcome = outcomes.get(trained) if trained else None
+    if outcome is None or PRETRAINED not in outcome.result:
+        return ""
+    differing = outcome.result["differing"]
+    more = f" and {len(differing) - MOST_NAMED} more" * (len(differing) > MOST_NAMED)
+    same = "a training here gives the same bits"
+    if differing:
+        same = f"a training here differs in {', '.join(differing[:MOST_NAMED])}{more}"
+    return f"{PRETRAINED} network {outcome.result[PRETRAINED]} of {outcome.result['trained_at']}; {same}"
 
 
 def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:

@@ -21,6 +21,8 @@ from benchmarks.results.row import OF_TRAINING, Row, with_provenance
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import PRETRAINED
+from snug.trained import FOLDER
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
@@ -66,6 +68,7 @@ class RunLog:
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
             "scheduler": plan.scheduler or None,
+            "pretrained": "of the package" if plan.trained == FOLDER else plan.trained and plan.trained.name,
             "commit": self.origin["commit"],
             "started": now(),
             "finished": None,
@@ -201,6 +204,9 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
         if name in methods and not methods[name].timed:
             of_methods[name]["label"] = f"{methods[name].label or name} (declared time)"
+    for name in {row.method for row in rows if PRETRAINED in row.reason}:
+        if name in methods:
+            of_methods[name]["label"] = f"{of_methods[name]['label'] or name} ({PRETRAINED})"
     cases = {
         case.name: {
             "description": case.description, "suite": case.suite, "scene": case.scene or case.name,

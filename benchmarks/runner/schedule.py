@@ -29,6 +29,7 @@ from benchmarks.tasks.cell_task import BatchCell, RepeatCell, RunCell, RunUntime
 from benchmarks.tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
 from benchmarks.tasks.metric_task import MeasureCell
 from benchmarks.tasks.microbenchmark import RunMicrobenchmark
+from benchmarks.tasks.pretrained_network import TakeNetwork, take_network, without_machine
 from benchmarks.tasks.task import Task
 from benchmarks.tasks.training import LONGEST, TrainNetwork
 from benchmarks.training import Simulated
@@ -62,9 +63,11 @@ class Schedule:
         simulated = {scene.name: scene for scene in plan.scenes if scene.simulated}
         others = (self._settled_in(scene) for scene in simulated.values() if scene.start_of)
         yield from map(self.start, ({scene.name: scene for scene in others} | simulated).values())
-        taught = (task for network in plan.networks for task in self.ground_truth(network))
+        networks = [self.obtained(network) for network in plan.networks]
+        trained = (n for n, task in zip(plan.networks, networks) if isinstance(task, TrainNetwork))
+        taught = (task for network in trained for task in self.ground_truth(network))
         yield from {task.id: task for task in taught}.values()
-        yield from map(self.network, plan.networks)
+        yield from networks
         for _, cells in groupby(plan.cells, key=lambda cell: cell.scene):
             timed = [cell for cell in cells if cell.timed]
             for first in range(0, len(timed), AT_ONCE):
@@ -121,6 +124,17 @@ class Schedule:
             **of_scene | {"inputs": inputs},
         )  # fmt: skip
 
+    def obtained(self, network: Network) -> TrainNetwork | TakeNetwork:
+        """Return the task that trains a network, or takes it from a file where the plan wants no trainings.
+
+        A network of a user's file is trained all the same, unless its file is there.
+        """
+        task = self.network(network)
+        if self.plan.trained is None or task.chosen is None:
+            return task
+        taken = take_network(task, self.plan.trained)
+        return task if network.users_training and taken.source is None else taken
+
     def network(self, network: Network) -> TrainNetwork:
         """Return the task that trains a network."""
         if network not in self._networks:
@@ -151,8 +165,10 @@ class Schedule:
             home=network.declared_in, seed=network.seed, garment=network.garment, steps=steps,
             motions=motions, held_out=held_out, simulated=simulated, clips=clips, device=self.plan.device,
         )  # fmt: skip
-        # What was interrupted resumes where all that it depends on is the same.
-        return dataclasses.replace(task, key=digest(dependencies(task)))
+        parts = dependencies(task)
+        if truth:
+            parts["simulations"] = digest([[t.title, without_machine(dependencies(t))] for t in truth])
+        return dataclasses.replace(task, parts=parts)
 
     # --- cells ---------------------------------------------------------------------------------------------
 

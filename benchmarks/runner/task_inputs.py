@@ -47,13 +47,15 @@ class TaskInputs:
         if not scene.dressed:
             return {"inputs": inputs, "modules": modules}
         inputs |= self.of_body(scene.garment) | {"motion": self.motion(scene.motion)}
+        if scene.motion not in self.plan.motions.train:  # those have a length of their own
+            inputs["frames"] = self.preset.frames
         if scene.part == "clip":
             inputs["clip_frames"] = self.preset.clip_frames
         return {"inputs": inputs, "modules": (*modules, ASSETS)}
 
     def of_body(self, garment: str) -> dict[str, Any]:
         """Return the inputs that the assets are made from."""
-        names = ("garment_vertices", "frames", "train_frames")
+        names = ("garment_vertices", "train_frames")
         sizes = {name: getattr(self.preset, name) for name in names} | {"garment": garment}
         digests: dict[str, str] = {}
         if user_body := self.plan.inputs.body:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from benchmarks import provenance
 from benchmarks.cell import TaskId
 from benchmarks.declarations import load
 from benchmarks.fingerprint.digest import digest
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
     from benchmarks.training import Training
     from snug.motion.motion import Motion
+    from snug.networks.trained_model import TrainedModel
 
 LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
@@ -34,8 +36,8 @@ class TrainNetwork(Task):
     the file that declares an energy of its recipe. motions: what it learns from; held_out: motions that
     stop it, where it goes on until it has converged; simulated: motion -> the task that simulates it, where
     it learns from simulations; clips: those that simulate mixed clips. device: cpu or cuda, for every part of
-    a step. key: with equal simulations, a training of the same key that was killed goes on from its last
-    checkpoint, and ends as it would have.
+    a step. parts: name -> digest or version of all that the network depends on: inputs, source files,
+    packages, data, and as `simulations` the code and inputs of what simulates.
     """
 
     kind = "network"
@@ -53,7 +55,23 @@ class TrainNetwork(Task):
     simulated: Mapping[str, TaskId]
     clips: tuple[TaskId, ...] = ()
     device: str
-    key: str = ""
+    parts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        """Digest of the parts.
+
+        With equal simulations, a training of the same key that was killed goes on from its last checkpoint,
+        and ends as it would have.
+        """
+        return digest(dict(self.parts))
+
+    @property
+    def split_parts(self) -> dict[str, dict[str, str]]:
+        """The parts as `inputs` and as `software`: source, packages and data."""
+        inputs = {name: part for name, part in self.parts.items() if name in self.inputs}
+        software = {name: part for name, part in self.parts.items() if name not in inputs}
+        return {"inputs": inputs, "software": software}
 
     def path(self, folder: RunFolder) -> Path:
         """Return the path of the trained model."""
@@ -114,22 +132,30 @@ class TrainNetwork(Task):
             )  # fmt: skip
         if reported < self.steps:  # it ended early
             context.tell(self.steps - reported)
+        model.origin = self._origin(needed, left_out=[name for name in self.motions if name not in motions])
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
         checkpoint.delete()
-        result = {
-            "recipe": model.recipe.name,
-            "left_out": [motion for motion in self.motions if motion not in motions],
+        return Outcome(result=facts_of(model), files=(run.relative(path),))
+
+    def _origin(self, needed: Mapping[TaskId, Outcome], *, left_out: list[str]) -> dict[str, Any]:
+        """Return what the file of the model says of its training; left_out: motions without simulation."""
+        simulated = self.chosen.simulated if self.chosen else None
+        return {
+            "network": self.training,
+            "garment": self.garment,
+            "motions": [name for name in self.motions if name not in left_out],
+            "held_out": list(self.held_out),
+            "simulated_by": simulated.method if simulated else "",
+            "left_out": left_out,
             "clips_left_out": sum(len(needed[id].result["left_out"]) for id in self.clips if id in needed),
-            "frames": model.summary.get("training_frames", 0),
-            "seconds": model.seconds,
-            "setup_seconds": model.setup_seconds,
-            "megabytes": model.megabytes,
-            "steps": model.steps,
-            "validation": model.summary.get("validation", {}),
-            "last": dict(model.history[-1]) if model.history else {},
+            "data_seconds": sum(needed[id].seconds for id in self.reads if id in needed),
+            "commit": provenance.commit(),
+            "hardware": provenance.hardware(self.device),
+            "versions": provenance.versions(),
+            "digest": self.key,
+            **self.split_parts,
         }
-        return Outcome(result=result, files=(run.relative(path),))
 
     def _mixed(
         self, assets: Assets, folder: RunFolder, needed: Mapping[TaskId, Outcome]
@@ -155,3 +181,19 @@ class TrainNetwork(Task):
     @staticmethod
     def _is_whole(outcome: Outcome | None) -> bool:
         return outcome is not None and bool(outcome.result["whole"])
+
+
+def facts_of(model: TrainedModel) -> dict[str, Any]:
+    """Return the result of the task that trained a model, or took it from a file."""
+    return {
+        "recipe": model.recipe.name,
+        "left_out": model.origin["left_out"],
+        "clips_left_out": model.origin["clips_left_out"],
+        "frames": model.summary.get("training_frames", 0),
+        "seconds": model.seconds,
+        "setup_seconds": model.setup_seconds,
+        "megabytes": model.megabytes,
+        "steps": model.steps,
+        "validation": model.summary.get("validation", {}),
+        "last": dict(model.history[-1]) if model.history else {},
+    }

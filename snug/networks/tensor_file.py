@@ -6,11 +6,12 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-from torch import Tensor
+from typing import TYPE_CHECKING, Any
 
 from reference_sim.files.atomic_files import replacing
+
+if TYPE_CHECKING:  # a header is read without torch
+    from torch import Tensor
 
 HEADER = "snug"  # name of our entry in the file's header
 DIGEST = "digest"  # entry of the header: of everything else in the file
@@ -34,16 +35,33 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Read tensors and header. Raises TensorFileError for a missing, broken, changed or foreign file."""
+    tensors, text = _read(path, "pt")
+    header = _parsed(path, text)
+    if header.pop(DIGEST, None) != _digest(tensors, header):
+        raise TensorFileError(f"{path}: is not as it was written: copy it again, or train again")
+    return tensors, header
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """Read the header alone, without torch and unchecked against its digest. Raises TensorFileError."""
+    return _parsed(path, _read(path, "numpy", tensors=False)[1])
+
+
+def _read(path: Path, framework: str, *, tensors: bool = True) -> tuple[dict[str, Tensor], str | None]:
     from safetensors import SafetensorError, safe_open
 
     if not path.is_file():
         raise TensorFileError(f"{path}: no such model file")
     try:
-        with safe_open(path, framework="pt") as stored:
+        with safe_open(path, framework=framework) as stored:
             text = (stored.metadata() or {}).get(HEADER)
-            tensors = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
+            names = stored.keys() if tensors else ()
+            return {name: stored.get_tensor(name) for name in names}, text
     except (SafetensorError, OSError, ValueError, RuntimeError, AttributeError, TypeError) as error:
         raise TensorFileError(f"{path}: not a safetensors file ({error})") from error
+
+
+def _parsed(path: Path, text: str | None) -> dict[str, Any]:
     if text is None:
         raise TensorFileError(f"{path}: no model of this project (its header has no '{HEADER}' entry)")
     try:
@@ -52,9 +70,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
         raise TensorFileError(f"{path}: broken header ({error})") from error
     if not isinstance(header, dict):
         raise TensorFileError(f"{path}: broken header (no JSON object)")
-    if header.pop(DIGEST, None) != _digest(tensors, header):
-        raise TensorFileError(f"{path}: is not as it was written: copy it again, or train again")
-    return tensors, header
+    return header
 
 
 def select_tensors(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:

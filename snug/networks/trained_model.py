@@ -14,6 +14,7 @@ from snug.networks.frame_layout import round_matrices
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.recipes.recipe import Recipe
+from snug.trained import trained_networks
 
 MODEL_FORMAT = "snug-model-9"
 _TYPES: dict[str, Any] = {
@@ -43,6 +44,8 @@ class TrainedModel:
             frames], and as `seconds/<part>` the mean time of the parts of a step.
         summary: numbers and names of high windows, of updates left out, of returns to good weights.
         unit: of the loss: joules, or a distance from the simulated vertices.
+        origin: what is known of its training: data, commit, versions, processor, and digests of all that it
+            depends on, see benchmarks.tasks.training; empty where nobody noted it.
         precision: of the matrices in roll-outs, one of frame_layout.PRECISIONS; not in its file.
 
     Example:
@@ -64,6 +67,7 @@ class TrainedModel:
     history: list[dict[str, float]] = field(default_factory=list)
     summary: dict[str, Any] = field(default_factory=dict)
     unit: str = "J"
+    origin: dict[str, Any] = field(default_factory=dict)
     precision: str = "float32"
 
     @property
@@ -90,13 +94,27 @@ class TrainedModel:
             "vertices": self.vertices,
             "pins": [int(pin) for pin in self.network.pins],
             **{name: getattr(self, name) for name in _COPIED},
+            "origin": self.origin,
         }
         return write_tensors(Path(path), self.network.state_dict(), metadata)
 
     @classmethod
     def load(cls, path: str | Path) -> TrainedModel:
-        """Read a model. Raises ModelFileError for a missing, broken or foreign file, or another format."""
-        path = Path(path)
+        """Read a model.
+
+        Args:
+            path: of its file, or the name of a network of the package (snug.trained), as `snug-tshirt`.
+
+        Raises:
+            ModelFileError: for an unknown name, and a missing, broken or foreign file, or another format.
+
+        >>> TrainedModel.load("tshirt-snug")
+        Traceback (most recent call last):
+        ...
+        snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the \
+package: pbns-tshirt, snug-tshirt, supervised-tshirt
+        """
+        path = _find_file(path)
         try:
             tensors, data = read_tensors(path)
         except TensorFileError as error:
@@ -111,7 +129,7 @@ class TrainedModel:
                 data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]
             )
             network.load_state_dict(tensors)
-            copied = {name: data[name] for name in _COPIED}
+            copied = {name: data[name] for name in _COPIED} | {"origin": data.get("origin", {})}
         except ModelFileError:
             raise
         except (KeyError, ValueError, RuntimeError, TypeError) as error:
@@ -119,6 +137,17 @@ class TrainedModel:
                 f"{path}: broken model file ({' '.join(str(error).split())[:200]})"
             ) from error
         return cls(data["kind"], network.eval(), recipe, **copied)
+
+
+def _find_file(path: str | Path) -> Path:
+    """Return the file of a model, by its path or by its name in the package. Raises ModelFileError."""
+    networks = trained_networks()
+    if isinstance(path, str) and path in networks:
+        return networks[path]
+    if isinstance(path, str) and not Path(path).suffix and not Path(path).exists():
+        known = ", ".join(networks)
+        raise ModelFileError(f"{path}: neither a model file nor a network of the package: {known}")
+    return Path(path)
 
 
 def _check(tensors: Mapping[str, Tensor], data: Mapping[str, Any]) -> None:
@@ -130,6 +159,8 @@ def _check(tensors: Mapping[str, Tensor], data: Mapping[str, Any]) -> None:
     for name, size in (("inputs", data["inputs"]), ("vertices", 3 * data["vertices"])):
         if size <= 0 or size not in sizes:
             raise ValueError(f"no tensor in it has the size of {name}, {data[name]}")
+    if not isinstance(data.get("origin", {}), dict):
+        raise ValueError("its origin is no mapping")
     if not all(type(pin) is int and 0 <= pin < data["vertices"] for pin in data["pins"]):
         raise ValueError(f"pins name no vertices 0..{data['vertices'] - 1}")
     if not 0 <= data["seed"] < 1 << 63:

@@ -31,6 +31,7 @@ FILES = {
     "reference_sim/terms/twist/lanes.py": "def make(term):\n    return 2 * term\n",
     "snug/network.py": "import torch\nfrom reference_sim.terms import Unknown\n",
     "snug/data/body.npz": "weights",
+    "snug/trained/snug-tshirt.safetensors": "a network, which counts where it is read",
     "benchmarks/methods/catalogue/all_methods.py": "from . import one, other\n",
     "benchmarks/methods/one.py": (
         '"""Words."""\nfrom typing import TYPE_CHECKING\nfrom reference_sim import Cloth\n'

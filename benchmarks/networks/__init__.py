@@ -1,0 +1,1 @@
+"""The command python -m benchmarks.networks: trainings of a run without its measurements."""

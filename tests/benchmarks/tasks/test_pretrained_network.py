@@ -1,0 +1,211 @@
+"""Networks from files in the place of trainings: which are taken, which refused, and what rows say."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+import torch
+
+from benchmarks.cell import Cell
+from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.networks import __main__ as command
+from benchmarks.networks import training_run
+from benchmarks.plan.make_plan import check_trained
+from benchmarks.plan.options import make_parser, request_of_run
+from benchmarks.plan.plan import Motions, Network, Plan, PlanError
+from benchmarks.plan.request import Request
+from benchmarks.results.row import BEFORE_FRAMES
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.console import remarks
+from benchmarks.runner.rows import rows_of
+from benchmarks.runner.run_json import described
+from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.tasks.pretrained_network import TakeNetwork, take_network, without_machine
+from benchmarks.tasks.task import Outcome
+from benchmarks.tasks.training import TrainNetwork
+from benchmarks.training import Training
+from snug import trained
+from snug.networks.trained_model import TrainedModel
+from snug.recipes.named import PBNS
+from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, context, dressed_scene
+from tests.benchmarks.tasks.test_cell_tasks import TINY, plan_of
+from tests.snug.training.dressing import swaying, tube_dress
+
+WALK = dataclasses.replace(swaying(16), name="walk")
+FEW = dataclasses.replace(TINY, steps={"snug": 2, "pbns": 2})
+RAN = Outcome(result={"seconds": 1.0, "frames": 4, "peak": 70.0, "terms": "strain"}, files=("x",))
+
+
+def plan_with(folder: Path, *methods: str, **changes) -> Plan:
+    """A plan of these methods in a scene of the T-shirt."""
+    cells = tuple(Cell(dressed_scene("kick", preset=FEW), find_method(m), 0, ("garments",)) for m in methods)
+    motions = Motions(train=("walk",), test=("kick",))
+    return plan_of(folder, **{"cells": cells, "motions": motions, "preset": FEW} | changes)
+
+
+def training_of(plan: Plan, name: str = "pbns", seed: int = 0) -> TrainNetwork:
+    return Schedule(plan).network(Network(name, seed, "tshirt"))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> tuple[Path, Outcome]:
+    """The folder of a run that trained PBNS, and what the training left."""
+    folder = tmp_path_factory.mktemp("made")
+    task = training_of(plan_with(folder, "pbns"))
+    return folder, task.run(context(folder, assets_of(tube_dress(), WALK)), {})
+
+
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    return TrainedModel.load(path).network.state_dict()
+
+
+def test_a_file_takes_the_place_of_the_training_that_made_it(made, tmp_path):
+    folder, outcome = made
+    task = training_of(plan_with(tmp_path, "pbns"))
+    taken = take_network(task, folder)
+    assert taken.id == task.id and not taken.skip({}) and taken.differing == ()
+    done = taken.run(context(tmp_path), {})
+    own, other = (weights(task.path(RunFolder(place))) for place in (folder, tmp_path))
+    assert all(torch.equal(own[name], other[name]) for name in own | other)
+    assert done.result == outcome.result | {
+        "pretrained": "pbns-seed0", "trained_at": done.result["trained_at"], "differing": [],
+        "data_seconds": 0,
+    }  # fmt: skip
+    assert done.origin["hardware"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"preset": dataclasses.replace(FEW, steps={"pbns": 3})}, "steps"),
+        ({"preset": dataclasses.replace(FEW, garment_vertices=99)}, "assets"),
+        ({"motions": Motions(train=("walk", "kick"))}, "motions"),
+    ],
+)
+def test_a_network_of_another_training_is_refused_and_says_in_what(made, tmp_path, changes, named):
+    taken = take_network(training_of(plan_with(tmp_path, "pbns", **changes)), made[0])
+    assert f"pbns-seed0.safetensors: a network of another training ({named})" in taken.skip({})
+    assert not taken.skip({}).count("\n")
+
+
+def test_how_long_tests_are_does_not_matter_to_a_training(made, tmp_path):
+    shorter = dataclasses.replace(FEW, frames=5, test_motions=3)
+    taken = take_network(training_of(plan_with(tmp_path, "pbns", preset=shorter)), made[0])
+    assert taken.refusal == "" and taken.differing == ()
+
+
+@pytest.mark.parametrize(
+    ("part", "differing"),
+    [
+        ("snug/training/training_loop.py", ("snug/training/training_loop.py",)),
+        ("package torch", ("package torch",)),
+        ("machine", ("machine",)),
+        ("benchmarks/results/row.py", ()),  # reports, and trains nothing
+        ("benchmarks/tasks/training.py", ("benchmarks/tasks/training.py",)),
+    ],
+)
+def test_other_code_packages_and_processors_are_said(made, tmp_path, part, differing):
+    task = training_of(plan_with(tmp_path, "pbns"))
+    assert part in task.parts
+    taken = take_network(dataclasses.replace(task, parts={**task.parts, part: "another"}), made[0])
+    assert taken.refusal == "" and taken.differing == differing
+
+
+def test_what_is_no_network_of_ours_is_refused_in_one_line(made, tmp_path):
+    task = training_of(plan_with(tmp_path, "pbns"))
+    assert "no pretrained network pbns-tshirt: python -m benchmarks.networks" in take_network(
+        task, tmp_path
+    ).skip({})
+    path = tmp_path / "pbns-tshirt.safetensors"
+    path.write_bytes(b"half")
+    assert "pbns-tshirt.safetensors: not a safetensors file" in take_network(task, tmp_path).refusal
+    dataclasses.replace(TrainedModel.load(task.path(RunFolder(made[0]))), origin={}).save(path)
+    assert "says nothing of its training" in take_network(task, tmp_path).refusal
+
+
+def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp_path):
+    own = dataclasses.replace(
+        find_method("pbns"), name="mine", trained="mine", training=Training("pbns", PBNS), declared_in=""
+    )
+    plan = plan_with(tmp_path, "pbns", "supervised", "untrained", trained=made[0])
+    cell = dataclasses.replace(plan.cells[0], entry=own)
+    tasks = tasks_of(dataclasses.replace(plan, cells=(*plan.cells, cell)))
+    kinds = {task.name: type(task) for task in tasks if task.kind == "network"}
+    assert kinds == {
+        "tshirt/pbns-seed0": TakeNetwork, "tshirt/supervised-seed0": TakeNetwork,
+        "tshirt/untrained-seed0": TrainNetwork, "tshirt/mine-seed0": TrainNetwork,
+    }  # fmt: skip
+    assert "data" not in {task.kind for task in tasks}
+    assert "data" in {task.kind for task in tasks_of(dataclasses.replace(plan, trained=None))}
+
+
+def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
+    plan = plan_with(tmp_path, "pbns", "skinning", trained=made[0])
+    (taken,) = (task for task in tasks_of(plan) if task.kind == "network")
+    done = taken.run(context(tmp_path), {})
+    done = dataclasses.replace(done, origin={"hardware": "a processor of theirs"})
+    outcomes = {cell.task_id: RAN for cell in plan.cells} | {taken.id: done}
+    outcomes |= {cell.metrics_id: Outcome(result={"energy/strain": 0.1}) for cell in plan.cells}
+    rows = rows_of(plan, tasks_of(plan), outcomes)
+    remark = f"pretrained network pbns-seed0 of {done.result['trained_at']}"
+    for row in rows:
+        assert row.reason.startswith(remark) == (row.method == "pbns")
+    assert all("a training here gives the same bits" in row.reason for row in rows if row.method == "pbns")
+    theirs = {row.metric for row in rows if row.hardware == "a processor of theirs"}
+    assert theirs == set(BEFORE_FRAMES)
+    assert described(plan, rows)["methods"]["pbns"]["label"] == "PBNS (pretrained)"
+    assert [line for line in remarks(rows, 0, {}) if line.startswith(f"not trained here: {remark}")]
+    differing = dataclasses.replace(done, result={**done.result, "differing": ["a", "b", "c", "d", "e"]})
+    rows = rows_of(plan, tasks_of(plan), outcomes | {taken.id: differing})
+    assert any("a training here differs in a, b, c and 2 more" in row.reason for row in rows)
+
+
+def test_the_option_takes_the_package_or_a_folder(tmp_path):
+    def folder(*words: str) -> Path | None:
+        return request_of_run(make_parser().parse_args(list(words)), words).trained
+
+    assert folder() is None and folder("--trained") == trained.FOLDER
+    assert folder("--trained", str(tmp_path)) == tmp_path
+    with pytest.raises(PlanError, match="no such folder"):
+        check_trained(Request(trained=tmp_path / "none"))
+    with pytest.raises(PlanError, match="leave out --scheduler"):
+        check_trained(Request(trained=tmp_path, scheduler="tcp://there"))
+
+
+def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp_path, monkeypatch, capsys):
+    packaged = tmp_path / "packaged"
+    monkeypatch.setattr(training_run, "FOLDER", packaged)
+    monkeypatch.setattr(
+        "benchmarks.runner.execute_plan.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
+    )
+    monkeypatch.setattr(Plan, "open_assets", lambda plan: assets_of(tube_dress(), WALK))
+    requests = []
+
+    def planned(request):
+        requests.append(request)
+        return plan_with(request.folder, *request.methods)
+
+    monkeypatch.setattr(command, "make_plan", planned)
+    words = ["--methods", "pbns", "-o", str(tmp_path / "nets")]
+    assert command.main([*words, "--into-package"]) == 0
+    assert "the package has none" in capsys.readouterr().out
+    assert set(requests[0].only) == {"failed", "stale", "missing"}
+    first = (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes()
+    assert (packaged / "pbns-tshirt.safetensors").read_bytes() == first
+    assert command.main(words) == 0  # nothing to do
+    assert (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes() == first
+    assert "the bits of the package's" in capsys.readouterr().out
+    model = TrainedModel.load(packaged / "pbns-tshirt.safetensors")
+    model.network.offsets.weight.data += 0.5
+    model.save(packaged / "pbns-tshirt.safetensors")
+    assert command.main(words) == 0
+    assert "differs from the package's by up to 0.5" in capsys.readouterr().out
+    assert command.main([*words, "--preset", "smoke", "--into-package"]) == 2
+    assert "networks of preset quick" in capsys.readouterr().err
+
+
+def test_parts_of_simulations_do_not_depend_on_the_machine():
+    parts = {"machine": "1", "package numba": "0.6", "reference_sim/cloth.py": "2", "benchmarks/cell.py": "3"}
+    assert without_machine(parts) == {"reference_sim/cloth.py": "2"}

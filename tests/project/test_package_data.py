@@ -1,0 +1,37 @@
+"""A wheel has every data file of the packages, and the licences."""
+
+from __future__ import annotations
+
+import tomllib
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+LAYERS = ("reference_sim", "snug", "benchmarks", "reports")
+SOURCE = (".py", ".pyi", ".pyc", ".nbi", ".nbc")
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def data_files() -> list[Path]:
+    """Return the files of the packages that are no source, as paths below the root."""
+    folders = [path.parent for layer in LAYERS for path in (ROOT / layer).rglob("__init__.py")]
+    files = [path for folder in folders for path in folder.iterdir() if path.is_file()]
+    return [path.relative_to(ROOT) for path in files if path.suffix not in SOURCE]
+
+
+def test_every_data_file_is_named_among_the_data_of_its_package():
+    patterns = SETTINGS["tool"]["setuptools"]["package-data"]
+    files = data_files()
+    assert any(path.suffix == ".safetensors" for path in files) and len(files) > 8
+    left_out = [
+        path.as_posix()
+        for path in files
+        if not any(fnmatchcase(path.name, p) for p in patterns.get(".".join(path.parts[:-1]), ()))
+    ]
+    assert left_out == []
+
+
+def test_the_licences_are_there():
+    named = SETTINGS["project"]["license-files"]
+    notices = [path.relative_to(ROOT).as_posix() for path in ROOT.rglob("snug/**/NOTICE.md")]
+    assert {"LICENSE", *notices} == set(named) and all((ROOT / name).is_file() for name in named)
