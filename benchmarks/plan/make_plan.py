@@ -20,8 +20,8 @@ from benchmarks.provenance import usable_cores
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
-from reference_sim.files.atomic_files import demand_writable_folder
 from benchmarks.scenes.textile_tests import textile_tests
+from reference_sim.files.atomic_files import demand_writable_folder
 from snug.garments.options import GarmentFile
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
