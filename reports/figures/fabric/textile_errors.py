@@ -36,17 +36,17 @@ class TextileErrors(Figure[dict[str, list[Point]]]):
     def draw(self, run: Run, data: dict[str, list[Point]]) -> Iterator[Drawing]:
         """Draw the panels side by side."""
         figure = new_figure(PAGE_WIDTH, 3.1)
-        reference = None
         for axes, (test, points) in zip(figure.subplots(1, len(data), squeeze=False)[0], data.items()):
             reference = value_of(rows_of_test(run, test), run.reference, TIME)
             draw_points(axes, run, points, reference, indistinct(run, rows_of_test(run, test), ERROR))
             axes.set(xlabel="run time [ms per frame]", title=PANELS[test])
             grid(axes)
-        draw_legend(figure, run, [p for points in data.values() for p in points], reference)
+        draw_legend(figure, run, [p for points in data.values() for p in points], None)
         caption = (
             "Textile tests: mean error over the fabrics against run time; lower left is better. Bending "
             "length: distance from the exact one. Drape coefficient: difference from the reference's; bars: "
-            "the change by a perturbed reference; grey: within it. Dotted: the reference. Joined: a family, "
+            "the change by a perturbed reference. Grey: no more than that of the reference and of its "
+            "perturbed runs. Dotted: the reference's run time. Joined: a family, "
             "its first and last number beside."
         )
         yield Drawing(figure, self.name, caption)
