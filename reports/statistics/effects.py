@@ -270,7 +270,8 @@ def _by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int
     values: dict[tuple[str, int], list[float]] = {}
     for (scene, seed), value in cells.items():
         values.setdefault((recording_of(scene), seed), []).append(value)
-    return {cell: float(np.mean(of_cell)) for cell, of_cell in values.items()}
+    # Where all are one number their mean is it, to the bit: what every motion repeats is certain.
+    return {cell: own[0] if len(set(own)) == 1 else float(np.mean(own)) for cell, own in values.items()}
 
 
 def _grid(mean: Mean, scale: str) -> np.ndarray:

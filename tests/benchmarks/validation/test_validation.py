@@ -25,7 +25,7 @@ def marked(case):
     return pytest.param(case, id=case.name, marks=marks)
 
 
-@pytest.mark.parametrize("case", map(marked, KNOWN_ANSWERS))
+@pytest.mark.parametrize("case", [marked(case) for case in KNOWN_ANSWERS])
 def test_a_known_answer_is_found(case):
     row = case.run()
     assert row.status == "ok", row.reason

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import inspect
-import re
 import warnings
 from dataclasses import replace
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -24,7 +22,6 @@ from reference_sim.energies import (
 )
 from reference_sim.kernels import fast_kernels
 from reference_sim.kernels.fast_kernels import (
-    OF_VERTICES,
     USES,
     SlowPathWarning,
     fast_kernel,
@@ -38,9 +35,7 @@ from snug.recipes.recipe import Recipe
 from snug.training.losses.physics_loss import PhysicsLoss
 from tests.reference_sim.meshes import patch
 
-METHOD = Path(__file__).resolve().parents[3] / "docs" / "method.md"
 TERMS = {name: getattr(energies, name) for name in MODULE_OF if name not in ("Energy", "Step")}
-COLUMNS = (("float32_lanes",), ("vertex_block", "constraint"), ("training_batch",))  # of the table in docs
 
 
 class Softer(StretchStVK):
@@ -128,23 +123,3 @@ def test_a_kernel_is_that_of_its_own_term(cloth, made):
     lanes = np.repeat(x[None, ..., None], 16, axis=-1)
     one, two = (fast_kernel(term, "training_batch")(lanes, np.zeros_like(lanes)) for term in (soft, stiff))
     assert two == pytest.approx(2 * one) and (one > 0).all()
-
-
-def test_the_table_of_kernels_in_the_documents_is_that_of_the_code():
-    """Each row has the term, then the files of its kernels by solver, as the class declares them."""
-
-    def files(term: type, uses: tuple[str, ...]) -> set[str]:
-        declared = vars(term).get("kernels", {})
-        uses = uses if set(uses) & set(declared) or uses == ("training_batch",) else OF_VERTICES
-        module = term.__module__
-        named = [declared[use].rpartition(":")[0] or module for use in uses if use in declared]
-        return {name.removeprefix("reference_sim.energies.").replace(".", "/") + ".py" for name in named}
-
-    expected = {name: [files(term, uses) for uses in COLUMNS] for name, term in TERMS.items()}
-    expected = {name: columns for name, columns in expected.items() if any(columns)}
-    text = METHOD.read_text(encoding="utf-8").partition("| fast kernels of")[2].partition("\n\n")[0]
-    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", text, re.M)
-    table = {
-        name: [set(re.findall(r"`([\w/]+\.py)`", cell)) for cell in row.split("|")] for name, row in rows
-    }
-    assert table == expected

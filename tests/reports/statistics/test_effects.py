@@ -151,6 +151,9 @@ def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
         return np.mean([low <= 0.0 <= high for low, high in (interval() for _ in range(400))])
 
     assert 0.93 <= held() <= 0.98
+    same = {(scene, 0): 99.7 for scene in MOTIONS}
+    constant = Mean(99.7, None, 20, 1, 20, seeded=False, cells=same)
+    assert effect(constant, replace(constant, cells=dict.fromkeys(same, 0.1)), DIFFERENCE).interval is None
     if alike:
         monkeypatch.setattr(effects, "recording_of", lambda scene: scene)
         assert held() < 0.85
