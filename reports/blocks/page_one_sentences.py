@@ -190,7 +190,8 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
-            f"{number(apart[1], 2)} 1/m in mean curvature: smaller errors are as small as a right answer's"
+            f"{number(apart[1], 2)} 1/m in mean curvature: errors below these cannot be distinguished from "
+            "none"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -244,8 +245,8 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         partly_measured = set(rows["method"]) - {point.method for point in points}
         whole = ", of what was measured in all scenes," if partly_measured else ""
         sentences = [
-            f"nothing{whole} is as fast and nearer to the minimum of its own time steps, which {snug} "
-            f"exceeds by {number(network.error)} J{network.fewer} (energy gap)"
+            f"nothing{whole} is as fast and has an energy gap, energy above the minimum of each time step, "
+            f"below the {number(network.error)} J{network.fewer} of {snug}"
         ]
     else:
         within = " within repeats" if best.time > network.time else ""
@@ -256,8 +257,8 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
             f"{best.fewer}, below the {number(network.error)} J{network.fewer} of {snug}{scatter}"
         ]
     if solver:
-        label, time = run.label(solver.method), number(solver.time)
-        sentences.append(f"the fastest solver stopped early that is as near is {label}, {time} ms a frame")
+        costs = f"{run.label(solver.method)}, {number(solver.time)} ms a frame"
+        sentences.append(f"the fastest solver stopped early with as small a gap is {costs}")
     return sentences
 
 

@@ -66,7 +66,8 @@ def overview(run: Run) -> list[Table]:
     if not columns:
         return []
     timed_in = ", ".join(scenes) if len(scenes) <= NAMED else f"{len(scenes)} scenes"
-    caption = f"{garment}: means over its motions" if garment else f"Means over {timed_in}"
+    of_motions = f"{garment}: geometric mean over motions of relative excess, means of the rest"
+    caption = of_motions if garment else f"Means over {timed_in}"
     caption += f"; gaps and run times over {timed_in}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)

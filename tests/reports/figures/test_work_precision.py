@@ -295,9 +295,9 @@ def test_garments_have_crossings_by_themselves():
 def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():
     run = run_of(all_rows())
     assert cost_sentence(run).endswith(
-        " Nothing is as fast and nearer to the minimum of its own time steps, which SNUG exceeds by 0.100 J "
-        "(energy gap). The fastest solver stopped early that is as near is L-BFGS, 20 iterations, 16.0 ms a "
-        "frame."
+        " Nothing is as fast and has an energy gap, energy above the minimum of each time step, below the "
+        "0.100 J of SNUG. The fastest solver stopped early with as small a gap is L-BFGS, 20 iterations, "
+        "16.0 ms a frame."
     )
     (table,) = error_rivals(run)
     assert table.rows == (
@@ -332,7 +332,7 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
     run = run_of(rows)
     frame = run.cells("speed", "garments")
     (sentence,) = page_one_sentences._rivals(run, frame, ["a", "b"])
-    assert sentence.startswith("nothing, of what was measured in all scenes, is as fast and nearer")
+    assert sentence.startswith("nothing, of what was measured in all scenes, is as fast and has")
     assert page_one_sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
 
 
