@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.results.row import USABLE, Row
-from benchmarks.runner.rows import DECLARED, NOT_FALLING, PRETRAINED, SPREAD
+from benchmarks.runner.rows import DECLARED, NOT_FALLING, SPREAD
+from benchmarks.tasks.pretrained_network import PRETRAINED
 
 COLUMNS = (
     ("energy/total", "total J"),

@@ -13,6 +13,7 @@ from benchmarks.metrics import find_metric
 from benchmarks.plan.plan import Plan
 from benchmarks.results.ensemble import is_member, spread
 from benchmarks.results.row import REFERENCE_TOLERANCE, Row
+from benchmarks.tasks.pretrained_network import PRETRAINED
 from benchmarks.tasks.task import Outcome, Task
 from benchmarks.tasks.training import TrainNetwork
 
@@ -20,7 +21,6 @@ MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
 GAP = "gap/energy"
 DECLARED = "declared by its author, not measured"
-PRETRAINED = "pretrained"  # in the result of a task, and first word of a remark: its network is of a file
 MOST_NAMED = 3  # names of what differs in a remark
 NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
 ROUND_OFF = 1e-6  # [J] a gap below it counts as none: who is called lower there is chance

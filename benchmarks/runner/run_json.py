@@ -21,7 +21,7 @@ from benchmarks.results.row import OF_TRAINING, Row, with_provenance
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
-from benchmarks.runner.rows import PRETRAINED
+from benchmarks.tasks.pretrained_network import PRETRAINED
 from snug.trained import FOLDER
 
 if TYPE_CHECKING:

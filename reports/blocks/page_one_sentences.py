@@ -206,19 +206,20 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
             "The reference is converged in each time step of 1/30 s and not in the size of the step: with "
             f"{count} steps a frame {' and '.join(words)} as large"
         )
-    counted = paper_claims.counts(run)
+    lines = paper_claims.judged(run)
+    counted = paper_claims.counts(lines)
     if counted:
         total = counted.total()
         claims = f"{total} primary claim{'' if total == 1 else 's'}"
         sentences.append(f"of the paper's {claims} {paper_claims.in_words(counted)}")
-        sentences += _claims_that_fail(run)
+        sentences += _claims_that_fail(run, lines)
     return _joined(sentences)
 
 
-def _claims_that_fail(run: Run) -> list[str]:
+def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> list[str]:
     """Return a sentence that names the primary claims that do not hold, none where there are none."""
     failed = []
-    for line in paper_claims.judged(run):
+    for line in lines:
         if line.claim.primary and line.verdict == paper_claims.FAILS:
             lower, higher = run.label(line.claim.lower), run.label(line.claim.higher)
             measure = measure_of(line.compared).title.lower()

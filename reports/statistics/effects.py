@@ -253,7 +253,7 @@ def _moved_by(mean: Mean, name: str, scale: str) -> float:
             changes[cell] = moved / value - 1.0
         else:
             changes[cell] = float(on_scale(moved, scale)) - float(on_scale(value, scale))
-    return float(np.mean(list(_by_recording(changes).values())))
+    return float(np.mean(list(mean_by_recording(changes).values())))
 
 
 def recording_of(scene: str) -> str:
@@ -265,7 +265,7 @@ def recording_of(scene: str) -> str:
     return re.sub(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)", r"\1", scene)
 
 
-def _by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:
+def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:
     """Return (recording, seed) -> mean over the segments of the recording."""
     values: dict[tuple[str, int], list[float]] = {}
     for (scene, seed), value in cells.items():
@@ -276,7 +276,7 @@ def _by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int
 
 def _grid(mean: Mean, scale: str) -> np.ndarray:
     """Return (M,S): value of each recording with each seed on the scale, both in order."""
-    cells = _by_recording({cell: float(on_scale(value, scale)) for cell, value in mean.cells.items()})
+    cells = mean_by_recording({cell: float(on_scale(value, scale)) for cell, value in mean.cells.items()})
     recordings, seeds = (sorted(set(names)) for names in zip(*cells))
     return np.array([[cells[recording, seed] for seed in seeds] for recording in recordings])
 

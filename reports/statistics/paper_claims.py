@@ -8,6 +8,7 @@ run can test each. All other claims are exploratory: their p-values are not corr
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import pandas as pd
@@ -170,9 +171,9 @@ class Judged:
     remark: str = ""
 
 
-def counts(run: Run) -> Counter[str]:
-    """Count the claims of the primary family by verdict."""
-    return Counter(line.verdict for line in judged(run) if line.claim.primary)
+def counts(lines: Iterable[Judged]) -> Counter[str]:
+    """Count the claims of the primary family, of these, by verdict."""
+    return Counter(line.verdict for line in lines if line.claim.primary)
 
 
 def in_words(verdicts: Counter[str]) -> str:

@@ -19,7 +19,15 @@ import numpy as np
 import pandas as pd
 
 from reports.run.finished_run import Metric, Run
-from reports.statistics.effects import EXCESS, SOFTENING, Effect, effect, off_scale, on_scale, recording_of
+from reports.statistics.effects import (
+    EXCESS,
+    SOFTENING,
+    Effect,
+    effect,
+    mean_by_recording,
+    off_scale,
+    on_scale,
+)
 from reports.statistics.means_and_spreads import Mean, pair
 
 TOTAL = "energy/total"
@@ -127,15 +135,12 @@ class Excess:
     @property
     def mean(self) -> float:
         """Arithmetic mean over recordings, of a recording over its segments."""
-        return float(np.mean([np.mean(values) for values in self.by_recording]))
+        return float(np.mean(list(mean_by_recording(self._cells).values())))
 
     @property
-    def by_recording(self) -> list[list[float]]:
-        """Values of the segments of each recording; of a motion that is no segment, its own."""
-        values: dict[str, list[float]] = {}
-        for scene, value in self.by_motion.items():
-            values.setdefault(recording_of(scene), []).append(value)
-        return list(values.values())
+    def _cells(self) -> dict[tuple[str, int], float]:
+        """Values as cells of one seed."""
+        return {(scene, 0): value for scene, value in self.by_motion.items()}
 
     @property
     def worst(self) -> tuple[str, float]:
@@ -146,7 +151,8 @@ class Excess:
     @property
     def without_each_recording(self) -> tuple[float, float]:
         """Smallest and largest typical value when one recording is left out."""
-        cells = np.array([np.mean(on_scale(np.array(values), EXCESS)) for values in self.by_recording])
+        scaled = {cell: float(on_scale(value, EXCESS)) for cell, value in self._cells.items()}
+        cells = np.array(list(mean_by_recording(scaled).values()))
         if len(cells) < 2:
             return self.typical, self.typical
         left = (cells.sum() - cells) / (len(cells) - 1)

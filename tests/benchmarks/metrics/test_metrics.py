@@ -51,7 +51,7 @@ def test_curvature_of_a_sphere_holds_at_its_five_valent_vertices_too():
 
 
 def test_curvature_of_random_points_on_a_sphere_is_right_and_of_irregular_slivers_too_large():
-    """As the documents say of meshes that look so."""
+    """Mean curvature on a sphere and on slivers has the errors that the documents state."""
     random = np.random.default_rng(0)
     x = random.normal(size=(500, 3))
     x /= np.linalg.norm(x, axis=1)[:, None]

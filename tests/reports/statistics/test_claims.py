@@ -113,13 +113,13 @@ def test_the_primary_family_is_the_same_whatever_a_run_has_and_others_are_not_co
         rows += seeds("pbns", (1.1, 2.0, 2.9), f"energy/{term}")
     line = told(rows)[STRAIN]
     assert line.p == alone.p and line.compared.effect == alone.compared.effect
-    assert counts(run_of(rows)) == {"inconclusive": 3}
-    assert in_words(counts(run_of(rows))) == "3 are inconclusive"
+    assert counts(judged(run_of(rows))) == {"inconclusive": 3}
+    assert in_words(counts(judged(run_of(rows)))) == "3 are inconclusive"
     names = {"snug": "snug-paper", "pbns": "pbns-paper"}
     explored = [replace(r, method=names[r.method], pairing_group=names[r.method]) for r in rows]
     line = told(explored)["energy/strain", "snug-paper", "pbns-paper"]
     assert not line.claim.primary and line.p == pytest.approx(bare) and line.verdict == "holds"
-    assert counts(run_of(explored)) == {}
+    assert counts(judged(run_of(explored))) == {}
 
 
 def costs(method, train, data=0.0, setup=1.0):
@@ -192,7 +192,7 @@ def test_a_lost_seed_is_said_and_the_others_are_compared():
 
 def test_without_a_network_there_is_no_table():
     assert findings(run_of([row(method="simulation")])) == []
-    assert counts(run_of([row(method="simulation")])).total() == 0
+    assert counts(judged(run_of([row(method="simulation")]))).total() == 0
 
 
 def test_what_diverged_is_the_worse_one_and_not_a_dash():
@@ -206,7 +206,7 @@ def test_what_diverged_is_the_worse_one_and_not_a_dash():
     broken = [row(method="pbns"), row(method="snug", **gone)]
     line = told(broken)[STRAIN]
     assert (line.verdict, line.remark) == ("does not hold", ": the first diverged")
-    assert counts(run_of(broken)) == {"does not hold": 1}
+    assert counts(judged(run_of(broken))) == {"does not hold": 1}
     # What a network cost that diverged, nobody knows: it did not cost more for that.
     cost = {"metric": "cost/train", "unit": "s"}
     assert told([row(**cost), row(method="tailornet", **gone)]) == {}
