@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.results.json_file import ResultsError
+from benchmarks.results.protocol import BEFORE
 
 USABLE = ("ok", "stalled")  # statuses of cells that came to their last frame: their numbers count
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
@@ -34,7 +35,7 @@ class Row:
     skipped row has a reason and no value. `uncertainty`, in the unit of the value: its standard deviation
     over the ensemble of the reference (benchmarks.results.ensemble), or its standard error as a sample of
     frames; `moved`: by how much each member of the ensemble, in the reference's place, changes it.
-    `terms` names the energies of the scene, joined by "+".
+    `terms` names the energies of the scene, joined by "+". `protocol`: see benchmarks.results.protocol.
 
     Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
     Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
@@ -58,6 +59,7 @@ class Row:
     uncertainty: float | None = None
     moved: tuple[tuple[str, float], ...] = ()
     preset: str = ""
+    protocol: str = ""
     commit: str = ""
     hardware: str = ""
     dtype: str = "float64"
@@ -129,7 +131,7 @@ def row_to_cells(row: Row) -> dict[str, str]:
 
 def cells_to_row(cells: dict[str, str]) -> Row:
     """Return the row written in the cells. Raises ResultsError for a number or name that is none."""
-    values: dict[str, Any] = dict(cells)
+    values: dict[str, Any] = {"protocol": BEFORE} | cells
     try:
         for name in OPTIONAL_NUMBERS:
             values[name] = float(cells[name]) if cells[name] else None

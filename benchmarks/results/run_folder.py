@@ -14,6 +14,8 @@ from benchmarks.results.row import COLUMNS, Row, cells_to_row, row_to_cells
 from benchmarks.results.run_config import read_run_config, write_run_config
 from reference_sim.files.atomic_files import replacing
 
+LATER = ("moved", "protocol")  # columns that runs of before have not
+
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
     """Return the path of the model of that kind and seed."""
@@ -163,8 +165,8 @@ class RunFolder:
     def _rows(self, stream: Iterable[str]) -> list[Row]:
         rows = []
         reader = csv.DictReader(stream)
-        before = tuple(name for name in COLUMNS if name != "moved")
-        if tuple(reader.fieldnames or ()) not in (COLUMNS, before):
+        names = tuple(reader.fieldnames or ())
+        if names != tuple(name for name in COLUMNS if name in names or name not in LATER):
             raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
         for cells in reader:
             line = f"{self.rows_path}: line {reader.line_num}"

@@ -11,7 +11,9 @@ from typing import Any
 from benchmarks.cell import Cell, TaskId
 from benchmarks.metrics import find_metric
 from benchmarks.plan.plan import Plan
+from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
 from benchmarks.results.ensemble import is_member, spread
+from benchmarks.results.protocol import BEFORE, OWN
 from benchmarks.results.row import REFERENCE_TOLERANCE, Row
 from benchmarks.tasks.pretrained_network import PRETRAINED
 from benchmarks.tasks.task import Outcome, Task
@@ -73,8 +75,9 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
     machines = machines_of(trained, taught_by, outcomes)
     for suite in cell.suites:
         rows = _rows(
-            cell, suite, outcome, status=status, reason=reason, metrics=metrics, outside=plan.metrics
-        )
+            cell, suite, outcome, status=status, reason=reason, metrics=metrics, outside=plan.metrics,
+            origin=_origin(outcome, protocol_of(cell, plan)),
+        )  # fmt: skip
         for row in rows:
             machine = machines.get(row.metric)
             yield row if machine is None else dataclasses.replace(row, hardware=machine)
@@ -89,13 +92,14 @@ def _rows(
     reason: str,
     metrics: Mapping[str, Any],
     outside: tuple[str, ...],
+    origin: Mapping[str, Any],
 ) -> Iterator[Row]:
     """Yield a row for each metric of a cell in one suite; one that says why, where there is none."""
     scene, entry = cell.scene, cell.entry
     base = Row(
         suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric="cost/frame", unit="ms",
         status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
-        dtype=entry.dtype, **outcome.origin, garment=scene.garment, motion=scene.motion, part=scene.part,
+        dtype=entry.dtype, **origin, garment=scene.garment, motion=scene.motion, part=scene.part,
         family=entry.reporting.family or entry.name, level=entry.reporting.level, role=entry.role,
         base=entry.reporting.base, seeded=entry.seeded, pairing_group=entry.reporting.pairing_group,
     )  # fmt: skip
@@ -108,9 +112,9 @@ def _rows(
             why = DECLARED
         if name == "cost/spread" and value > 100.0 * SPREAD:
             why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
-        judged: dict[str, Any] = {}
+        judged: dict[str, Any] = {"protocol": OWN} if metric.declared_in else {}
         if metric.reference_tolerance is not None and entry.role == "reference":
-            judged = {"expected": 0.0, "tolerance": metric.reference_tolerance}
+            judged |= {"expected": 0.0, "tolerance": metric.reference_tolerance}
             if value > metric.reference_tolerance:
                 ended, why = "failed", f"{value:.3g} in a frame that claims to have converged"
         if not math.isfinite(value):
@@ -121,6 +125,14 @@ def _rows(
             moved=tuple((twin, change) for twin, change in moved if math.isfinite(change)),
             seeded=entry.seeded and metric.of == "answer", **judged,
         )  # fmt: skip
+
+
+def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
+    """Return the provenance of an outcome's rows; it keeps the protocol under which it was made."""
+    if not outcome.origin:
+        return {"protocol": protocol}
+    made = outcome.origin.get("protocol", BEFORE)
+    return {**outcome.origin, "protocol": OWN if protocol == OWN else made}
 
 
 def _finite(number: float | None) -> float | None:
@@ -231,7 +243,8 @@ def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
     for row in task.rows(outcome):
         reason = "; ".join(filter(None, (row.reason, outcome.remark)))
         unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
-        yield dataclasses.replace(row, **outcome.origin, reason=reason, unit=unit)
+        origin = _origin(outcome, protocol_of_case(row.scene, row.metric))
+        yield dataclasses.replace(row, **origin, reason=reason, unit=unit)
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:

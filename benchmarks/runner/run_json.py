@@ -17,6 +17,7 @@ from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.results import frame_energies
+from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import OF_TRAINING, Row, with_provenance
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -41,7 +42,10 @@ class RunLog:
         self.hardware = provenance.hardware(plan.device)
         # Only training uses an accelerator: its rows name it, see write_rows.
         hardware = provenance.hardware_line(self.hardware | {"accelerator": None})
-        self.origin = {"commit": provenance.commit(), "preset": plan.preset.name, "hardware": hardware}
+        self.origin = {
+            "commit": provenance.commit(), "preset": plan.preset.name, "protocol": NUMBER,
+            "hardware": hardware,
+        }  # fmt: skip
         self.cache = Cache(self.folder, only=plan.only, origin=self.origin)
         self.rows: list[Row] = []
         self.stages: list[dict[str, Any]] = []
@@ -50,6 +54,7 @@ class RunLog:
         self.config: dict[str, Any] = {
             "command": plan.command,
             "preset": plan.preset.name,
+            "protocol": {"number": NUMBER, "digest": DIGEST},
             "suites": list(plan.suites),
             "motions": {
                 f"{what} {garment}": list(names(garment))

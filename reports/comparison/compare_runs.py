@@ -10,6 +10,7 @@ from fnmatch import fnmatchcase
 import pandas as pd
 
 from benchmarks.results.json_file import ResultsError
+from benchmarks.results.protocol import BEFORE, LEVEL, one_protocol
 from reports.comparison.change import (
     BETTER,
     GONE,
@@ -26,7 +27,7 @@ from reports.comparison.change import (
 from reports.comparison.gone import CELL, endings, gone
 from reports.comparison.scenes import changed_scenes
 from reports.run.finished_run import SUITES, Metric, Run
-from reports.statistics.effects import DIFFERENCE, LEVEL, RATIO, Effect, effect
+from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means
 from reports.statistics.pareto import REPEATS, TIME, WHOLE
 from reports.statistics.relative_excess import relative_metric, with_relative_excess
@@ -68,8 +69,10 @@ def compare(
         shared: leave out what the later run lacks; otherwise it is a change for the worse.
 
     Raises:
-        ResultsError: where the presets differ or nothing is shared.
+        ResultsError: where presets or numbers of the protocol differ, or nothing is shared.
     """
+    if BEFORE not in (one.protocol, other.protocol):  # nobody knows by what protocol those of before are
+        one_protocol((one.protocol, other.protocol), "A and B")
     presets = [run.config.get("preset") for run in (one, other)]
     if presets[0] != presets[1]:
         raise ResultsError(f"A is of preset {presets[0]}, B of {presets[1]}: their numbers differ by design")

@@ -78,9 +78,10 @@ class Run:
 
     frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table` (of
     its metric) and `case` (the check or stress test that it is, else empty). changed: files that are not as
-    the run wrote them. frame_energies: lines of frame_energies.csv, empty without the file. histories: of the
-    trainings. roll_outs: reads stored roll-outs when they are asked for. problems: a sentence for each file
-    that could not be read, added to while roll-outs are read.
+    the run wrote them. protocol: of its rows; empty where all are a user's own. frame_energies: lines of
+    frame_energies.csv, empty without the file. histories: of the trainings. roll_outs: reads stored roll-outs
+    when they are asked for. problems: a sentence for each file that could not be read, added to while
+    roll-outs are read.
     """
 
     config: Mapping[str, Any]
@@ -88,6 +89,7 @@ class Run:
     metrics: Mapping[str, Metric]
     methods: Mapping[str, Method]
     changed: Sequence[str] = ()
+    protocol: str = ""
     frame_energies: pd.DataFrame = field(default_factory=pd.DataFrame)
     histories: Sequence[History] = ()
     roll_outs: NoRollOuts = field(default_factory=NoRollOuts)

@@ -10,6 +10,7 @@ import pandas as pd
 
 from benchmarks.results import frame_energies
 from benchmarks.results.json_file import ResultsError
+from benchmarks.results.protocol import one_protocol
 from benchmarks.results.run_folder import RunFolder, model_path
 from reference_sim.files.array_file import read_arrays
 from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
@@ -27,7 +28,8 @@ def read_run(folder: RunFolder) -> Run:
     """Read rows and declarations of a run; its roll-outs are read when they are asked for.
 
     Raises:
-        ResultsError: when run.json or results.csv is absent, broken or of an earlier version.
+        ResultsError: when run.json or results.csv is absent, broken or of an earlier version, or rows are of
+            two protocols, which no table may mix.
 
     >>> run = read_run(RunFolder("reports/runs/first"))  # doctest: +SKIP
     """
@@ -39,6 +41,7 @@ def read_run(folder: RunFolder) -> Run:
     run = make_run(config, rows, folder.changed(config))
     return replace(
         run,
+        protocol=one_protocol(run.frame["protocol"], folder.rows_path),
         frame_energies=_read_frame_energies(folder.frame_energies_path),
         roll_outs=RollOuts(folder, run.problems),
     )

@@ -16,16 +16,11 @@ from functools import cache
 import numpy as np
 
 from benchmarks.results.ensemble import spread
+from benchmarks.results.protocol import DRAWS, LEVEL, SEED, SOFTENING, TIE
 from reports.statistics.means_and_spreads import Mean
 
 RATIO, EXCESS, DIFFERENCE = "ratio", "excess", "difference"  # scales
 RANGE = "range"  # what the limits of a cost are
-LEVEL = 0.05  # of the two-sided tests, and what an interval leaves out
-TIE = 0.05  # share of a number up to which another one counts as equal
-# % of skinning's excess. Shares well above it are compared by their logarithm, those below by their
-# difference: arcsinh(x / SOFTENING) is one and the other, and defined for shares below zero.
-SOFTENING = 1.0
-DRAWS, SEED = 10_000, 20220619  # of the bootstrap; the same draws for every comparison
 
 
 def on_scale(values: np.ndarray | float, scale: str) -> np.ndarray | float:

@@ -10,10 +10,11 @@ import pandas as pd
 from scipy import stats
 
 from benchmarks.results.json_file import ResultsError
+from benchmarks.results.protocol import BEFORE, LEVEL
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
-from reports.statistics.effects import EXCESS, LEVEL, off_scale, on_scale
+from reports.statistics.effects import EXCESS, off_scale, on_scale
 from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
 
 PUBLISHED = Path(__file__).resolve().parents[1] / "published"
@@ -34,6 +35,8 @@ def published_beside(run: Run, method: str) -> str:
     except ResultsError:
         return ""  # of an earlier version
     if published.config.get("started") == run.config.get("started"):
+        return ""
+    if BEFORE != published.protocol != run.protocol:
         return ""
     ours, theirs = _by_seed(run, method), _by_seed(published, method)
     scenes = sorted(set(ours.index) & set(theirs.index))

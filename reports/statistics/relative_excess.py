@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from benchmarks.results.protocol import SOFTENING
 from reports.run.finished_run import Metric, Run
 from reports.statistics.effects import (
     EXCESS,
-    SOFTENING,
     Effect,
     effect,
     mean_by_recording,

@@ -18,13 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from benchmarks.results.protocol import LEAST_MOTIONS, LEVEL
 from reports.run.finished_run import Metric, Run
-from reports.statistics.effects import EXCESS, LEVEL, RANGE, Effect, cost_effect, effect
+from reports.statistics.effects import EXCESS, RANGE, Effect, cost_effect, effect
 from reports.statistics.means_and_spreads import Mean, pair
 from reports.statistics.relative_excess import compared_excess, relative_metric
 
 TIED, OPEN, LESS, MORE = "tie", "inconclusive", "less", "more"  # how the first stands to the second
-LEAST_MOTIONS = 4
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ COLUMNS = {
         "what each member of the reference's ensemble changes of the value, in its place: JSON, or empty",
     ),
     "preset": ("", "sizes of everything, as declared in run.json"),
+    "protocol": ("", "number of the protocol; 'own' where scene, metric or settings are a user's"),
     "commit": ("", "of the source that measured the row"),
     "hardware": ("", "processor and number of its cores"),
     "dtype": ("", "of the numbers computed with"),

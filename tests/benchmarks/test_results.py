@@ -13,11 +13,13 @@ import pytest
 
 from benchmarks.results import frame_energies
 from benchmarks.results.json_file import ResultsError
+from benchmarks.results.protocol import BEFORE, NUMBER, OWN
 from benchmarks.results.row import COLUMNS, Row, with_provenance
 from benchmarks.results.run_config import FORMAT
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
 from reference_sim.files.atomic_files import replacing
+from reports.run.reading import read_run
 
 ROWS = [
     Row("garments", "dressed/walk", "snug", 0, "energy/strain", "J", 0.1 + 0.2, terms="strain+gravity"),
@@ -50,6 +52,21 @@ def test_a_file_of_before_what_each_reference_changes_is_read(tmp_path):
     assert [r.moved for r in folder.read_rows()] == [(), ()]
 
 
+def test_rows_without_a_protocol_are_of_before_and_no_table_mixes_two(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.write_config({"preset": "quick"})
+    folder.write_rows(
+        [dataclasses.replace(ROWS[0], protocol=NUMBER), dataclasses.replace(ROWS[2], protocol=OWN)]
+    )
+    assert read_run(folder).protocol == NUMBER
+    text = pd.read_csv(folder.rows_path, dtype=str, keep_default_na=False)
+    text.drop(columns="protocol").to_csv(folder.rows_path, index=False)
+    assert read_run(folder).protocol == BEFORE
+    folder.write_rows([dataclasses.replace(ROWS[k], protocol=n) for k, n in ((0, "1.0"), (2, "1.1"))])
+    with pytest.raises(ResultsError, match=r"results\.csv: rows of protocols 1\.0 and 1\.1 do not stand"):
+        read_run(folder)
+
+
 def test_config_comes_back(tmp_path):
     folder = RunFolder(tmp_path)
     folder.write_config({"preset": "smoke", "seeds": [0, 1], "note": "λ"})
@@ -80,8 +97,8 @@ def test_a_row_that_says_nothing_true_is_refused(changes, word):
         ("", "line 1: the columns"),
         ("a,b\n1,2\n", "line 1: the columns"),
         (",".join(COLUMNS) + "\n1,2\n", f"line 2: {len(COLUMNS)} cells"),
-        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
-        (",".join(COLUMNS) + "\ns,c,m,0,x,J,1,ok,,,,,[2],,,,,1,,,,,,,,,false,\n", "line 2: column moved"),
+        (",".join(COLUMNS) + "\ns,c,m,zero,x,J,1,ok,,,,,,,,,,,1,,,,,,,,,false,\n", "line 2: column seed"),
+        (",".join(COLUMNS) + "\ns,c,m,0,x,J,1,ok,,,,,[2],,,,,,1,,,,,,,,,false,\n", "line 2: column moved"),
     ],
 )
 def test_a_broken_file_is_named_with_its_line(tmp_path, text, word):

@@ -1,0 +1,162 @@
+"""Definitions of the protocol, as values for a digest: what numbers depend on and no method brings.
+
+Digests are of contents (arrays, declared values, energies of a probe), never of source code: code that is
+written anew and computes the same has the same digests. `benchmarks.results.protocol` records number and
+digests; a test compares them with the code.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.presets import PRESETS, find_preset
+from benchmarks.results import protocol as recorded
+from benchmarks.results.ensemble import LEAST_MEMBERS, MEMBERS
+from benchmarks.results.row import REFERENCE_TOLERANCE
+from benchmarks.scene import Scene
+from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes
+
+PRESET = "quick"  # whose sizes the meshes of the digest have
+DECIMALS = 6  # [um, urad] of arrays: more may differ between processors
+DIGITS = 9  # of probed energies
+PROBED = ("hanging_sheet", "sheet_on_sphere")
+FALL = 0.12  # [m] of the probe: onto the sphere
+PATH = (0.0, 0.3, 1.0, 1.6)  # share of the fall in each frame of the probe: it accelerates
+OF_NAMES = ("name", "description", "module", "declared_in", "files")  # of a scene: prose and places of code
+
+
+def definitions() -> dict[str, Any]:
+    """Return part of the protocol -> what it defines, as values that `digest` takes.
+
+    >>> list(definitions())[:3]  # doctest: +SKIP
+    ['scenes', 'materials', 'motions']
+    """
+    return {part: make() for part, make in PARTS.items()}
+
+
+def _scenes() -> dict[str, Any]:
+    """Return declarations of all scenes, body and T-shirt, and what small scenes are built of."""
+    from snug.body.parametric_body import Body
+    from snug.garments.templates import find_template, tailor_tshirt
+    from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
+    from snug.training.simulated_data import settings_of
+
+    preset = find_preset(PRESET)
+    body = Body.load()
+    declared = all_scenes((*TEST, *VALIDATION), (*DYNAMIC_TEST, *DYNAMIC_VALIDATION))
+    built = {scene.name: scene.at(preset).build() for scene in SCENES}
+    return {
+        "declared": {name: _declared(scene) for name, scene in declared.items()},
+        "worn": settings_of(body, tailor_tshirt(body, vertices=preset.garment_vertices)),
+        "garments": {worn.garment: _defaults(find_template(worn.garment).tailor) for worn in GARMENT_SCENES},
+        "built": {
+            name: (
+                _rounded(scene.cloth.rest_positions), scene.cloth.faces, scene.terms, scene.dt, scene.frames,
+                _rounded(scene.start_state), scene.warm_up,
+            )
+            for name, scene in built.items()
+        },
+        "energies": {name: list(_probed(built[name])) for name in PROBED},
+    }  # fmt: skip
+
+
+def _defaults(function: Callable[..., Any]) -> dict[str, Any]:
+    parameters = inspect.signature(function).parameters.values()
+    return {p.name: p.default for p in parameters if p.default is not p.empty}
+
+
+def _declared(scene: Scene) -> dict[str, Any]:
+    return {name: value for name, value in vars(scene).items() if name not in OF_NAMES}
+
+
+def _rounded(array: np.ndarray) -> np.ndarray:
+    """Return the array as the digest takes it; a zero has no sign."""
+    return np.round(np.asarray(array, dtype=np.float64), DECIMALS) + 0.0
+
+
+def _probed(scene: Any) -> Iterator[tuple[str, list[str]]]:
+    """Yield each term and its energies in the last frames of a falling, waving sheet: what formulas give."""
+    from benchmarks.metrics.energies.energy import energy_series
+
+    wave = 0.04 * np.sin(9.0 * scene.start[:, [2, 0, 1]])
+    positions = np.stack([scene.start + share * (wave - [0.0, FALL, 0.0]) for share in PATH])
+    for term, series in energy_series(scene, [positions])[0].items():
+        yield term, [f"{value:.{DIGITS}g}" for value in series[2:]]
+
+
+def _materials() -> dict[str, Any]:
+    from benchmarks.fabrics.fabric import FABRICS
+    from reference_sim.energies.contact_penalty.definition import DEFAULT_MARGIN, DEFAULT_STIFFNESS
+    from reference_sim.material import GRAVITY, Material
+
+    return {
+        "cloth": asdict(Material()), "gravity": GRAVITY, "contact": (DEFAULT_STIFFNESS, DEFAULT_MARGIN),
+        "fabrics": [asdict(fabric) for fabric in FABRICS],
+    }  # fmt: skip
+
+
+def _motions() -> dict[str, Any]:
+    """Roles, and the content of every motion of the library; of whole recorded clips their frozen digests."""
+    from snug.motion import library
+    from snug.motion.recorded.table import CLIPS, SEGMENTS
+
+    roles = ("TRAIN", "VALIDATION", "TEST", "DYNAMIC_VALIDATION", "DYNAMIC_TEST")
+    made = (library.make_motion(name) for name in library.LIBRARY if name not in CLIPS)
+    return {
+        "roles": {role.lower(): getattr(library, role) for role in roles},
+        "clips": {name: clip.digest for name, clip in CLIPS.items()},
+        "segments": {name: list(segment) for name, segment in SEGMENTS.items()},
+        "made": {m.name: (_rounded(m.poses), _rounded(m.translations), m.fps) for m in made},
+    }
+
+
+def _metrics() -> dict[str, Any]:
+    from benchmarks.metrics import declared
+
+    without = ("title", "table", "declared_in")  # how a report shows it
+    return {
+        name: {field: value for field, value in asdict(metric).items() if field not in without}
+        for name, metric in declared().items()
+    }
+
+
+def _sampling() -> dict[str, Any]:
+    from benchmarks.metrics.energies import energy_gap
+    from benchmarks.metrics.motion import hem
+    from benchmarks.metrics.surface import body_intersections, surface_distance, swept_crossings
+
+    return {
+        "presets": {preset.name: asdict(replace(preset, description="")) for preset in PRESETS},
+        "gap": (energy_gap.PRECISION, energy_gap.NEGLIGIBLE, energy_gap.ITERATIONS),
+        "hem": (hem.HELD, hem.SHIFTING, hem.MAX_LAG, hem.SHORTEST, hem.NO_MOTION),
+        "body": (body_intersections.SAMPLED_FRAMES, body_intersections.OFFSET),
+        "surface": surface_distance.SAMPLED_FRAMES,
+        "crossings": swept_crossings.SAMPLED_STEPS,
+    }
+
+
+def _reference() -> dict[str, Any]:
+    return {"ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": REFERENCE_TOLERANCE}
+
+
+def _statistics() -> dict[str, Any]:
+    return {
+        "level": recorded.LEVEL, "tie": recorded.TIE, "softening": recorded.SOFTENING,
+        "motions": recorded.LEAST_MOTIONS, "bootstrap": (recorded.DRAWS, recorded.SEED),
+    }  # fmt: skip
+
+
+PARTS: dict[str, Callable[[], dict[str, Any]]] = {
+    "scenes": _scenes,
+    "materials": _materials,
+    "motions": _motions,
+    "metrics": _metrics,
+    "reference": _reference,
+    "sampling": _sampling,
+    "statistics": _statistics,
+}

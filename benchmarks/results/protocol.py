@@ -1,0 +1,58 @@
+"""Number of the benchmark's protocol, its recorded digests, and the rules of verdicts that reports apply.
+
+The number stands for all that a result depends on and that no method brings itself: see
+`benchmarks.protocol`. Two numbers of the same protocol can stand in one table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from benchmarks.fingerprint.digest import digest
+from benchmarks.results.json_file import ResultsError
+
+NUMBER = "1.0"
+# Part of the protocol -> digest of its definitions. A test compares them with the code.
+DIGESTS = {
+    "scenes": "2949e3d57aec722f",
+    "materials": "832890dcb5d69952",
+    "motions": "dc71f7b3a0e629a9",
+    "metrics": "a5eab060bbe89364",
+    "reference": "28da648b87037fbc",
+    "sampling": "50c7bfe97f3707d7",
+    "statistics": "bbdacc941ceaa26a",
+}
+DIGEST = digest(DIGESTS)
+BEFORE = "before 1.0"  # of rows that were written before the protocol had a number
+OWN = "own"  # of rows whose scene, metric or settings are a user's
+
+# Rules of verdicts.
+LEVEL = 0.05  # of the two-sided tests, and what an interval leaves out
+TIE = 0.05  # share of a number up to which another one counts as equal
+# % of skinning's excess. Shares well above it are compared by their logarithm, those below by their
+# difference: arcsinh(x / SOFTENING) is one and the other, and defined for shares below zero.
+SOFTENING = 1.0
+LEAST_MOTIONS = 4  # below which two methods are not told apart
+DRAWS, SEED = 10_000, 20220619  # of the bootstrap; the same draws for every comparison
+
+
+def one_protocol(protocols: Iterable[str], where: object) -> str:
+    """Return the protocol of rows that may stand in one table; empty where all are a user's own.
+
+    Args:
+        protocols: column `protocol` of the rows.
+        where: the file or folder that has them.
+
+    Raises:
+        ResultsError: rows of two protocols.
+
+    >>> one_protocol(["1.0", "own"], "results.csv")
+    '1.0'
+    """
+    numbers = sorted(set(protocols) - {OWN, ""})
+    if len(numbers) > 1:
+        raise ResultsError(
+            f"{where}: rows of protocols {' and '.join(numbers)} do not stand in one table; run the "
+            "older ones again, in a new folder or with --fresh"
+        )
+    return numbers[0] if numbers else ""

@@ -1,0 +1,116 @@
+"""The protocol: recorded digests hold, a changed definition is seen, and rows say whose their scene is."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.fingerprint.digest import digest
+from benchmarks.metric import Metric
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.request import Request
+from benchmarks.presets import find_preset
+from benchmarks.protocol import definitions as protocol
+from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
+from benchmarks.results import protocol as recorded
+from benchmarks.results.protocol import DIGESTS, NUMBER, OWN, one_protocol
+from benchmarks.scenes import SCENES
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.material import Material
+from snug.motion.library import make_motion
+
+
+@pytest.fixture(scope="module")
+def parts():
+    return protocol.definitions()
+
+
+def test_the_recorded_digests_are_those_of_the_code(parts):
+    found = {part: digest(content) for part, content in parts.items()}
+    changed = {part: found[part] for part in found if found[part] != DIGESTS.get(part)}
+    assert changed == {}, (
+        f"no longer protocol {NUMBER}: raise NUMBER and set these DIGESTS in benchmarks/results/protocol.py, "
+        "and write down what changed in docs/protocol.md and CHANGELOG.md"
+    )
+    assert list(DIGESTS) == list(parts) and digest(DIGESTS) == recorded.DIGEST
+
+
+def _motion_of_one_more_degree(name):
+    motion = make_motion(name)
+    poses = motion.poses.copy()
+    poses[3, 5, 0] += np.radians(1.0 if name == "push_recovery" else 0.0)
+    return dataclasses.replace(motion, poses=poses)
+
+
+def _metrics():
+    return {"a": Metric(name="a", unit="m", title="A", definition="a length")}
+
+
+@pytest.mark.parametrize(
+    ("part", "place", "name", "value"),
+    [
+        ("motions", "snug.motion.library", "make_motion", _motion_of_one_more_degree),
+        ("motions", "snug.motion.library", "TEST", ("01_01_a",)),
+        ("materials", "reference_sim.material", "Material", lambda: Material(bending_stiffness=4e-5)),
+        ("materials", "reference_sim.material", "GRAVITY", 9.8),
+        ("metrics", "benchmarks.metrics", "declared", _metrics),
+        ("reference", "benchmarks.protocol.definitions", "REFERENCE_TOLERANCE", 1e-5),
+        ("sampling", "benchmarks.metrics.surface.surface_distance", "SAMPLED_FRAMES", 24),
+        ("statistics", "benchmarks.results.protocol", "TIE", 0.1),
+    ],
+)
+def test_a_changed_definition_changes_its_digest(monkeypatch, part, place, name, value):
+    monkeypatch.setattr(f"{place}.{name}", value)
+    assert digest(protocol.PARTS[part]()) != DIGESTS[part]
+
+
+def test_a_changed_formula_changes_the_energies(monkeypatch, parts):
+    scene = SCENES[0].at(find_preset("quick")).build()
+    assert dict(protocol._probed(scene)) == dict(parts["scenes"]["energies"]["hanging_sheet"])
+    right = BendHinge.value_and_gradient
+    monkeypatch.setattr(BendHinge, "value_and_gradient", lambda self, x: (1.001 * right(self, x)[0], 0.0))
+    assert dict(protocol._probed(scene)) != dict(parts["scenes"]["energies"]["hanging_sheet"])
+
+
+def test_titles_and_prose_are_no_part_of_it(monkeypatch):
+    from benchmarks.metrics import declared
+
+    renamed = {name: dataclasses.replace(metric, title="Another") for name, metric in declared().items()}
+    monkeypatch.setattr("benchmarks.metrics.declared", lambda: renamed)
+    assert digest(protocol._metrics()) == DIGESTS["metrics"]
+
+
+@pytest.mark.parametrize(
+    ("request_fields", "expected"),
+    [
+        ({"scenes": ("flag",)}, NUMBER),
+        ({"scenes": ("tshirt/dance_turn",)}, NUMBER),
+        (
+            {
+                "scenes": ("tshirt/dance_turn",),
+                "preset": dataclasses.replace(find_preset("quick"), frames=20),
+            },
+            OWN,
+        ),
+        ({"scenes": ("tshirt/kick",), "methods": ("simulation", "snug")}, NUMBER),
+        ({"scenes": ("tshirt/dance_turn",), "validation_motions": ("05_04",), "methods": ("snug",)}, OWN),
+    ],
+)
+def test_a_row_is_of_the_protocol_where_scene_and_settings_are(tmp_path, request_fields, expected):
+    plan = make_plan(Request(**{"methods": ("simulation",), "folder": tmp_path / "run", **request_fields}))
+    assert {protocol_of(cell, plan) for cell in plan.cells} == {expected}
+
+
+def test_a_scene_of_another_size_and_a_users_case_are_own(tmp_path):
+    plan = make_plan(Request(scenes=("flag",), methods=("simulation",), folder=tmp_path / "run"))
+    cell = plan.cells[0]
+    other = dataclasses.replace(cell.scene, options={**cell.scene.options, "sheet_cells": 99})
+    assert protocol_of(dataclasses.replace(cell, scene=other), plan) == OWN
+    assert protocol_of_case("measured/percentile", "check") == OWN
+
+
+def test_own_rows_stand_beside_those_of_a_protocol():
+    assert one_protocol(["", OWN, NUMBER, NUMBER], "x") == NUMBER
+    assert one_protocol([OWN], "x") == ""
