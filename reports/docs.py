@@ -7,20 +7,23 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
+from reports.entries import ENTRIES, PAGE, page_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
-    """Yield (path, text, text with its generated parts made anew) of README and each document of docs/.
+    """Yield (path, text, text with its generated parts made anew) of README, docs/ and the page of entries.
 
     Raises:
         ValueError: for a part of no known form or without an end; names the document.
     """
+    from reports.statistics.published import DEFAULT, PUBLISHED
     from reports.text.generated_parts import fill  # loads pandas
-    from reports.text.published_parts import published_part
+    from reports.text.published_parts import published_part, read_published
 
     for path in sorted([root / "README.md", *(root / "docs").rglob("*.md")]):
         text = path.read_text(encoding="utf-8")
@@ -28,6 +31,12 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
             yield path, text, fill(text, published_part)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
+    if (entries := root / ENTRIES).is_dir():
+        path = entries / PAGE
+        page, _ = page_of(
+            entries, path, (RunFolder(PUBLISHED / DEFAULT), read_published(PUBLISHED / DEFAULT))
+        )
+        yield path, path.read_text(encoding="utf-8") if path.is_file() else "", page
 
 
 @command("reports.docs", goes_on="the same command begins again", bad_input=(ResultsError, ValueError))
@@ -36,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="python -m reports.docs",
         description="Make the parts of README.md and docs/ that stand between '<!-- generated: ... -->' and "
-        "'<!-- end of generated -->' from the runs in reports/published.",
+        "'<!-- end of generated -->' from the runs in reports/published, and the page of entries.",
         epilog="Exit status: 0 when all is up to date or written, 1 when --check finds a part that is not, 2 "
         "for a part or a run that cannot be read. Example: python -m reports.docs --check",
     )

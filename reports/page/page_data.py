@@ -67,7 +67,9 @@ def tables_of(report: Report) -> list[dict[str, Any]]:
     """
     blocks = [block for block in BLOCKS if isinstance(block, TableBlock)]
     first = {table.name: table for block in blocks for table in block.tables(report)}
-    return [_table(report.run, table) for table in (first | dict(report.tables)).values() if table.caption]
+    return [
+        table_data(report.run, table) for table in (first | dict(report.tables)).values() if table.caption
+    ]
 
 
 def sentences_of(report: Report) -> list[tuple[str, str]]:
@@ -76,7 +78,8 @@ def sentences_of(report: Report) -> list[tuple[str, str]]:
     return [pair for block in blocks for pair in block.make(report.run)]
 
 
-def _table(run: Run, table: Table) -> dict[str, Any]:
+def table_data(run: Run, table: Table) -> dict[str, Any]:
+    """Return a table as the page's script shows it; the run declares its metrics and methods."""
     printed = [_printed(table, reference) for reference in table.references]
     texts = [
         column_texts(run, column, [row[place] for row in table.rows], [row[place] for row in printed])

@@ -65,8 +65,9 @@ function showTable(table, root, definition, note) {
 
 function lineOf(row, table, kind = '') {
   const cells = row.map((cell, k) => {
-    const [text, , spread, mark] = Array.isArray(cell) ? cell : [cell, null, '', ''];
-    const node = element('td', { class: table.columns[k].words ? 'words' : '' }, text + (mark || ''));
+    const [text, , spread, mark, link] = Array.isArray(cell) ? cell : [cell, null, '', ''];
+    const shown = text + (mark || '');
+    const node = element('td', { class: table.columns[k].words ? 'words' : '' }, link ? element('a', { href: link }, shown) : shown);
     if (spread) node.append(element('small', {}, spread));
     return node;
   });

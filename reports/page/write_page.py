@@ -56,8 +56,8 @@ def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
     return template.substitute(
         style=style,
         script=script,
-        style_hash=_hash(style),
-        script_hash=_hash(script),
+        style_hash=policy_hash(style),
+        script_hash=policy_hash(script),
         subtitle=html.escape(report.subtitle),
         sentences=_sentences(report),
         trouble=_trouble(report),
@@ -90,6 +90,6 @@ def _details(summary: str, lines: Sequence[str], kind: str) -> str:
     )
 
 
-def _hash(text: str) -> str:
+def policy_hash(text: str) -> str:
     """Return the hash for the policy that lets a browser run this text and no other."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")

@@ -55,11 +55,11 @@ def published_part(words: str) -> str:
     if source == "the library" and kind in LIBRARY_TABLES:
         return markdown_table(list(LIBRARY_TABLES[kind]()))
     if kind == "headline":
-        return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(_read(folders[0])))
+        return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
     if kind == "table":
         wanted = [column.strip() for column in columns.split(",") if column.strip()]
         table = _table(folders[0], name)
-        rows = text_rows(_read(folders[0]), table, wanted)
+        rows = text_rows(read_published(folders[0]), table, wanted)
         return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
     if words.startswith("claims earlier"):
         earlier = [PUBLISHED / run.strip() for run in columns.split(",")]
@@ -77,7 +77,7 @@ def published_part(words: str) -> str:
 
 @cache
 def _claims(*folders: Path) -> JudgedClaims:
-    return judge_in_first([(folder.name, _read(folder)) for folder in folders])
+    return judge_in_first([(folder.name, read_published(folder)) for folder in folders])
 
 
 def _table(folder: Path, name: str) -> Table:
@@ -93,9 +93,10 @@ def _table(folder: Path, name: str) -> Table:
 
 @cache
 def _made(folder: Path, place: int) -> list[Table]:
-    return TABLES[place](_read(folder))
+    return TABLES[place](read_published(folder))
 
 
 @cache
-def _read(folder: Path) -> Run:
+def read_published(folder: Path) -> Run:
+    """Return a published run, read once."""
     return read_run_with_trainings(RunFolder(folder))

@@ -73,8 +73,12 @@ def test_the_command_checks_and_says_so(project, monkeypatch, capsys):
     assert capsys.readouterr().err.startswith(f"{path}: not what the published runs give")
 
 
-def test_documents_are_readme_and_docs_alone(project):
-    assert {path.relative_to(Path(ROOT)).parts[0] for path, *_ in project} == {"README.md", "docs"}
+def test_documents_are_readme_docs_and_the_page_of_entries(project):
+    assert {path.relative_to(Path(ROOT)).parts[0] for path, *_ in project} == {
+        "README.md",
+        "docs",
+        "submissions",
+    }
 
 
 def test_earlier_runs_judge_what_current_ones_cannot_and_nothing_else():
