@@ -12,7 +12,7 @@ from pathlib import Path
 from benchmarks.merge import merge
 from benchmarks.process.timing import one_thread
 from benchmarks.provenance import commit
-from benchmarks.published_runs import RUNS, PublishedRun
+from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
@@ -112,9 +112,7 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
         whole = out / name
         shutil.rmtree(whole, ignore_errors=True)  # what it was merged from stays
         merge(list(parts), whole, command=shlex.join(["python", "-m", PROGRAM, name]))
-        from reports.build import build_report
-
-        build_report(whole)
+        subprocess.run([sys.executable, "-m", "reports.build", str(whole)], check=False)
     keep(whole, into / name, run.pictures)
     print(f"{name}: published in {into / name}", flush=True)
     return True

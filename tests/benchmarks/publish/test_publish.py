@@ -8,13 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks import publish as command
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import runs
 from benchmarks.provenance import commit
-from benchmarks.publish import PublishError, keep, publish
-from benchmarks.published_runs import RUNS, PublishedRun
+from benchmarks.publish import __main__ as command
+from benchmarks.publish.__main__ import PublishError, keep, publish
+from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.run_folder import RunFolder
 
 FALL = "--preset smoke --suite speed --scenes free_fall --methods "
