@@ -10,7 +10,6 @@ from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
-from reports.entries import ENTRIES, PAGE, page_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -21,6 +20,7 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
     Raises:
         ValueError: for a part of no known form or without an end; names the document.
     """
+    from reports.entries.page import ENTRIES, PAGE, page_of
     from reports.statistics.published import DEFAULT, PUBLISHED
     from reports.text.generated_parts import fill  # loads pandas
     from reports.text.published_parts import published_part, read_published

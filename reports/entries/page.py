@@ -7,11 +7,17 @@ import string
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.results.json_file import ResultsError
+from benchmarks.results.run_folder import RunFolder
+from reports.entries.tables import Scored, entries_tables, of_entry
 from reports.page.page_data import table_data
 from reports.page.write_page import HERE, policy_hash
-from reports.tables.entries import Scored
+from reports.run.finished_run import Run
+from reports.run.reading import read_run
 from reports.tables.table import Table
 
+ENTRIES = "submissions"
+PAGE = "index.html"
 SCRIPTS = ("tables", "entries")  # in this order
 
 
@@ -20,7 +26,7 @@ def entries_page(path: Path, tables: Sequence[tuple[Table, Sequence[Scored]]]) -
 
     Args:
         path: where it will be; links lead from it to pages of runs.
-        tables: of reports.tables.entries.entries_tables.
+        tables: of reports.entries.tables.entries_tables.
     """
     content = []
     for table, scored in tables:
@@ -41,3 +47,29 @@ def entries_page(path: Path, tables: Sequence[tuple[Table, Sequence[Scored]]]) -
         script_hash=policy_hash(script),
         content=text.replace("<", "\\u003c"),  # no text of an entry ends the element
     )
+
+
+def entries_in(folder: Path) -> list[Path]:
+    """Return the folders of entries, by name. Raises ResultsError where there is none."""
+    found = sorted(path.parent for path in folder.glob("*/entry.toml"))
+    if not found:
+        raise ResultsError(f"{folder}: holds no entry, a folder with entry.toml")
+    return found
+
+
+def page_of(folder: Path, path: Path, published: tuple[RunFolder, Run]) -> tuple[str, list[Path]]:
+    """Return the page of the entries in a folder, and the entries that have no scores.
+
+    Args:
+        folder: has a folder for each entry.
+        path: where the page will be.
+        published: the run whose methods stand beside entries of its protocol.
+
+    Raises:
+        ResultsError: no entry, or scores that cannot be read.
+    """
+    found = entries_in(folder)
+    scores = {entry: RunFolder(entry / "scores") for entry in found}
+    without = [entry for entry in found if not scores[entry].config_path.is_file()]
+    scored = [of_entry(scores[entry], read_run(scores[entry])) for entry in found if entry not in without]
+    return entries_page(path, entries_tables(scored, published)), without

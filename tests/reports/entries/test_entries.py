@@ -9,9 +9,10 @@ import re
 import pytest
 
 from benchmarks.results.run_folder import RunFolder
-from reports.entries import main, page_of
+from reports.entries.__main__ import main
+from reports.entries.page import page_of
+from reports.entries.tables import entries_tables, full_scenes, of_entry
 from reports.run.reading import read_run
-from reports.tables.entries import entries_tables, full_scenes, of_entry
 from tests.reports.report_folder import declaration, row
 
 TOTAL = {"simulation": 1.0, "skinning": 9.0}

@@ -1,0 +1,1 @@
+"""The command python -m reports.entries: the page of all entries beside the published methods."""
