@@ -1,4 +1,4 @@
-"""Tables of a document whose texts the code has: options, attributes of a class, presets, suites, kernels."""
+"""Tables of a document whose texts the code has: options, attributes, recipes, presets, suites, kernels."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS
 from reference_sim.kernels.fast_kernels import USES
 from snug.garments.templates import GARMENT_TEMPLATES
+from snug.recipes.named import RECIPES
 
 Rows = list[tuple[str, ...]]
 ALL = 10_000  # frames or more: whole motions
@@ -61,6 +62,33 @@ def attribute_rows(path: str) -> Rows:
         (f"`{names.replace(', ', '`, `')}`", " ".join(words.split()).rstrip(".")) for names, words in entries
     ]
     return [("Field", "Content"), *rows]
+
+
+def recipe_rows(names: str) -> Rows:
+    """Return a heading and a row of each option in which recipes differ: its values, and its meaning.
+
+    Args:
+        names: of the recipes, as "default, paper".
+
+    Raises:
+        ValueError: no recipe of that name.
+
+    >>> recipe_rows("default, paper")[4][:3]
+    ('`zero_last_layer`', 'True', 'False')
+    """
+    chosen = names.split(", ")
+    if unknown := [name for name in chosen if name not in RECIPES]:
+        raise ValueError(f"no recipe '{unknown[0]}'; choose from {', '.join(RECIPES)}")
+    rows: Rows = []
+    for option, meaning in attribute_rows("snug.recipes.recipe.Recipe")[2:]:
+        values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
+        if len(set(values)) > 1:
+            rows.append((option, *(_setting(value) for value in values), meaning))
+    return [("Option", *(f"Recipe `{name}`" for name in chosen), "Meaning"), *rows]
+
+
+def _setting(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def metric_rows() -> Rows:

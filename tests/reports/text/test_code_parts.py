@@ -11,7 +11,9 @@ from benchmarks.method import MethodEntry
 from benchmarks.presets import PRESETS
 from benchmarks.results.row import COLUMNS
 from benchmarks.scene import BuiltScene
-from reports.text.code_parts import PARTS, attribute_rows, option_rows
+from reports.text.code_parts import PARTS, attribute_rows, option_rows, recipe_rows
+from snug.recipes.named import PAPER
+from snug.recipes.recipe import DEFAULT
 
 
 def test_every_option_of_a_command_but_help_has_a_row_with_its_default():
@@ -57,3 +59,14 @@ def test_presets_suites_garments_and_kernels_have_a_row_each():
         "`ease=0.04, clearance=0.006, rise=0.17, length=0.3, flare=0.1`",
     )
     assert all(len(set(map(len, part()))) == 1 for part in PARTS.values())
+
+
+def test_recipes_are_compared_in_the_options_that_differ():
+    rows = {row[0].strip("`"): row[1:3] for row in recipe_rows("default, paper")[1:]}
+    same = {
+        field.name for field in fields(DEFAULT) if getattr(DEFAULT, field.name) == getattr(PAPER, field.name)
+    }
+    assert rows.keys() == {field.name for field in fields(DEFAULT)} - same - {"name"}
+    assert rows["contact_margin"] == ("None", "0.002") and rows["schedule"] == ("cosine", "epochs")
+    with pytest.raises(ValueError, match="no recipe 'text'; choose from default, paper"):
+        recipe_rows("default, text")
