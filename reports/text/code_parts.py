@@ -64,6 +64,26 @@ def attribute_rows(path: str) -> Rows:
     return [("Field", "Content"), *rows]
 
 
+def docstring_rows(module: str) -> Rows:
+    """Return the rows of the table in the docstring of a module.
+
+    Raises:
+        ValueError: no such module, or one without a table in its docstring.
+
+    >>> docstring_rows("snug.body.smpl_files")[2]
+    ('faces, closed and wound outwards', '`f`, `faces`', '(F, 3), (F, 4)')
+    """
+    try:
+        text = import_module(module).__doc__ or ""
+    except ImportError:
+        raise ValueError(f"no module '{module}'") from None
+    lines = [line.strip("|") for line in text.splitlines() if line.startswith("|")]
+    rows: Rows = [tuple(cell.strip() for cell in line.split("|")) for line in lines]
+    if not rows:
+        raise ValueError(f"module '{module}' has no table in its docstring")
+    return [rows[0], *rows[2:]]
+
+
 def recipe_rows(names: str) -> Rows:
     """Return a heading and a row of each option in which recipes differ: its values, and its meaning.
 

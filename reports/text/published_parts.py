@@ -3,8 +3,9 @@
 `headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
 `claims exploratory of RUN, ...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`,
 `runs of RUN, ...`; RUN is a folder of reports/published. Earlier runs judge claims that the runs before them
-cannot. `rooms of PACKAGE`, `attributes of MODULE.CLASS`, `recipes of NAME, ...`, `clips of the library`,
-`distances of the library` and the parts that `code_parts.PARTS` names come from the code.
+cannot. `rooms of PACKAGE`, `attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of
+NAME, ...`, `clips of the library`, `distances of the library` and the parts that `code_parts.PARTS` names come
+from the code.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from reports.text.claim_rows import (
     judge_in_first,
     rows_of_earlier_runs,
 )
-from reports.text.code_parts import PARTS, attribute_rows, recipe_rows
+from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, recipe_rows
 from reports.text.rooms import room_rows
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
@@ -35,8 +36,8 @@ from snug.motion.composition import clip_rows, distance_rows
 FORMS = (
     "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
     "claims exploratory of RUN, ...; claims earlier of RUN, ...; EARLIER RUN, ...; counts of RUN, ...; "
-    "runs of RUN, ...; rooms of PACKAGE; attributes of MODULE.CLASS; recipes of NAME, ...; clips of "
-    f"the library; distances of the library; {'; '.join(PARTS)}"
+    "runs of RUN, ...; rooms of PACKAGE; attributes of MODULE.CLASS; docstring of MODULE; recipes of "
+    f"NAME, ...; clips of the library; distances of the library; {'; '.join(PARTS)}"
 )
 
 LIBRARY_TABLES = {"clips": clip_rows, "distances": distance_rows}
@@ -53,6 +54,8 @@ def published_part(words: str) -> str:
         return markdown_table(PARTS[words]())
     if kind == "rooms":
         return markdown_table(room_rows(source))
+    if kind == "docstring":
+        return markdown_table(docstring_rows(source))
     if kind == "recipes":
         return markdown_table(recipe_rows(source))
     if kind == "attributes":

@@ -7,11 +7,14 @@ from dataclasses import fields
 
 import pytest
 
+from benchmarks.external.roll_out_files import KEYS
 from benchmarks.method import MethodEntry
 from benchmarks.presets import PRESETS
 from benchmarks.results.row import COLUMNS
 from benchmarks.scene import BuiltScene
-from reports.text.code_parts import PARTS, attribute_rows, option_rows, recipe_rows
+from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, option_rows, recipe_rows
+from snug.body.smpl_files import SYNONYMS
+from snug.motion.smpl_arrays import ARRAY_NAMES
 from snug.recipes.named import PAPER
 from snug.recipes.recipe import DEFAULT
 
@@ -70,3 +73,22 @@ def test_recipes_are_compared_in_the_options_that_differ():
     assert rows["contact_margin"] == ("None", "0.002") and rows["schedule"] == ("cosine", "epochs")
     with pytest.raises(ValueError, match="no recipe 'text'; choose from default, paper"):
         recipe_rows("default, text")
+
+
+@pytest.mark.parametrize(
+    ("module", "names"),
+    [
+        ("snug.body.smpl_files", [name for names in SYNONYMS.values() for name in names]),
+        ("snug.motion.smpl_arrays", ARRAY_NAMES),
+        ("benchmarks.external.roll_out_files", KEYS),
+    ],
+)
+def test_tables_of_files_have_every_array_that_is_read(module, names):
+    table = " ".join(cell for row in docstring_rows(module) for cell in row)
+    assert not [name for name in names if f"`{name}`" not in table]
+
+
+def test_a_module_without_a_table_is_refused():
+    for module in ("snug.body.plain_files", "snug.recipes.recipe"):
+        with pytest.raises(ValueError, match=module):
+            docstring_rows(module)
