@@ -4,12 +4,11 @@
 | --- | --- |
 | `.npz` | `positions`; optional `faces`, `fps`, `quasi_static`, `obstacle`, `obstacle_faces` |
 | `.vtkhdf`, `.hdf` | a trajectory of this project |
-| `.pkl` | plain arrays `pred`, `cloth_faces`, `obstacle`, `obstacle_faces`, as HOOD and ContourCraft write them |
+| `.pkl` | `pred`, `cloth_faces`, `obstacle`, `obstacle_faces`, as HOOD and ContourCraft write them |
 | `.pc2`, `.pc16` | point cache, as Neural Cloth Simulation writes it; faces of the `.obj` of the same name |
 | folder, pattern | one mesh a frame (`.obj`, `.ply` and others), in the order of the numbers in their names |
 
-Positions and obstacles have shape (T, V, 3), faces (F, 3).
-`quasi_static` (T, V, 3) is the answer to each pose held still.
+Arrays over time have shape (T, V, 3), faces (F, 3); `quasi_static` is the answer to each pose held still.
 
 What a file declares of its size is compared with the file before anything of that size is allocated. Nothing
 is executed.

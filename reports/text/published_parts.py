@@ -4,8 +4,8 @@
 `claims exploratory of RUN, ...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`,
 `runs of RUN, ...`; RUN is a folder of reports/published. Earlier runs judge claims that the runs before them
 cannot. `rooms of PACKAGE`, `attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of
-NAME, ...`, `clips of the library`, `distances of the library` and the parts that `code_parts.PARTS` names come
-from the code.
+NAME, ...`, `clips of the library`, `distances of the library` and the parts that `code_parts.PARTS` names
+come from the code.
 """
 
 from __future__ import annotations
