@@ -1,4 +1,4 @@
-"""python -m reports.docs: make the generated parts of README and docs from the published runs."""
+"""python -m reports.docs: make the generated parts of README and docs from published runs and the code."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="python -m reports.docs",
         description="Make the parts of README.md and docs/ that stand between '<!-- generated: ... -->' and "
-        "'<!-- end of generated -->' from the runs in reports/published, and the page of entries.",
+        "'<!-- end of generated -->' from the runs in reports/published and from the code, "
+        "and the page of entries.",
         epilog="Exit status: 0 when all is up to date or written, 1 when --check finds a part that is not, 2 "
         "for a part or a run that cannot be read. Example: python -m reports.docs --check",
     )
