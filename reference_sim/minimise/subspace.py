@@ -123,7 +123,9 @@ class SubspaceNewton(Newton):
         **options: Any,
     ) -> None:
         super().__init__(potential, **{"reuse": True, "start_projected": True} | options)
-        self.hessian = SubspaceHessian(potential, tolerance=self.tolerance, reference_dt=REFERENCE_DT)
+        self.hessian: SubspaceHessian = SubspaceHessian(
+            potential, tolerance=self.tolerance, reference_dt=REFERENCE_DT
+        )
         self._basis, self._placements, self._offsets = basis, placements, offsets
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:

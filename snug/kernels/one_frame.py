@@ -89,9 +89,10 @@ def run_frame(
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
     begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where its
     recurrent part begins; of NEAREST the terms begin with the number of rows that share, and what is added to
-    each distance; of HANDLE rows is the distance between two coordinates of a vertex in `work`, and columns
-    that between the numbers of its two rows. terms: mean and spread of the features (D,), which are normalised into work[:D], then
-    factors and biases of each matrix. The offsets are the last of `work`. The others are those of skin_frame.
+    each distance; of HANDLE rows is how far apart two coordinates of a vertex are written, and columns how
+    far apart their numbers are read. terms: mean and spread of the features (D,), which are normalised into
+    work[:D], then factors and biases of each matrix. The offsets are the last of `work`. The others are those
+    of skin_frame.
     """
     inputs = len(features)
     for i in range(inputs):
@@ -105,7 +106,7 @@ def run_frame(
             _distances(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
         elif kind == NEAREST:
             _nearest(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
-        elif kind == HANDLE or kind == HANDLE_ADDED:
+        elif kind in (HANDLE, HANDLE_ADDED):
             _handle(kind == HANDLE_ADDED, terms[operations[i, 4] :], source, y, rows, columns)
         else:
             matrix, affine = weights[operations[i, 3] :], terms[operations[i, 4] :]
@@ -194,7 +195,7 @@ def _nearest(
 def _handle(
     added: bool, functions: np.ndarray, numbers: np.ndarray, y: np.ndarray, padded: int, apart: int
 ) -> None:
-    """Write or add the offsets of a block: A [f_0 ... f_3] by the numbers A (3, 4) and the shape functions."""
+    """Write or add the offsets of a block: A [f_0 ... f_3], of numbers A (3, 4) and shape functions."""
     for c in range(3):
         a, at = numbers[c * apart :], y[c * padded :]
         a0, a1, a2, a3 = a[0], a[1], a[2], a[3]

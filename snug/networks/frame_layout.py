@@ -169,7 +169,7 @@ class FramePlan:
         self._terms += [np.array([neighbours, near], np.float32), np.float32(network.output_scale) * factors]
 
     def add_handles(self, network: GarmentNetwork, functions: Tensor, x: slice) -> None:
-        """Add the offsets of handles with shape functions (V, B, 4), whose numbers lie at x; to be called last.
+        """Add the offsets of handles whose numbers lie at x, with shape functions (V, B, 4); called last.
 
         Each block of vertices reads the handles that reach it. The functions stay in float32.
         """

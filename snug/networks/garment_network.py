@@ -74,7 +74,7 @@ class GarmentNetwork(nn.Module):
         layers = self.last_layers()
         if not layers:
             raise ValueError(f"{type(self).__name__} has no last layer, whose span could be minimised in")
-        biases = [layer.bias for layer in layers if layer.bias is not None]
+        biases: list[Tensor] = [layer.bias for layer in layers if layer.bias is not None]
         centre = torch.stack(biases).sum(0) if biases else layers[0].weight.new_zeros(3 * self.vertices)
         basis = torch.cat([layer.weight for layer in layers], dim=1)
         return self.output_scale * basis.detach(), self.output_scale * centre.detach()

@@ -113,7 +113,7 @@ FLOORS = (
         for name, label, space, seeded in (
             ("snug", "SNUG", "SNUG's last layer", True),
             ("pbns", "PBNS", "PBNS's last layer", True),
-            ("pose-regression", "principal components", "64 principal components of simulated offsets", False),
+            ("pose-regression", "principal components", "64 principal components of the offsets", False),
         )
     ),
 )  # fmt: skip

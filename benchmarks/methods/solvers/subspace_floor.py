@@ -72,7 +72,9 @@ class SubspaceFloor(Method):
         return self.simulation.run()
 
 
-def _placements(dressed: DressedBody, scene: BuiltScene, centre: np.ndarray, smoothing: int) -> list[Placement]:
+def _placements(
+    dressed: DressedBody, scene: BuiltScene, centre: np.ndarray, smoothing: int
+) -> list[Placement]:
     """Return turns and places of the vertices in each frame, with offsets `centre` (V, 3) [m]."""
     assert scene.dressed is not None
     motion, betas = scene.dressed.motion, scene.dressed.betas
@@ -110,4 +112,6 @@ def _last_layer(path: Path) -> Callable[[DressedBody], Space]:
 
 def make(*, models: Path, seed: int, handles: int = 0, network: str = "") -> SubspaceFloor:
     """Make the floor of so many handles, or that of the last layer of a network."""
-    return SubspaceFloor(_last_layer(model_path(models, network, seed)) if network else _handle_space(handles))
+    return SubspaceFloor(
+        _last_layer(model_path(models, network, seed)) if network else _handle_space(handles)
+    )
