@@ -91,34 +91,36 @@ class MethodEntry:
     """Declaration of a method: cheap to list. Its module is imported when a cell needs it.
 
     Attributes:
-        name: in commands, rows and files.
+        name: its name in commands, rows and files.
         description: one line, for --list and run.json.
         label: its name for people.
         module: has `make(*, models, seed, **options)`, which returns a Method; by default the file that
             declares the entry.
         declared_in: that file, or module of an installed package; empty for the project's own. Filled in
             where it is read.
-        files: what it reads besides, beside that file; a run notices when one has changed.
-        options: of make().
-        needs_body: whether it works on dressed scenes alone.
+        files: paths beside that file of what it reads, such as weights; a change makes its results stale.
+        options: what make() gets besides models and seed.
+        needs_body: whether it works on dressed bodies alone: `scene.dressed` has body, garment and motion.
         trained: name of the network that it needs, if any.
         training: how that is trained, where catalogue/trainings.py does not have it.
         seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
         dtype: of its computation; trajectories and metrics are float64 in any case.
-        truncated: whether it stops before the minimum on purpose, where iterations run out.
+        truncated: whether it stops before the minimum on purpose, after a number of iterations.
         needs_no_obstacle: whether it knows no contact.
         package: what it needs installed besides this project.
-        batched: whether it computes many bodies at once.
-        gives_first_frame: whether it computes frame 0 too; a simulator is given it.
+        batched: whether it has `batch(copies)`, which computes many bodies at once.
+        gives_first_frame: whether it computes frame 0 too, as networks do; other methods are given the start.
         conserving: whether conservation laws are measured.
-        timed: whether its costs are measured where those of the scene are.
+        timed: whether its run time is measured in scenes that measure run times.
         declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance of a
             trajectory may say it as well.
         other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are compared.
         static_known: whether its quasi-static solution is what quasi_static() returns.
-        left_out: why it is not run, where somebody wants it so.
-        role: one of benchmarks.results.row.ROLES.
-        reporting: its place among others, for reports alone.
+        left_out: reason why it is not run; empty where it runs.
+        role: its place in tables and plots: `solver`, `warm-started`, `network`, `ablation`, `baseline`,
+            `external`, or another of benchmarks.results.row.ROLES.
+        reporting: a Reporting, which joins the members of a family by a line and names the method to compare
+            with; for reports alone.
 
     Raises:
         DeclarationError: an unknown role.

@@ -55,8 +55,11 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
 
             print(describe(plan))
             return 0
+        from benchmarks.process.isolated_process import LOADED_BY_DRESSED, start_loading
         from benchmarks.runner.execute_plan import check_roll_outs, execute
 
+        dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
+        start_loading(*(LOADED_BY_DRESSED if dressed else ()))
         assets = check_roll_outs(plan)
         with held(plan.folder), heeded_interrupts():
             return execute(plan, assets, report=report)

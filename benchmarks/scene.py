@@ -136,14 +136,14 @@ class BuiltScene:
     """Built scene: all that a method may read. Frame 0 of every array is the start.
 
     Attributes:
-        name: of its declaration.
-        cloth: mesh, masses, material and pins.
-        energies: the terms declared; the time step adds inertia.
-        dt: [s] of a frame.
-        frames: positions of a trajectory, the start included.
+        name: the name in its declaration.
+        cloth: mesh, material, `masses`, `free` vertices and `pins`.
+        energies: the terms but for inertia, which the time step adds; each name once.
+        dt: duration of a frame [s].
+        frames: number of positions in a trajectory, the start included.
         settle: returns the start (V,3) [m] at rest, or positions and velocities (2,V,3) [m, m/s]. It may
             itself simulate, so it is called once, off the clock.
-        obstacle: what the cloth touches, or None.
+        obstacle: what the cloth touches, or None; the declaration then says `obstacle=True`.
         origin_heights: (T,) [m] where the gravity energy of each frame is zero.
         exact: the exact answer (T,V,3) [m], or None.
         dressed: body, garment and motion, or None.

@@ -1,4 +1,4 @@
-"""python -m reports.docs: make the generated parts of README and docs from the published runs."""
+"""python -m reports.docs: make the generated parts of README and docs from published runs and the code."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="python -m reports.docs",
         description="Make the parts of README.md and docs/ that stand between '<!-- generated: ... -->' and "
-        "'<!-- end of generated -->' from the runs in reports/published.",
+        "'<!-- end of generated -->' from the runs in reports/published and from the code.",
         epilog="Exit status: 0 when all is up to date or written, 1 when --check finds a part that is not, 2 "
         "for a part or a run that cannot be read. Example: python -m reports.docs --check",
     )

@@ -1,11 +1,14 @@
 """Roll-outs of other programs: positions over time from the files that the field writes.
 
-    .vtkhdf .hdf          trajectories of this project
-    .npz                  positions (T,V,3), and where they are there: faces (F,3), fps, obstacle (T,B,3),
-                          obstacle_faces (G,3), quasi_static (T,V,3), the answer to each pose held still
-    .pkl .pickle          a dict of plain arrays: pred (T,V,3), cloth_faces, obstacle, obstacle_faces
-    .pc2 .pc16            point caches; faces from the .obj of the same name, where there is one
-    folder, pattern       one mesh a frame (.obj, .ply, ...), in the order of the numbers in their names
+| file | content |
+| --- | --- |
+| `.npz` | `positions`; optional `faces`, `fps`, `quasi_static`, `obstacle`, `obstacle_faces` |
+| `.vtkhdf`, `.hdf` | a trajectory of this project |
+| `.pkl` | `pred`, `cloth_faces`, `obstacle`, `obstacle_faces`, as HOOD and ContourCraft write them |
+| `.pc2`, `.pc16` | point cache, as Neural Cloth Simulation writes it; faces of the `.obj` of the same name |
+| folder, pattern | one mesh a frame (`.obj`, `.ply` and others), in the order of the numbers in their names |
+
+Arrays over time have shape (T, V, 3), faces (F, 3); `quasi_static` is the answer to each pose held still.
 
 What a file declares of its size is compared with the file before anything of that size is allocated. Nothing
 is executed.

@@ -84,7 +84,13 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="NAME,...",
         help=f"only these; patterns allowed{file}",
     )
-    add("--methods", action="append", default=[], metavar="NAME,...", help="only these; named likewise")
+    add(
+        "--methods",
+        action="append",
+        default=[],
+        metavar="NAME,...",
+        help="only these; patterns and files as for scenes",
+    )
     add("--metrics", action="append", default=[], metavar="FILE,...",
         help="files of metrics of your own, measured besides all others")  # fmt: skip
     add("--rollout", action="append", default=[], metavar="NAME=FILE", help=ROLL_OUT_HELP)
@@ -99,15 +105,15 @@ def make_parser() -> argparse.ArgumentParser:
         "files trained")  # fmt: skip
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     add("--only", action="append", default=[], metavar="STATE,...",
-        help="of what the folder holds already, do again what is failed, stale or missing (default "
-        "stale,missing; the finished is reused)")  # fmt: skip
+        help="tasks of the folder that are repeated: failed, stale or missing (default stale,missing); the "
+        "others are reused")  # fmt: skip
     add("--fresh", action="store_true", help="reuse nothing from the folder")
     add("--workers", type=int, metavar="N",
-        help="processes side by side for ground truth, training, metrics and cases (default 2, or the "
-        "cores there are); cells that are timed run alone")  # fmt: skip
+        help="parallel processes for work that is not timed (default 2, or the number of cores if less); "
+        "timed methods run alone")  # fmt: skip
     add("--scheduler", metavar="ADDRESS",
-        help="a cluster of dask.distributed, as tcp://HOST:8786, for all that is not timed; timed cells run "
-        "here (docs/scale.md)")  # fmt: skip
+        help="a cluster of dask.distributed, as tcp://HOST:8786, for work that is not timed; timed methods "
+        "run here (docs/scale.md)")  # fmt: skip
     add("--list", action="store_true", help="list suites, scenes, methods, motions and presets; run nothing")
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
     return parser
@@ -117,24 +123,24 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of what a scene is made of; benchmarks.score and benchmarks.export take the same."""
     add = parser.add_argument
     names = ", ".join(preset.name for preset in PRESETS)
-    add("--preset", default="quick", metavar="NAME", help=f"how much of everything: {names} (default quick)")
+    add("--preset", default="quick", metavar="NAME", help=f"sizes of everything: {names} (default quick)")
     add("--motions", action="append", default=[], metavar="PATH",
         help="motion file (.npz, .bvh, .amc with .asf), folder, or the word library; repeatable")  # fmt: skip
     add_motion_options(add)
     add("--frames", type=int, metavar="N",
         help="measure at most N frames of a motion, at 30 a second (default: the preset's)")  # fmt: skip
-    add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions to test on")
+    add("--test-motions", action="append", default=[], metavar="NAME,...", help="motions that test")
     add("--validation-motions", action="append", default=[], metavar="NAME,...",
-        help="motions to choose recipes by; neither these nor those to test on train")  # fmt: skip
+        help="motions that validate; neither these nor those that test train a network")  # fmt: skip
     add(
         "--body",
         metavar="FILE",
-        help="an own body of SMPL's family, .npz or .pkl, in place of the package's; garments are made for "
+        help="your own body of SMPL's family, .npz or .pkl, in place of the package's; garments are made for "
         "it (extreme cases of single steps keep the package's)",
     )
     add("--garment", metavar="FILE",
-        help="an own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "
-        "<name of the file>/<motion>. What will work says python -m snug.check FILE")  # fmt: skip
+        help="your own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "
+        "<name of the file>/<motion>. python -m snug.check FILE tells whether it can be used")  # fmt: skip
     add_garment_options(parser)
 
 

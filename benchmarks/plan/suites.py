@@ -176,7 +176,7 @@ SUITES = (
     ),
     Suite(
         name="speed",
-        description="error against run time: truncated solvers beside networks",
+        description="error against run time: solvers stopped early versus networks",
         scenes=_clips,
         methods=_solvers,
         # Learned ones, and solvers that start from `snug-dynamic`, as in suite garments.
@@ -204,8 +204,8 @@ SUITES = (
     ),
     Suite(
         name="shapes",
-        description="a motion on body shapes that no training has drawn: energies against the shape; only "
-        "where it is named, or at preset paper",
+        description="a motion on body shapes that no network was trained on: energies against the shape; "
+        "only where it is named, or at preset paper",
         scenes=_shapes,
         methods=lambda extent: ["simulation", *ENSEMBLE, "skinning", "snug", SHAPED, "pbns", *CHEAP],
         more_methods=(
@@ -222,7 +222,8 @@ SUITES = (
     ),
     Suite(
         name="performance",
-        description="microbenchmarks of simulator, trainings and networks; only where it is named",
+        description="microbenchmarks: a solver step, a training step, a frame of a network; only where it is "
+        "named",
         default=False,
     ),
 )  # fmt: skip

@@ -14,6 +14,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
 # What every worker loads. Nothing that a scene may do without: not torch, not what a body is asked with.
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.tasks.cell_task")
+# What every task of a scene with a body loads: torch skins the garment.
+LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")
 
 
 class WorkerDied(RuntimeError):
@@ -49,6 +52,13 @@ def new_processes() -> SpawnContext | ForkServerContext:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(LOADED_BY_ALL))
     return context
+
+
+def start_loading(*also: str) -> None:
+    """Begin to load what all workers need, and these modules, while this process does something else."""
+    if sys.platform == "linux":
+        multiprocessing.get_context("forkserver").set_forkserver_preload([*LOADED_BY_ALL, *also])
+        forkserver.ensure_running()
 
 
 class IsolatedProcess:

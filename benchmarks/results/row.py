@@ -28,20 +28,28 @@ REFERENCE_TOLERANCE = 1e-6  # of the reference's minimisations
 
 @dataclass(frozen=True)
 class Row:
-    """One measured number: a (suite, scene, method, seed, metric) and what came out.
+    """One measured number: a (suite, scene, method, seed, metric) and its value.
 
-    `value`, `expected`, `tolerance` and `uncertainty` are None where absent (an empty cell in the file); a
-    skipped row has a reason and no value. `uncertainty`, in the unit of the value: its standard deviation
-    over the ensemble of the reference (benchmarks.results.ensemble), or its standard error as a sample of
-    frames; `moved`: by how much each member of the ensemble, in the reference's place, changes it.
-    `terms` names the energies of the scene, joined by "+".
+    Attributes:
+        suite, scene, method, seed, metric: the key of the row.
+        unit, value: the number; None (an empty cell) where there is none.
+        status, reason: `ok`, `diverged`, `stalled`, `timeout`, `out-of-memory`, `failed` or `skipped`, and
+            why. A skipped row has a reason and no value.
+        expected, tolerance: of a validation case.
+        uncertainty: standard deviation of the value over the reference ensemble, or its standard error as a
+            sample of frames, in the unit of the value.
+        moved: change of the value by each member of the reference ensemble in the reference's place, as JSON.
+        preset, commit, hardware, dtype, threads: origin.
+        terms: energies of the scene, joined by `+`.
+        garment, motion, part: of the scene; the part is `whole`, `clip`, `loop` or `start`.
+        family, level: name shared by methods that differ by one number, and that number.
+        role: place of the method in tables and plots, such as `reference`, `solver`, `network` or `baseline`.
+        base: method that this one varies or starts from.
+        seeded: whether another seed gives another value.
+        pairing_group: name shared by variants of one method, which are compared seed by seed.
 
-    Of the scene: garment and motion, and its part: "whole", "clip", "loop" or "start"; empty without one.
-    Of the method: its role (one of ROLES); family, shared by methods that differ by one number, and level,
-    that number; base, the method that it varies or starts from; seeded, whether another seed gives another
-    value; pairing_group, of variants of one method, which share the seed and are compared seed by seed.
-
-    Raises ResultsError for an unknown status, a non-finite value called ok, or a skip without a reason.
+    Raises:
+        ResultsError: an unknown status, a non-finite value called ok, or a skip without a reason.
     """
 
     suite: str

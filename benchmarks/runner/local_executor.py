@@ -35,7 +35,9 @@ class Bar(Protocol):
 
 
 class Executor(Protocol):
-    """Executes tasks whose needs are there; gives outcomes, in any order."""
+    """Executes tasks whose needs are there; gives outcomes, in any order. workers: at most, side by side."""
+
+    workers: int
 
     def together(self, ready: Ready, bar: Bar) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work and none is ready.

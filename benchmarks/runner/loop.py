@@ -99,6 +99,10 @@ class Runner:
                     if self._is_ready(batch):
                         waiting.remove(batch)
                         if wanted := [task for task in batch if self.decide(task)]:
+                            if executor.workers > 1 and len(wanted) > 1 and not waiting:
+                                half = (len(wanted) + 1) // 2  # of the last batch: the others would wait
+                                wanted, rest = wanted[:half], wanted[half:]
+                                waiting.append(rest)
                             if wanted[0] not in tasks:
                                 bar.total += sum(task.expected_seconds for task in wanted)
                             for task in wanted:

@@ -203,7 +203,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
             if one and other and other.value
         ]
         sentences.append(
-            "The reference is converged in each time step of 1/30 s and not in the size of the step: with "
+            "The reference is converged in each time step of 1/30 s, but not in the step size: with "
             f"{count} steps a frame {' and '.join(words)} as large"
         )
     lines = paper_claims.judged(run)
@@ -244,10 +244,10 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
-        whole = ", of what was measured in all scenes," if partly_measured else ""
+        whole = " that was measured in all scenes" if partly_measured else ""
         sentences = [
-            f"nothing{whole} is as fast and has an energy gap, energy above the minimum of each time step, "
-            f"below the {number(network.error)} J{network.fewer} of {snug}"
+            f"{snug} has an energy gap, the energy above the minimum of each time step, of "
+            f"{number(network.error)} J{network.fewer}; no other method{whole} is as fast with a smaller gap"
         ]
     else:
         within = " within repeats" if best.time > network.time else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,8 @@ DEFAULT = "quick"  # the preset that is published, and the folder of its run
 def published_beside(run: Run, method: str) -> str:
     """Return "published 6.8 % on these motions: reproduced", empty for a run that has nothing beside it.
 
-    It has where its preset is the default and the checkout has the published run. A method is reproduced
+    It has where its preset is the default, its motions have the published frames (`--frames` cuts them), and
+    the checkout has the published run. A method is reproduced
     where each of its seeds lies within the interval in which one more of the published seeds is expected:
     their mean on the scale of relative excess, plus or minus Student's t times s sqrt(1 + 1/n).
     """
@@ -37,6 +39,8 @@ def published_beside(run: Run, method: str) -> str:
         return ""
     ours, theirs = _by_seed(run, method), _by_seed(published, method)
     scenes = sorted(set(ours.index) & set(theirs.index))
+    if _frames(run, scenes) != _frames(published, scenes):
+        return ""
     if not scenes or set(ours.index) - set(scenes):
         return ""
     before, now = theirs.loc[scenes].mean().to_numpy(), ours.loc[scenes].mean().to_numpy()
@@ -46,6 +50,12 @@ def published_beside(run: Run, method: str) -> str:
     reach = stats.t.ppf(1.0 - LEVEL / 2.0, len(before) - 1) * before.std(ddof=1)
     reach *= math.sqrt(1.0 + 1.0 / len(before))
     return f"{text}: {'reproduced' if np.all(np.abs(now - before.mean()) <= reach) else 'not reproduced'}"
+
+
+def _frames(run: Run, scenes: Sequence[str]) -> list[int | None]:
+    """Return the number of frames of each scene's motion, None where the run does not say."""
+    frames, declared = run.config.get("motions", {}).get("frames", {}), run.config.get("scenes", {})
+    return [frames.get(declared.get(scene, {}).get("motion")) for scene in scenes]
 
 
 def _by_seed(run: Run, method: str) -> pd.DataFrame:

@@ -3,7 +3,9 @@
 `headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
 `claims exploratory of RUN, ...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`,
 `runs of RUN, ...`; RUN is a folder of reports/published. Earlier runs judge claims that the runs before them
-cannot. `metrics`, `rooms of PACKAGE`, `clips of the library`, `distances of the library` come from the code.
+cannot. `rooms of PACKAGE`, `attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of
+NAME, ...`, `clips of the library`, `distances of the library` and the parts that `code_parts.PARTS` names
+come from the code.
 """
 
 from __future__ import annotations
@@ -11,7 +13,6 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from benchmarks.metrics import declared
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks.page_one_sentences import headline
 from reports.run.finished_run import Run
@@ -26,6 +27,7 @@ from reports.text.claim_rows import (
     judge_in_first,
     rows_of_earlier_runs,
 )
+from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, recipe_rows
 from reports.text.rooms import room_rows
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
@@ -34,11 +36,11 @@ from snug.motion.composition import clip_rows, distance_rows
 FORMS = (
     "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
     "claims exploratory of RUN, ...; claims earlier of RUN, ...; EARLIER RUN, ...; counts of RUN, ...; "
-    "runs of RUN, ...; metrics; rooms of PACKAGE; clips of the library; distances of the library"
+    "runs of RUN, ...; rooms of PACKAGE; attributes of MODULE.CLASS; docstring of MODULE; recipes of "
+    f"NAME, ...; clips of the library; distances of the library; {'; '.join(PARTS)}"
 )
 
 LIBRARY_TABLES = {"clips": clip_rows, "distances": distance_rows}
-METRIC = ("Metric", "Unit", "Definition")  # heads
 ORIGIN = ("Run", "Day", "Commit", "Processor (2 cores)", "Command")  # heads
 
 
@@ -48,10 +50,16 @@ def published_part(words: str) -> str:
     runs, _, columns = source.partition(";")
     folders = [PUBLISHED / name.strip() for name in runs.split(",")]
     kind, _, name = what.partition(" ")
-    if words == "metrics":
-        return markdown_table([METRIC, *((f"`{m.name}`", m.unit, m.definition) for m in declared().values())])
+    if words in PARTS:
+        return markdown_table(PARTS[words]())
     if kind == "rooms":
         return markdown_table(room_rows(source))
+    if kind == "docstring":
+        return markdown_table(docstring_rows(source))
+    if kind == "recipes":
+        return markdown_table(recipe_rows(source))
+    if kind == "attributes":
+        return markdown_table(attribute_rows(source))
     if source == "the library" and kind in LIBRARY_TABLES:
         return markdown_table(list(LIBRARY_TABLES[kind]()))
     if kind == "headline":

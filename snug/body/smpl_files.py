@@ -1,16 +1,17 @@
 """Read a body of SMPL's family: .npz of plain arrays, or .pkl as the models are distributed.
 
-| here | in files | shape |
+| content | arrays, the first that is there | shape |
 | --- | --- | --- |
-| vertices | v_template, vertices, template | (B, 3) [m], y up, facing +z, in T or A pose |
-| faces | f, faces | (F, 3), or (F, 4) |
-| weights | weights, blend_weights, lbs_weights, skinning_weights | (B, J) |
-| tree | kintree_table (2, J), or parents (J,) | SMPL's |
-| joints | J_regressor (J, B), or J_template, joints, joint_template, J | (J, 3) [m] |
-| shapes, may lack | shapedirs, shape_directions | (B, 3, S) |
-| of joints without regressor | J_shapedirs, joint_directions | (J, 3, S) |
-| correctives, may lack | posedirs | (B, 3, 9 (J - 1)) |
-| axes of the bones, must be those of the world | rest_pose | (J, 3) or (J, 4) |
+| vertices | `v_template`, `vertices`, `template` | (B, 3) [m], y up, facing +z, pelvis at x = 0 |
+| faces, closed and wound outwards | `f`, `faces` | (F, 3), (F, 4) |
+| weights, rows sum to one | `weights`, `blend_weights`, `lbs_weights`, `skinning_weights` | (B, J) |
+| SMPL's tree | `kintree_table`; or `parents` | (2, J); (J,) |
+| joints from vertices, dense or sparse | `J_regressor` | (J, B) |
+| or joints | `J_template`, `joints`, `joint_template`, `J` | (J, 3) [m] |
+| shapes, optional, the first ten | `shapedirs`, `shape_directions` | (B, 3, S) |
+| how shape moves joints without regressor | `J_shapedirs`, `joint_directions` | (J, 3, S) |
+| pose correctives, optional | `posedirs` | (B, 3, 9 (J - 1)) |
+| axes of the bones, optional, the identity | `rest_pose` | (J, 3), (J, 4) |
 
 J: 24 of SMPL, 52 of SMPL-H, 55 of SMPL-X. Of the latter two, fingers go into the hand, jaw and eyes into the
 head, in weights and skeleton; the hand's joint is the mean of its knuckles. A rest pose with lowered arms is

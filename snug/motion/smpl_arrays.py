@@ -4,6 +4,17 @@ Axis-angle, rotation matrices or unit quaternions, relative to the parent joint.
 begin with the same 22 joints. Only SMPL's own two hand joints are the ones of our tree; the others carry
 fingers there, which a garment never meets. Shape coefficients and soft tissue are left out: shape is the
 caller's choice.
+
+| content | arrays, the first that is there | shape, T frames |
+| --- | --- | --- |
+| axis-angle [rad] | `poses`, `pose` | SMPL (T, 72), (T, 24, 3), SMPL+H (T, 156), SMPL-X (T, 165), (T, 66) |
+| the same, root apart | `poses`, `pose`, `pose_body`, `body_pose` | (T, 63), (T, 69) |
+| root apart | `root_orient`, `global_orient` | (T, 3), (T, 1, 3), (T, 3, 3), (T, 1, 3, 3) |
+| matrices | `rotations`, `rotation_matrices`, or any above | (T, joints, 3, 3) |
+| quaternions, w first | `quaternions`, `rotations_quat`, `quaternions_wxyz` | (T, joints, 4) |
+| quaternions, w last | `quaternions_xyzw` | (T, joints, 4) |
+| path of the root [m] | `trans`, `transl`, `translations` | (T, 3), (T, 1, 3) |
+| rate [1/s] | `mocap_framerate`, `mocap_frame_rate`, `framerate`, `frame_rate`, `fps` | one number |
 """
 
 from __future__ import annotations

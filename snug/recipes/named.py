@@ -96,7 +96,7 @@ def _without(term: str) -> Recipe:
 
 # Longer windows get smaller batches, so that a step sees 48 frames in each. Bodies of other shapes: with all
 # augmented clips on them the excess over the simulation on the mean body was 0.052 J, with half 0.033,
-# without 0.027 (docs/method.md).
+# without 0.027 (docs/notebook/simulator.md).
 ABLATIONS = (
     replace(DEFAULT, name="shapes", shape_range=3.0, shape_of="clip", shape_share=0.5),
     *(_without(term) for term in TERMS),

@@ -8,8 +8,8 @@ C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and wi
 1/(2 3^0.5), C11 = k/4.
 
 No other family is isotropic: their stiffness depends on the direction of the fold by up to a factor of 3, see
-the table in docs/method.md. So a plate that can be compared with one of another program has equilateral
-triangles.
+the table in docs/notebook/simulator.md. So a plate that can be compared with one of another program has
+equilateral triangles.
 
 Squares with both diagonals, w = x^2/2 at the corners and d above that at the centres: per cell the hinges
 of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy over

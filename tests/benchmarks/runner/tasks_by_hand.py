@@ -58,6 +58,8 @@ def context(folder, assets: Assets | None = None, **fields) -> Context:
 class InProcess:
     """An executor that does everything here: the seam behind which a cluster could stand."""
 
+    workers = 1
+
     def __init__(self, folder: RunFolder, assets: Assets | None = None) -> None:
         self.folder, self.assets = folder, assets
         self._named: dict[str, Context] = {}

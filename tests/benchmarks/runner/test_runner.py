@@ -156,6 +156,8 @@ def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
 class TwoAtOnce(InProcess):
     """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
 
+    workers = 2
+
     def __init__(self, folder: RunFolder) -> None:
         super().__init__(folder)
         self.at_work: list[list[str]] = []
@@ -195,6 +197,18 @@ def test_workers_that_would_wait_begin_what_comes_later_and_nothing_is_beside_a_
         ["after", "three"], ["three"],
     ]  # fmt: skip
     assert all(outcome.status == "ok" for outcome in runner.outcomes.values())
+
+
+def test_the_last_batch_is_shared_by_workers_that_would_wait(tmp_path):
+    tasks = tuple(task(name, batch="all") for name in ("one", "two", "three"))
+    at_work = {}
+    for workers in (1, 2):
+        (tmp_path / str(workers)).mkdir()
+        executor = TwoAtOnce(folder := RunFolder(tmp_path / str(workers)))
+        executor.workers = workers
+        Runner(tasks, Cache(folder)).run(executor, NoLog())
+        at_work[workers] = executor.at_work
+    assert at_work == {1: [["one", "two", "three"]], 2: [["one", "two", "three"], ["three"]]}
 
 
 def test_a_task_whose_process_is_killed_is_kept_as_failed_and_done_again_when_asked(tmp_path):

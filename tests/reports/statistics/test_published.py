@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,18 @@ def test_the_interval_is_that_of_one_more_seed(publish):
         published.read_run = lambda folder, before=before: before
         inside += published_beside(run_of({0: line[3]}, SCENES[:1]), "snug").endswith(": reproduced")
     assert 0.91 <= inside / 200 <= 0.985
+
+
+def test_nothing_stands_beside_a_motion_that_was_cut(publish):
+    def framed(frames: int, shares: dict[int, float], started: str = "now") -> Run:
+        scenes = {scene: {"motion": scene[-1]} for scene in SCENES}
+        frames_of = {scene[-1]: frames for scene in SCENES}
+        run = run_of(shares, started=started, motions={"frames": frames_of})
+        return replace(run, config=run.config | {"scenes": scenes})
+
+    publish(framed(98, {0: 5.0, 1: 5.5}, "before"))
+    assert published_beside(framed(98, {0: 5.2}), "snug").endswith(": reproduced")
+    assert published_beside(framed(20, {0: 5.2}), "snug") == ""
 
 
 def test_nothing_stands_beside_another_preset_the_published_run_itself_or_motions_of_ones_own(publish):

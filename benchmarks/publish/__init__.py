@@ -1,0 +1,1 @@
+"""The published runs, made again at one commit: `python -m benchmarks.publish`."""

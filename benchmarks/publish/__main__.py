@@ -1,0 +1,146 @@
+"""python -m benchmarks.publish: make the published runs again, all at one commit."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from benchmarks.merge import merge
+from benchmarks.process.timing import one_thread
+from benchmarks.provenance import commit
+from benchmarks.publish.published_runs import RUNS, PublishedRun
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.command.command_line import Parser, command
+from reference_sim.files.atomic_files import new_folder
+
+PROGRAM = "benchmarks.publish"
+WORK = Path("reports/runs/published")
+TARGET = Path("reports/published")
+KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
+EXAMPLES = """examples:
+  python -m benchmarks.publish --list                what is published, and by which commands
+  python -m benchmarks.publish fabric                one run
+  python -m benchmarks.publish --workers 8           all of them, with more processes side by side
+  python -m benchmarks.publish --scheduler tcp://HOST:8786 --workers 40      untimed tasks on a cluster
+
+Each run goes on where it was stopped, in a folder of its own below --out. When it has ended well, its
+  rows, tables, PDF and the pictures that the documents show replace those in --into. Times want a machine
+  with nothing beside.
+Then: python -m reports.docs writes the tables of README and docs from them.
+exit status: 0 all are published; 1 a run failed and is left as it was; 2 the request cannot be met: one line
+  says why."""
+
+
+class PublishError(ValueError):
+    """What cannot be published; the message says why."""
+
+
+@command(PROGRAM, goes_on="the same command goes on from there")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    one_thread()
+    parser = Parser(
+        prog=f"python -m {PROGRAM}",
+        description="Make the published runs again, at the commit that is checked out.",
+        epilog=EXAMPLES,
+    )
+    add = parser.add_argument
+    add("runs", nargs="*", metavar="RUN", help="names of runs (default: all)")
+    add("--list", action="store_true", help="print each run, its question and its commands; run nothing")
+    add("--workers", metavar="N", help="of benchmarks.run")
+    add("--scheduler", metavar="ADDRESS", help="of benchmarks.run")
+    add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})")
+    add("--into", metavar="DIR", default=TARGET, type=Path, help=f"where they are kept (default {TARGET})")
+    options = parser.parse_args(arguments)
+    if unknown := [name for name in options.runs if name not in RUNS]:
+        raise PublishError(f"no published run {unknown[0]!r}: use some of {', '.join(RUNS)}")
+    names = options.runs or list(RUNS)
+    if options.list:
+        for name in names:
+            print(f"{name}: {RUNS[name].question}")
+            for line in commands(name, RUNS[name], options.out).values():
+                print(f"  {shlex.join(['python', *line[1:]])}")
+        return 0
+    head = commit()
+    if head.endswith("+changes"):
+        raise PublishError(f"{head}: commit the changes first, so that a commit says what was run")
+    more = [word for name in ("workers", "scheduler") if (value := getattr(options, name))
+            for word in (f"--{name}", value)]  # fmt: skip
+    return int(not all([publish(name, RUNS[name], options.out, options.into, head, more) for name in names]))
+
+
+def commands(name: str, run: PublishedRun, out: Path, more: Sequence[str] = ()) -> dict[Path, list[str]]:
+    """Return folder -> command line of each part of a run."""
+    folders = {part: out / (f"{name}-{part}" if part else name) for part in run.parts}
+    program = [sys.executable, "-m", "benchmarks.run"]
+    return {
+        folder: [*program, *shlex.split(run.parts[part]), *more, "-o", str(folder)]
+        for part, folder in folders.items()
+    }
+
+
+def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more: Sequence[str] = ()) -> bool:
+    """Do one run, or go on with it, and keep what is published of it.
+
+    Args:
+        name: of the run.
+        run: its parts.
+        out: folder of the parts' folders.
+        into: folder of published runs.
+        head: commit that all rows have to name.
+        more: further options of every part.
+
+    Returns:
+        Whether it is published; the reason stands on standard error where it is not.
+    """
+    parts = commands(name, run, out, more)
+    for folder, line in parts.items():
+        print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
+        if status := subprocess.run(line, check=False).returncode:
+            print(f"{PROGRAM}: {name}: {folder}: exit status {status}; not published", file=sys.stderr)
+            return False
+        if others := sorted({row.commit for row in RunFolder(folder).read_rows()} - {head, ""}):
+            found = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
+            print(f"{PROGRAM}: {folder}: {found}", file=sys.stderr)
+            return False
+    whole = next(iter(parts))
+    if len(parts) > 1:
+        whole = out / name
+        shutil.rmtree(whole, ignore_errors=True)  # what it was merged from stays
+        merge(list(parts), whole, command=shlex.join(["python", "-m", PROGRAM, name]))
+        subprocess.run([sys.executable, "-m", "reports.build", str(whole)], check=False)
+    keep(whole, into / name, run.pictures)
+    print(f"{name}: published in {into / name}", flush=True)
+    return True
+
+
+def keep(whole: Path, target: Path, pictures: Sequence[str]) -> None:
+    """Replace the folder `target` by what is published of the run in `whole`.
+
+    Raises:
+        PublishError: a picture is not there.
+    """
+    kept = list(_kept(whole, pictures))
+    if missing := [path for path in kept if not path.exists()]:
+        raise PublishError(f"{missing[0]}: not there, and the documents show it")
+    fresh = target.with_name(f"{target.name}.new")
+    shutil.rmtree(fresh, ignore_errors=True)
+    with new_folder(fresh) as part:
+        for path in kept:
+            shutil.copytree(path, part / path.name) if path.is_dir() else shutil.copy(path, part)
+    shutil.rmtree(target, ignore_errors=True)
+    fresh.rename(target)
+
+
+def _kept(whole: Path, pictures: Sequence[str]) -> Iterator[Path]:
+    yield from (whole / name for name in KEPT if name != "frame_energies.csv" or (whole / name).exists())
+    yield whole / "tables"
+    yield from (whole / "figures" / f"{name}.png" for name in pictures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,107 @@
+"""The runs that the documents take their numbers from, each with its question and its command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+RECORDED = (
+    "01_01_a,01_01_b,01_01_c,01_01_d,01_01_e,01_01_f,01_01_g,02_07_a,02_07_b,02_07_c,02_07_d,02_07_e,02_07_f,"
+    "05_03,06_14,06_15,07_02"
+)
+MADE = "push_recovery,dance_turn,cartwheel_lean,climbing_steps,sit_and_stand"
+ALL_TESTS = f"--test-motions {RECORDED},{MADE}"
+REFERENCES = "simulation,simulation-perturbed-1e-4,simulation-refrozen,skinning"
+THREE = "--seeds 0,1,2"
+
+
+@dataclass(frozen=True)
+class PublishedRun:
+    """A run that is published.
+
+    Attributes:
+        question: that its numbers answer.
+        parts: name -> options of `benchmarks.run`; several parts are merged into one folder. They are apart
+            where a part has other scenes or times.
+        pictures: figures that the documents show, by their names in the folder `figures` of the report.
+    """
+
+    question: str
+    parts: dict[str, str]
+    pictures: tuple[str, ...] = ()
+
+
+def _validation(methods: str, more: str = THREE) -> dict[str, str]:
+    """Return the one part of a run on the validation motions."""
+    return {"": f"--suite garments --split validation {more} --methods '{REFERENCES},{methods}'"}
+
+
+RUNS = {
+    "quick": PublishedRun(
+        "all methods on 22 test motions; error against run time on two clips",
+        {
+            "garments": f"--suite garments {THREE} {ALL_TESTS} --scenes 'tshirt/*' --methods {REFERENCES},"
+            "simulation-1e-8,snug,pbns,supervised,fast-lbfgs-10,snug-no-collision,snug+cleanup",
+            "speed": f"--suite speed {THREE} {ALL_TESTS} "
+            "--scenes tshirt/push_recovery@clip,tshirt/01_01_a@clip",
+        },
+        ("energy_series_tshirt-01_01_a", "error_against_time", "frames_tshirt-01_01_a", "training"),
+    ),
+    "paper_text": PublishedRun(
+        "the recipe of the paper's text and PBNS by it, 136,000 steps at 4378 vertices, on 22 test motions",
+        {
+            "": f"--preset paper --suite garments {THREE} {ALL_TESTS} --scenes 'tshirt/*' --methods "
+            "simulation,simulation-perturbed-1e-4,skinning,snug-paper,pbns-paper,supervised"
+        },
+        ("frames_tshirt-01_01_a", "training"),
+    ),
+    "fabric": PublishedRun(
+        "textile tests of six fabrics by the reference and by every solver stopped early",
+        {"": "--suite fabric"},
+        ("textile_errors",),
+    ),
+    "ablations": PublishedRun(
+        "each energy left out of the loss; springs; Santesteban 2019 and TailorNet",
+        _validation("simulation-springs,simulation-pbns-springs,snug,snug+cleanup,snug-springs,pbns,"
+                    "pbns-springs,santesteban2019,tailornet,snug-no-*"),
+        ("frames_tshirt-sudden_stop",),
+    ),
+    "windows": PublishedRun(
+        "longer windows of the loss, first states, vertices optimised directly",
+        _validation("snug,snug-paper,snug-no-noise,snug-noise-alone,snug-window6,snug-window12,"
+                    "direct-optimisation"),
+    ),
+    "equal_data": PublishedRun(
+        "networks with the same frames and numbers of steps",
+        _validation("snug-data-[01]*,pbns-data-[01]*,supervised-data-[01]*,tailornet-data-[01]*,*-data-3,"
+                    "santesteban2019-data-[01]*,nearest-poses-data-*,pose-regression-data-*"),
+        ("equal_data",),
+    ),
+    "equal_data_converged": PublishedRun(
+        "the same until a held-out motion no longer improves",
+        _validation("snug-data-converged-*,supervised-data-converged-*,pbns-data-converged-*"),
+        ("held_out",),
+    ),
+    "garments": PublishedRun(
+        "tank top, trousers, shorts, long sleeves",
+        {
+            "": f"--suite garments --split validation {THREE} --methods {REFERENCES},snug,pbns --scenes "
+            "'tank_top/*,long_sleeves/*,trousers/*,shorts/*'"
+        },
+    ),
+    "shapes": PublishedRun(
+        "12 bodies of other shapes",
+        {
+            "": f"--suite shapes {THREE} --methods {REFERENCES},snug,snug-shapes,snug-paper,pbns,"
+            "fast-lbfgs-10,snug+fast-lbfgs-1"
+        },
+        ("against_shape",),
+    ),
+    "dynamics": PublishedRun(
+        "garments that swing; networks that learn dynamics",
+        {
+            "": f"--suite garments {THREE} --scenes 'tshirt/*,tunic/*' --methods {REFERENCES},snug,"
+            "snug-dynamic,snug-dynamic+fast-lbfgs-2,supervised,pbns,fast-lbfgs-10"
+        },
+        ("hem_tunic-dance_turn",),
+    ),
+}  # fmt: skip

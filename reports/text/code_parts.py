@@ -1,0 +1,162 @@
+"""Tables of a document whose texts the code has: options, attributes, recipes, presets, suites, kernels."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from argparse import SUPPRESS, ArgumentParser
+from importlib import import_module
+
+from benchmarks.metrics import declared
+from benchmarks.plan.options import make_parser
+from benchmarks.plan.suites import SUITES
+from benchmarks.presets import PRESETS
+from reference_sim.kernels.fast_kernels import USES
+from snug.garments.templates import GARMENT_TEMPLATES
+from snug.recipes.named import RECIPES
+
+Rows = list[tuple[str, ...]]
+ALL = 10_000  # frames or more: whole motions
+_ENTRY = re.compile(r"^ {4}(\w+(?:, \w+)*): ((?:.|\n {5,})*)", re.M)
+
+
+def option_rows(parser: ArgumentParser) -> Rows:
+    """Return a heading and a row of each option of a command, with the text of its --help.
+
+    >>> parser = ArgumentParser()
+    >>> _ = parser.add_argument("--seed", metavar="N", default=0, help="of training (default %(default)s)")
+    >>> option_rows(parser)[1]
+    ('`--seed N`', 'of training (default 0)')
+    """
+    texts = parser._get_formatter()
+    shown = [action for action in parser._actions if action.option_strings and action.help != SUPPRESS]
+    rows = [
+        (f"`{texts._format_action_invocation(action)}`", texts._expand_help(action).replace("<", "\\<"))
+        for action in shown
+    ]
+    return [("Option", "Meaning"), *(row for row in rows if "--help" not in row[0])]
+
+
+def attribute_rows(path: str) -> Rows:
+    """Return a heading and a row of each attribute that the docstring of a class describes.
+
+    Args:
+        path: module and class, as "reference_sim.material.Material".
+
+    Raises:
+        ValueError: no such class, or one that describes no attributes.
+
+    >>> attribute_rows("benchmarks.method.Reporting")[2]
+    ('`level`', 'place on that curve, as a number of iterations or a tolerance')
+    """
+    module, _, name = path.rpartition(".")
+    try:
+        text = inspect.getdoc(getattr(import_module(module), name)) or ""
+    except (ImportError, AttributeError, ValueError):
+        raise ValueError(f"no class '{path}'") from None
+    _, _, section = text.partition("Attributes:\n")
+    entries = _ENTRY.findall(re.split(r"\n\n\S", section)[0])
+    if not entries:
+        raise ValueError(f"class '{path}' has no attributes in its docstring")
+    rows = [
+        (f"`{names.replace(', ', '`, `')}`", " ".join(words.split()).rstrip(".")) for names, words in entries
+    ]
+    return [("Field", "Content"), *rows]
+
+
+def docstring_rows(module: str) -> Rows:
+    """Return the rows of the table in the docstring of a module.
+
+    Raises:
+        ValueError: no such module, or one without a table in its docstring.
+
+    >>> docstring_rows("snug.body.smpl_files")[2]
+    ('faces, closed and wound outwards', '`f`, `faces`', '(F, 3), (F, 4)')
+    """
+    try:
+        text = import_module(module).__doc__ or ""
+    except ImportError:
+        raise ValueError(f"no module '{module}'") from None
+    lines = [line.strip("|") for line in text.splitlines() if line.startswith("|")]
+    rows: Rows = [tuple(cell.strip() for cell in line.split("|")) for line in lines]
+    if not rows:
+        raise ValueError(f"module '{module}' has no table in its docstring")
+    return [rows[0], *rows[2:]]
+
+
+def recipe_rows(names: str) -> Rows:
+    """Return a heading and a row of each option in which recipes differ: its values, and its meaning.
+
+    Args:
+        names: of the recipes, as "default, paper".
+
+    Raises:
+        ValueError: no recipe of that name.
+
+    >>> recipe_rows("default, paper")[4][:3]
+    ('`zero_last_layer`', 'True', 'False')
+    """
+    chosen = names.split(", ")
+    if unknown := [name for name in chosen if name not in RECIPES]:
+        raise ValueError(f"no recipe '{unknown[0]}'; choose from {', '.join(RECIPES)}")
+    rows: Rows = []
+    for option, meaning in attribute_rows("snug.recipes.recipe.Recipe")[2:]:
+        values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
+        if len(set(values)) > 1:
+            rows.append((option, *(_setting(value) for value in values), meaning))
+    return [("Option", *(f"Recipe `{name}`" for name in chosen), "Meaning"), *rows]
+
+
+def _setting(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def metric_rows() -> Rows:
+    """Return a heading and a row of each declared metric: name, unit, definition."""
+    rows = [(f"`{metric.name}`", metric.unit, metric.definition) for metric in declared().values()]
+    return [("Metric", "Unit", "Definition"), *rows]
+
+
+def preset_rows() -> Rows:
+    """Return a heading and a row of each preset: sizes, and steps of SNUG's training."""
+    heads = ("Preset", "Vertices", "Test motions", "Frames of each", "Steps of SNUG", "Description")
+    rows = []
+    for preset in PRESETS:
+        motions = "all" if preset.test_motions is None else str(preset.test_motions)
+        frames = "all" if preset.frames >= ALL else f"at most {preset.frames}"
+        sizes = (str(preset.garment_vertices), motions, frames, f"{preset.steps['snug']:,}")
+        rows.append((f"`{preset.name}`", *sizes, preset.description))
+    return [heads, *rows]
+
+
+def suite_rows() -> Rows:
+    """Return a heading and a row of each suite."""
+    return [("Suite", "Question"), *((f"`{suite.name}`", suite.description) for suite in SUITES)]
+
+
+def garment_rows() -> Rows:
+    """Return a heading and a row of each kind of tailored garment, with the defaults of its function."""
+    rows = []
+    for kind in GARMENT_TEMPLATES:
+        cut = [
+            f"{name}={parameter.default:g}"
+            for name, parameter in inspect.signature(kind.tailor).parameters.items()
+            if name not in ("body", "vertices")
+        ]
+        rows.append((f"`{kind.name}`", f"`{kind.tailor.__name__}`", f"`{', '.join(cut)}`"))
+    return [("Kind", "Function", "Cut"), *rows]
+
+
+def kernel_rows() -> Rows:
+    """Return a heading and a row of each use of a fast kernel."""
+    return [("Use", "The function returns: asked by"), *((f"`{use}`", text) for use, text in USES.items())]
+
+
+PARTS = {
+    "metrics": metric_rows,
+    "presets": preset_rows,
+    "suites": suite_rows,
+    "kinds of garments": garment_rows,
+    "uses of kernels": kernel_rows,
+    "options of benchmarks.run": lambda: option_rows(make_parser()),
+}

@@ -1,0 +1,84 @@
+"""Published runs are made by one command, at one commit, and replaced whole."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+from types import SimpleNamespace
+
+import pytest
+
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import make_parser, request_of_run
+from benchmarks.plan.plan import runs
+from benchmarks.provenance import commit
+from benchmarks.publish import __main__ as command
+from benchmarks.publish.__main__ import PublishError, keep, publish
+from benchmarks.publish.published_runs import RUNS, PublishedRun
+from benchmarks.results.run_folder import RunFolder
+
+FALL = "--preset smoke --suite speed --scenes free_fall --methods "
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_every_published_command_can_be_planned(name, tmp_path):
+    for folder, line in command.commands(name, RUNS[name], tmp_path).items():
+        words = line[3:]
+        plan = make_plan(request_of_run(make_parser().parse_args(words), words))
+        assert plan.folder == folder and plan.scenes
+        assert {cell.scene.name for cell in plan.cells if runs(cell)} == {scene.name for scene in plan.scenes}
+
+
+def test_what_is_published_is_replaced_whole_or_left(tmp_path):
+    whole, target = tmp_path / "run", tmp_path / "published" / "run"
+    for name in (
+        "results.csv",
+        "run.json",
+        "report.pdf",
+        "tables/energies.csv",
+        "figures/lead.png",
+        "x.vtkhdf",
+    ):
+        (whole / name).parent.mkdir(parents=True, exist_ok=True)
+        (whole / name).write_text(name)
+    (target / "tables").mkdir(parents=True)
+    (target / "tables" / "old.csv").write_text("old")
+    with pytest.raises(PublishError, match=r"figures/none\.png: not there"):
+        keep(whole, target, ["none"])
+    assert [path.name for path in target.rglob("*.*")] == ["old.csv"]
+    keep(whole, target, ["lead"])
+    kept = ["energies.csv", "lead.png", "report.pdf", "results.csv", "run.json"]
+    assert sorted(path.name for path in target.rglob("*.*")) == kept
+    assert [path.name for path in target.parent.iterdir()] == ["run"]
+
+
+def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch, capsys):
+    run, status = PublishedRun("?", {"": FALL + "newton-1"}), 1
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=status))
+    assert not publish("fall", run, tmp_path, tmp_path / "kept", "abc")
+    assert "exit status 1; not published" in capsys.readouterr().err
+    status = 0
+    monkeypatch.setattr(RunFolder, "read_rows", lambda _: [SimpleNamespace(commit=c) for c in ("abc", "def")])
+    assert not publish("fall", run, tmp_path, tmp_path / "kept", "abc")
+    assert "rows of commit def" in capsys.readouterr().err and not (tmp_path / "kept").exists()
+
+
+def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, capsys):
+    monkeypatch.setattr(command, "commit", lambda: "abc+changes")
+    assert command.main(["quick"]) == 2 and "commit the changes first" in capsys.readouterr().err
+    assert command.main(["quik"]) == 2 and "no published run 'quik'" in capsys.readouterr().err
+    assert command.main(["--list"]) == 0
+    shown = capsys.readouterr().out
+    assert all(f"{name}: {run.question}" in shown for name, run in RUNS.items())
+
+
+@pytest.mark.slow
+def test_parts_are_merged_reported_and_kept(tmp_path):
+    parts = {"one": FALL + "simulation,newton-1", "two": FALL + "newton-2"}
+    run = PublishedRun("?", parts, ("error_against_time_free_fall",))
+    assert publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
+    rows = RunFolder(tmp_path / "kept" / "fall").read_rows()
+    assert {row.method for row in rows} == {"simulation", "newton-1", "newton-2"}
+    line = RunFolder(tmp_path / "kept" / "fall").read_config()["command"]
+    assert shlex.split(line) == ["python", "-m", "benchmarks.publish", "fall"]
+    assert publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
