@@ -179,8 +179,8 @@ class FramePlan:
         for block in range(padded // VERTEX_BLOCK):
             part = values[block * VERTEX_BLOCK : (block + 1) * VERTEX_BLOCK]
             reaching = np.flatnonzero(part.any(axis=(0, 2)))
-            for handle in reaching if len(reaching) else (0,):
-                kind = HANDLE if handle == reaching[:1] or not len(reaching) else HANDLE_ADDED
+            for place, handle in enumerate(reaching if len(reaching) else [0]):
+                kind = HANDLE_ADDED if place else HANDLE
                 terms, target = sum(map(len, self._terms)), self._used + block * VERTEX_BLOCK
                 numbers = x.start + 4 * int(handle)
                 self._operations.append((kind, padded, 4 * count, 0, terms, numbers, target))

@@ -73,7 +73,7 @@ NEAREST_POSES = replace(TAILORNET, name="nearest-poses")
 POSE_REGRESSION = replace(TAILORNET, name="pose-regression")
 # Twice the default's rate: at the default's the relative excess on validation motions was larger by a fifth.
 PBNS = replace(DEFAULT, name="pbns", learning_rate=2e-3)
-# Twelve numbers move a patch, where SNUG's three move a vertex.
+# The default as it is: no rate was searched for.
 HANDLES = replace(DEFAULT, name="handles")
 PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_samples="vertices")
 
