@@ -179,10 +179,10 @@ class FramePlan:
         for block in range(padded // VERTEX_BLOCK):
             part = values[block * VERTEX_BLOCK : (block + 1) * VERTEX_BLOCK]
             reaching = np.flatnonzero(part.any(axis=(0, 2)))
-            for place, handle in enumerate(reaching if len(reaching) else [0]):
+            for place, handle in enumerate(reaching.tolist() or [0]):
                 kind = HANDLE_ADDED if place else HANDLE
                 terms, target = sum(map(len, self._terms)), self._used + block * VERTEX_BLOCK
-                numbers = x.start + 4 * int(handle)
+                numbers = x.start + 4 * handle
                 self._operations.append((kind, padded, 4 * count, 0, terms, numbers, target))
                 self._terms.append(np.ascontiguousarray(part[:, handle].T).ravel())
 
