@@ -89,7 +89,10 @@ class Newton:
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
         """Minimise from x0 (V, 3) [m]; counts and clock go on from those of `after`."""
-        run = NewtonRun(self, x0, after)
+        return self.descend(NewtonRun(self, x0, after))
+
+    def descend(self, run: NewtonRun) -> Result:
+        """Minimise from where `run` is."""
         try:
             result = run.result(iterate(self, run))
         finally:

@@ -70,7 +70,7 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     if count > 1:
         scene, worst = excess.worst
         sentences.append(
-            f"These numbers are geometric means over motions; the arithmetic mean of {run.label(first)} is "
+            f"These numbers are geometric means{_once(excess)}; the arithmetic mean of {run.label(first)} is "
             f"{number(excess.mean, 2)} %, and its worst motion, {scene.partition('/')[2] or scene}, has "
             f"{number(worst, 2)} %"
         )
@@ -89,9 +89,16 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
 
 
 def _independent(excess: Excess) -> str:
-    """Return ", 11 of them independent," where some motions are segments of one recording."""
+    """Return " from 11 independent sources" where some motions are segments of one recording."""
     count = excess.effect.motions
-    return f", {count} of them independent," if count < len(excess.by_motion) else ""
+    return f" from {count} independent sources" if count < len(excess.by_motion) else ""
+
+
+def _once(excess: Excess) -> str:
+    """Return what the means are taken over."""
+    if _independent(excess):
+        return ", in which the segments of one recording count once"
+    return " over motions"
 
 
 def _joined(sentences: Sequence[str]) -> str:
@@ -111,7 +118,7 @@ def _against_reference(excess: Excess) -> str:
     stands = standing(excess.effect, excess.effect.p_value())
     return {
         TIED: "this is a tie with the reference",
-        MORE: "the excess exceeds the uncertainty of the reference",
+        MORE: "the excess is larger than the uncertainty of the reference",
         LESS: "this is less than the reference has, which is no better: cloth that moves less has less",
     }.get(stands, "whether this differs from the reference is inconclusive")
 
@@ -190,8 +197,8 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
-            f"{number(apart[1], 2)} 1/m in mean curvature: errors below these cannot be distinguished from "
-            "none"
+            f"{number(apart[1], 2)} 1/m in mean curvature: a smaller error is no evidence of a difference "
+            "from the simulation"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -244,10 +251,12 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
-        whole = " that was measured in all scenes" if partly_measured else ""
+        others = (
+            "of the methods measured in all of these scenes, none" if partly_measured else "no other method"
+        )
         sentences = [
             f"{snug} has an energy gap, the energy above the minimum of each time step, of "
-            f"{number(network.error)} J{network.fewer}; no other method{whole} is as fast with a smaller gap"
+            f"{number(network.error)} J{network.fewer}; {others} is as fast with a smaller gap"
         ]
     else:
         within = " within repeats" if best.time > network.time else ""

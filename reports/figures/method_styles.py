@@ -48,6 +48,7 @@ KNOWN = {
     "santesteban2019": Style("", "#AA4499", "d", (0.0, (1.0, 1.0))),
     "nearest-poses": Style("", "#A6761D", "8", ":"),
     "pose-regression": Style("", "#7570B3", "h", ":"),
+    "handles": Style("Handles", "#CC6677", "p", "--"),
     "supervised": Style("", "#E69F00", "s", (0.0, (6.0, 1.5))),
     "snug": Style("", "#0072B2", "o"),
     "snug-paper": Style("", "#94A000", "o", "-."),
@@ -68,6 +69,8 @@ KNOWN = {
     "snug-dynamic+lbfgs": Style("SNUG, dynamic + L-BFGS", "", "X", "-."),
     "snug-dynamic+fast-lbfgs": Style("SNUG, dynamic + fast L-BFGS", "", "X", "--"),
     "skinning+lbfgs": Style("Skinning + L-BFGS", "", "X", "-."),
+    # So has the least that a network's own space allows.
+    "handles-floor": Style("Floor of handles", "", "p", ":"),
     # So have networks that learn from more or fewer frames.
     "snug-data": Style("SNUG", "", "o"),
     "pbns-data": Style("PBNS", "", "^", "-."),

@@ -122,7 +122,7 @@ def errors_in_spreads(run: Run) -> list[Table]:
                 lines.append((garment, method, *values))
     columns = (GARMENT, METHOD, *(Column(metric.name, metric.title) for metric in metrics))
     caption = (
-        "Errors relative to the spread of the reference ensemble, both root mean squares over seeds or "
-        "members and then means over motions: 1 is as near as another valid simulation."
+        "Errors over the spread of the reference ensemble: root mean square of the error over seeds, and of "
+        "the spread over members, means over motions, divided: 1 is as near as another valid simulation."
     )
     return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))

@@ -66,7 +66,9 @@ def overview(run: Run) -> list[Table]:
     if not columns:
         return []
     timed_in = ", ".join(scenes) if len(scenes) <= NAMED else f"{len(scenes)} scenes"
-    of_motions = f"{garment}: geometric mean over motions of relative excess, means of the rest"
+    of_motions = (
+        f"{garment}: relative excess as a geometric mean over recordings, the rest as means over motions"
+    )
     caption = of_motions if garment else f"Means over {timed_in}"
     caption += f"; gaps and run times over {timed_in}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)

@@ -16,8 +16,9 @@ from numba.extending import overload
 from reference_sim.kernels.kernel_cache import njit
 
 # Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU); a cell;
-# squared distances of x from the rows of W; the mean of the rows of W that have the least distances.
-PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, DISTANCES, NEAREST = range(7)
+# squared distances of x from the rows of W; the mean of the rows of W that have the least distances; offsets
+# of a block of vertices by one handle, and those added.
+PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, DISTANCES, NEAREST, HANDLE, HANDLE_ADDED = range(9)
 ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
 VERTEX_BLOCK = 64  # vertices that are skinned together
 FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
@@ -88,8 +89,10 @@ def run_frame(
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
     begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where its
     recurrent part begins; of NEAREST the terms begin with the number of rows that share, and what is added to
-    each distance. terms: mean and spread of the features (D,), which are normalised into work[:D], then
-    factors and biases of each matrix. The offsets are the last of `work`. The others are those of skin_frame.
+    each distance; of HANDLE rows is how far apart two coordinates of a vertex are written, and columns how
+    far apart their numbers are read. terms: mean and spread of the features (D,), which are normalised into
+    work[:D], then factors and biases of each matrix. The offsets are the last of `work`. The others are those
+    of skin_frame.
     """
     inputs = len(features)
     for i in range(inputs):
@@ -103,6 +106,8 @@ def run_frame(
             _distances(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
         elif kind == NEAREST:
             _nearest(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
+        elif kind in (HANDLE, HANDLE_ADDED):
+            _handle(kind == HANDLE_ADDED, terms[operations[i, 4] :], source, y, rows, columns)
         else:
             matrix, affine = weights[operations[i, 3] :], terms[operations[i, 4] :]
             _multiply(kind, matrix, affine, source, y, rows, columns)
@@ -184,6 +189,20 @@ def _nearest(
         distances[j] = np.inf
     for k in range(columns):
         y[k] /= total
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def _handle(
+    added: bool, functions: np.ndarray, numbers: np.ndarray, y: np.ndarray, padded: int, apart: int
+) -> None:
+    """Write or add the offsets of a block: A [f_0 ... f_3], of numbers A (3, 4) and shape functions."""
+    for c in range(3):
+        a, at = numbers[c * apart :], y[c * padded :]
+        a0, a1, a2, a3 = a[0], a[1], a[2], a[3]
+        for i in range(VERTEX_BLOCK):
+            moved = a0 * functions[i] + a1 * functions[VERTEX_BLOCK + i]
+            moved += a2 * functions[2 * VERTEX_BLOCK + i] + a3 * functions[3 * VERTEX_BLOCK + i]
+            at[i] = at[i] + moved if added else moved
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")

@@ -12,8 +12,8 @@
 | roll_out | a network run over a motion, frame by frame: `snug.roll_out` |
 
 >>> from snug.networks import ARCHITECTURES, make_network
->>> list(ARCHITECTURES)
-['snug', 'dynamic', 'supervised', 'pbns', 'santesteban2019', 'tailornet', 'nearest-poses', 'pose-regression']
+>>> list(ARCHITECTURES)[:4]
+['snug', 'dynamic', 'supervised', 'pbns']
 >>> from snug.recipes import DEFAULT
 >>> network = make_network("snug", 154, 1000, DEFAULT, seed=0)
 >>> f"{network.megabytes:.1f} MB, reads {network.feature_set}"

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 
 from snug.networks.fitted import NearestPoses, PoseRegression
 from snug.networks.garment_network import GarmentNetwork
+from snug.networks.handles.network import Handles20, Handles40, Handles80
 from snug.networks.initialisation import initialise, zero
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.pbns import PoseSpaceDeformation
@@ -26,6 +27,9 @@ ARCHITECTURES: dict[str, type[GarmentNetwork]] = {
     "tailornet": FrequencyMixture,
     "nearest-poses": NearestPoses,
     "pose-regression": PoseRegression,
+    "handles-20": Handles20,
+    "handles-40": Handles40,
+    "handles-80": Handles80,
 }
 
 

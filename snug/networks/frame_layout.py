@@ -18,6 +18,8 @@ from snug.kernels.one_frame import (
     CELL,
     COLUMNS,
     DISTANCES,
+    HANDLE,
+    HANDLE_ADDED,
     NEAREST,
     PRODUCT,
     RECTIFIED,
@@ -166,11 +168,33 @@ class FramePlan:
         self._matrices.append(weights.ravel())
         self._terms += [np.array([neighbours, near], np.float32), np.float32(network.output_scale) * factors]
 
+    def add_handles(self, network: GarmentNetwork, functions: Tensor, x: slice) -> None:
+        """Add the offsets of handles whose numbers lie at x, with shape functions (V, B, 4); called last.
+
+        Each block of vertices reads the handles that reach it. The functions stay in float32.
+        """
+        count, padded = functions.shape[1], len(self._places)
+        values = np.concatenate([functions.detach().numpy(), np.zeros((1, count, 4), np.float32)])
+        values = np.float32(network.output_scale) * values[self._free_places(network)]
+        for block in range(padded // VERTEX_BLOCK):
+            part = values[block * VERTEX_BLOCK : (block + 1) * VERTEX_BLOCK]
+            reaching = np.flatnonzero(part.any(axis=(0, 2)))
+            for place, handle in enumerate(reaching.tolist() or [0]):
+                kind = HANDLE_ADDED if place else HANDLE
+                terms, target = sum(map(len, self._terms)), self._used + block * VERTEX_BLOCK
+                numbers = x.start + 4 * handle
+                self._operations.append((kind, padded, 4 * count, 0, terms, numbers, target))
+                self._terms.append(np.ascontiguousarray(part[:, handle].T).ravel())
+
+    def _free_places(self, network: GarmentNetwork) -> np.ndarray:
+        """Return the vertex of each place (V',); V for those without offset: pins, and places behind."""
+        places, vertices = self._places.copy(), network.vertices
+        places[np.isin(places, network.pins)] = vertices
+        return places
+
     def _rows(self, network: GarmentNetwork) -> np.ndarray:
         """Return the offset of a network that each of the frame's is; 3 V to 3 V + 2 for none."""
-        places, vertices = self._places.copy(), network.vertices
-        places[np.isin(places, network.pins)] = vertices  # as those behind: without offset
-        return (3 * places + np.arange(3)[:, None]).ravel()
+        return (3 * self._free_places(network) + np.arange(3)[:, None]).ravel()
 
     def _place(self, size: int) -> slice:
         """Reserve a place for `size` numbers; those behind stay zero: matrices are read in whole vectors."""

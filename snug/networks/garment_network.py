@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 if TYPE_CHECKING:
+    from snug.garments.garment import Garment
     from snug.networks.frame_layout import FramePlan
 
 
@@ -50,6 +51,9 @@ class GarmentNetwork(nn.Module):
         """Return the features (N, T, D) less their mean, over their spread."""
         return (features - self.input_mean) / self.input_std
 
+    def wear(self, garment: Garment) -> None:
+        """Take what the garment fixes of the network, before it is trained. Nothing by default."""
+
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor | None:
         """Draw the state that a training window starts from; None for a network without one."""
         return None
@@ -61,6 +65,19 @@ class GarmentNetwork(nn.Module):
     def last_layers(self) -> tuple[nn.Linear, ...]:
         """Return the layers whose sum the offsets are."""
         raise NotImplementedError
+
+    def offset_space(self) -> tuple[Tensor, Tensor]:
+        """Return what the last layer can express: a basis (3 V, K) and a centre (3 V,) [m] of the offsets.
+
+        Raises ValueError for a network without one.
+        """
+        layers = self.last_layers()
+        if not layers:
+            raise ValueError(f"{type(self).__name__} has no last layer, whose span could be minimised in")
+        biases: list[Tensor] = [layer.bias for layer in layers if layer.bias is not None]
+        centre = torch.stack(biases).sum(0) if biases else layers[0].weight.new_zeros(3 * self.vertices)
+        basis = torch.cat([layer.weight for layer in layers], dim=1)
+        return self.output_scale * basis.detach(), self.output_scale * centre.detach()
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""

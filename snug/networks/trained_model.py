@@ -156,9 +156,9 @@ def _check(tensors: Mapping[str, Tensor], data: Mapping[str, Any]) -> None:
         if not isinstance(data[name], kind) or isinstance(data[name], bool):
             raise ValueError(f"{name} is {str(data[name])[:40]!r}")
     sizes = {size for tensor in tensors.values() for size in tensor.shape}
-    for name, size in (("inputs", data["inputs"]), ("vertices", 3 * data["vertices"])):
-        if size <= 0 or size not in sizes:
-            raise ValueError(f"no tensor in it has the size of {name}, {data[name]}")
+    for name, size, factors in (("inputs", data["inputs"], (1,)), ("vertices", data["vertices"], (1, 3))):
+        if size <= 0 or not any(factor * size in sizes for factor in factors):
+            raise ValueError(f"no tensor in it has the size of {name}, {size}")
     if not isinstance(data.get("origin", {}), dict):
         raise ValueError("its origin is no mapping")
     if not all(type(pin) is int and 0 <= pin < data["vertices"] for pin in data["pins"]):

@@ -73,6 +73,8 @@ NEAREST_POSES = replace(TAILORNET, name="nearest-poses")
 POSE_REGRESSION = replace(TAILORNET, name="pose-regression")
 # Twice the default's rate: at the default's the relative excess on validation motions was larger by a fifth.
 PBNS = replace(DEFAULT, name="pbns", learning_rate=2e-3)
+# The default as it is: no rate was searched for.
+HANDLES = replace(DEFAULT, name="handles")
 PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_samples="vertices")
 
 # Inertia about a simulation's past begins at joules, which are no divergence.
@@ -120,6 +122,9 @@ RECIPE_OF_KIND = {
     "nearest-poses": NEAREST_POSES,
     "pose-regression": POSE_REGRESSION,
     "dynamic": DYNAMIC,
+    "handles-20": HANDLES,
+    "handles-40": HANDLES,
+    "handles-80": HANDLES,
 }
 
 

@@ -46,6 +46,7 @@ KINDS = {
     "tailornet": Kind(ARCHITECTURES["tailornet"], targets=BandTargets),
     "nearest-poses": Kind(ARCHITECTURES["nearest-poses"], targets=VertexTargets),
     "pose-regression": Kind(ARCHITECTURES["pose-regression"], targets=VertexTargets),
+    **{name: Kind(ARCHITECTURES[name]) for name in ("handles-20", "handles-40", "handles-80")},
 }
 
 

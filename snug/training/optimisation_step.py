@@ -78,6 +78,7 @@ class Trainer:
         network = make_network(
             kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins
         )
+        network.wear(dressed.garment)
         network.normalise_by(*self.data.input_statistics())
         self.network = network.to(device)
         if how.closed_form:

@@ -149,5 +149,6 @@ def untrained_model(
     )
     pins = dressed.garment.pins
     network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
+    network.wear(dressed.garment)
     network.normalise_by(*data.input_statistics())
     return TrainedModel(model_kind, network.eval(), recipe, seed=seed, unit=kind.unit)

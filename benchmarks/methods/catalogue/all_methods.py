@@ -16,6 +16,8 @@ from benchmarks.methods.catalogue.solvers import SOLVERS, warm_started
 # They run when they are named: further baselines, ablations of SNUG, post-processing, the bound.
 FURTHER_METHODS = (
     *networks.NETWORKS,
+    *networks.HANDLES,
+    *networks.FLOORS,
     *ablations.RECIPES,
     *ablations.PRECISIONS,
     *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),

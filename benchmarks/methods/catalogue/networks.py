@@ -74,6 +74,50 @@ NETWORKS = (
             base="snug", pairing_group="snug"),
 )  # fmt: skip
 
+COUNTS = (20, 40, 80)
+HANDLES = tuple(
+    network(f"handles-{count}", f"{count} handles",
+            f"static network that moves the garment by {count} handles, trained on the energies",
+            reporting=Reporting(family="handles", level=count, pairing_group="handles"))
+    for count in COUNTS
+)  # fmt: skip
+
+
+def _floor(name: str, label: str, space: str, **fields: Any) -> MethodEntry:
+    """Declare the simulation within what a network can express. Its time is not that of a network."""
+    return MethodEntry(
+        name=f"{name}-floor", label=label,
+        description=f"no network: each time step minimised over {space}",
+        module="benchmarks.methods.solvers.subspace_floor", needs_body=True, gives_first_frame=True,
+        static_known=False, timed=False, role="solver",
+        **{"reporting": Reporting(base=name, pairing_group=name)} | fields,
+    )  # fmt: skip
+
+
+FLOORS = (
+    *(
+        _floor(
+            f"handles-{count}", f"Floor of {count} handles", f"the transforms of {count} handles",
+            options={"handles": count},
+            reporting=Reporting(
+                family="handles-floor", level=count, base=f"handles-{count}", pairing_group="handles"
+            ),
+        )
+        for count in COUNTS
+    ),
+    *(
+        _floor(
+            name, f"Floor of {label}", f"all that {space} can give", options={"network": name},
+            trained=name, seeded=seeded,
+        )
+        for name, label, space, seeded in (
+            ("snug", "SNUG", "SNUG's last layer", True),
+            ("pbns", "PBNS", "PBNS's last layer", True),
+            ("pose-regression", "principal components", "64 principal components of the offsets", False),
+        )
+    ),
+)  # fmt: skip
+
 POST_PROCESSED = tuple(
     post_processed(network(name, label, ""))
     for name, label in (

@@ -11,6 +11,7 @@ from snug.recipes.deviations import exchange_deviations
 from snug.recipes.named import (
     ABLATIONS,
     DYNAMIC,
+    HANDLES,
     NEAREST_POSES,
     PAPER,
     PBNS,
@@ -32,6 +33,7 @@ TRAININGS = {
     "tailornet": Training("tailornet", TAILORNET, Simulated()),
     "nearest-poses": Training("nearest-poses", NEAREST_POSES, Simulated()),
     "pose-regression": Training("pose-regression", POSE_REGRESSION, Simulated()),
+    **{f"handles-{count}": Training(f"handles-{count}", HANDLES) for count in (20, 40, 80)},
     "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
     # Each deviation has as many steps as the recipe that it changes.

@@ -31,8 +31,8 @@ METRICS = (
     _dynamics("gain", "1", "Gain", "factor by which the hem answers its own quasi-static turn or shift"),
     _dynamics("lag", "frames", "Lag", "frames by which it comes later"),
     *(_dynamics(f"common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
-                "the same where every method's dynamic part is taken from the simulator's answer to poses "
-                "held still instead of its own", table="dynamics" if name in COMMON[:2] else "")
+                f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to "
+                "poses held still", table="dynamics" if name in COMMON[:2] else "")
       for name, title in zip(COMMON, ("Hem amplitude", "Correlation", "Gain", "Lag"))),
     _dynamics("ringing", "mm", "Ringing", "distance of the hem to where it ends, after the body has stopped"),
     *(_dynamics(f"ringing/{after}", "mm", f"Ringing, {after} frames",

@@ -1,0 +1,116 @@
+"""The floor of handles and of last layers: converged, within its subspace, above the simulation's step."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, find_method
+from benchmarks.metrics.energies.replayed_step import copied_terms, freeze_step
+from benchmarks.presets import find_preset
+from benchmarks.results.run_folder import model_path
+from reference_sim import Potential, minimise
+from snug.body.skinning import unskin
+from snug.networks.architectures import make_network
+from snug.networks.dressed_body import DressedBody
+from snug.networks.handles.shape_functions import shape_functions, span
+from snug.networks.trained_model import TrainedModel
+from snug.recipes.recipe import DEFAULT
+from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene
+from tests.snug.training.dressing import swaying, tube_dress
+
+FRAMES = 5
+
+
+@pytest.fixture(scope="module")
+def scene():
+    preset = dataclasses.replace(find_preset("smoke"), settle_frames=4)
+    motion = swaying(FRAMES)
+    return dressed_scene(motion.name, preset=preset).build(assets_of(tube_dress(), motion))
+
+
+def simulated(scene, name: str, models=None):
+    method = find_method(name).make(models=models, seed=0)
+    method.prepare(scene)
+    return method.run()
+
+
+@pytest.fixture(scope="module")
+def floor(scene):
+    return simulated(scene, "handles-20-floor")
+
+
+def unposed(scene, positions) -> np.ndarray:
+    """Offsets (T, 3 V) that skinning with the recipe's weights takes to positions."""
+    dressed, motion = DressedBody(scene.dressed.body, scene.dressed.garment), scene.dressed.motion
+    local = torch.from_numpy(positions - dressed.pelvis(motion)[:, None])
+    weights, transforms = (
+        dressed.weights(DEFAULT.smoothing).double(),
+        dressed.transforms(motion.poses).double(),
+    )
+    return (unskin(local, weights, transforms) - dressed.rest().double()).flatten(1).numpy()
+
+
+def left_over(columns: np.ndarray, offsets: np.ndarray) -> float:
+    return float(np.abs(columns @ np.linalg.lstsq(columns, offsets.T)[0] - offsets.T).max())
+
+
+def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertices(scene, floor):
+    assert floor.status == "converged" and floor.frame_fields["converged"].all()
+    columns = span(shape_functions(scene.dressed.garment, 20))
+    offsets = unposed(scene, floor.positions)
+    assert left_over(columns, offsets) < 1e-8 and np.abs(offsets).max() > 0.01
+    potential = Potential(copied_terms(scene))
+    dressed, weight = DressedBody(scene.dressed.body, scene.dressed.garment), scene.cloth.masses.mean() * 9.81
+    weights = dressed.weights(DEFAULT.smoothing).double().numpy()
+    transforms = dressed.transforms(scene.dressed.motion.poses).double().numpy()
+    for frame in range(1, FRAMES):
+        freeze_step(scene, potential, floor.positions, frame)
+        x = np.ascontiguousarray(floor.positions[frame])
+        assert potential.value(x) == pytest.approx(
+            sum(floor.frame_fields[f"energy/{term.name}"][frame] for term in potential.energies), abs=1e-9
+        )
+        assert minimise(potential, x).energy < potential.value(x)
+        # No force is left along any number of any handle, though there is along vertices.
+        turns = np.einsum("vj,jik->vik", weights, transforms[frame, ..., :3])
+        forces = np.einsum("vij,vi->vj", turns, potential.gradient(x))
+        sizes = np.linalg.norm(columns, axis=0)
+        assert np.abs(columns.T @ forces.ravel() / sizes).max() < 2e-6 * weight * np.sqrt(columns.shape[1])
+        assert np.abs(forces).max() > 0.1 * weight
+
+
+def test_more_handles_have_less_energy(scene, floor):
+    finer = simulated(scene, "handles-40-floor")
+    assert finer.status == "converged"
+
+    def energy(trajectory):
+        parts = [v for name, v in trajectory.frame_fields.items() if name.startswith("energy/")]
+        return float(np.sum(parts, axis=0)[2:].mean())
+
+    assert energy(simulated(scene, "simulation")) < energy(finer) < energy(floor)
+
+
+def test_the_floor_of_a_network_lies_in_the_span_of_its_last_layer(scene, tmp_path):
+    vertices = scene.cloth.vertex_count
+    network = make_network("pbns", 141, vertices, dataclasses.replace(DEFAULT, zero_last_layer=False), seed=0)
+    TrainedModel("pbns", network, DEFAULT).save(model_path(tmp_path, "pbns", 0))
+    floor = simulated(scene, "pbns-floor", tmp_path)
+    assert floor.status == "converged"
+    columns, _ = network.offset_space()
+    assert left_over(columns.double().numpy(), unposed(scene, floor.positions)) < 1e-6
+
+
+def test_networks_without_a_last_layer_have_no_floor():
+    with pytest.raises(ValueError, match="NearestPoses has no last layer"):
+        make_network("nearest-poses", 141, 5, DEFAULT, seed=0).offset_space()
+
+
+def test_floors_run_when_named_and_are_not_timed():
+    floors = [entry for entry in FURTHER_METHODS if entry.name.endswith("-floor")]
+    assert len(floors) == 6 and not any(entry.timed or entry.static_known for entry in floors)
+    assert {find_method(entry.reporting.base).name for entry in floors} == {
+        entry.name.removesuffix("-floor") for entry in floors
+    }

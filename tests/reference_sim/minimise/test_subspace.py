@@ -1,0 +1,140 @@
+"""Newton's method in a subspace: against the whole space, automatic differentiation and itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from torch.autograd import functional
+
+from reference_sim import Cloth, Potential, minimise
+from reference_sim.energies import BendHinge, Gravity, Inertia, StretchStVK
+from reference_sim.minimise.subspace import (
+    Placement,
+    SubspaceHessian,
+    SubspaceNewton,
+    SubspaceRun,
+    nearest_offsets,
+    orthonormal,
+)
+from tests.reference_sim.meshes import grid
+
+SHEET, FACES = grid(5, 5, width=0.5, depth=0.5)
+COUNT = len(SHEET)
+PINS = [0, 5]
+
+
+def potential() -> Potential:
+    """A step of a sheet that hangs from two corners, from a crumpled past."""
+    cloth = Cloth(SHEET, FACES, pins=PINS)
+    inertia = Inertia(cloth, 1 / 30)
+    inertia.x_hat = SHEET + np.random.default_rng(5).normal(0, 0.02, SHEET.shape) * cloth.free[:, None]
+    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), inertia])
+
+
+def placed() -> Placement:
+    """Vertices turned and sheared each in its own way, around the sheet."""
+    noise = np.random.default_rng(2).normal(0, 0.3, (COUNT, 3, 3))
+    return Placement(np.eye(3) + noise, SHEET)
+
+
+def basis(size: int) -> np.ndarray:
+    """Smooth waves along both sides, none at the pins; fewer are among more."""
+    waves = [
+        np.cos(np.pi * a * SHEET[:, 0] / 0.5) * np.cos(np.pi * b * SHEET[:, 2] / 0.5)
+        for a, b in sorted(np.ndindex(5, 5), key=sum)
+    ][:size]
+    flat = np.stack(waves, axis=1)
+    flat[PINS] = 0.0
+    return orthonormal(np.kron(flat, np.eye(3))).reshape(COUNT, 3, -1)
+
+
+def solved(space: np.ndarray, offsets: np.ndarray | None = None, placement: Placement | None = None):
+    start = np.zeros((COUNT, 3)) if offsets is None else offsets
+    steps = iter([placement or placed()])
+    return SubspaceNewton(potential(), basis=space, placements=steps, offsets=start).minimise(SHEET)
+
+
+def gradient_of(energy, q: torch.Tensor) -> torch.Tensor:
+    return functional.jacobian(energy, q)
+
+
+def test_the_whole_space_has_the_minimum_of_newtons_method():
+    whole = np.eye(3 * COUNT)
+    whole[:, [3 * pin + c for pin in PINS for c in range(3)]] = 0.0
+    result = solved(orthonormal(whole).reshape(COUNT, 3, -1))
+    expected = minimise(potential(), SHEET)
+    assert result.status == expected.status == "converged"
+    assert result.energy == pytest.approx(expected.energy, rel=1e-9)
+    assert np.abs(result.positions - expected.positions).max() < 1e-5
+
+
+def test_a_larger_space_has_less_energy_and_none_has_less_than_all_vertices():
+    energies, offsets = [], None
+    for size in (1, 3, 8, 16):
+        space = basis(size)
+        result = solved(space, offsets)
+        assert result.status == "converged", result.reason
+        offsets = placed().unposed(result.positions)
+        assert np.abs(nearest_offsets(space, offsets) - offsets).max() < 1e-12  # it stayed inside
+        assert np.array_equal(result.positions[PINS], SHEET[PINS])
+        energies.append(result.energy)
+    energies.append(minimise(potential(), result.positions).energy)
+    assert (np.diff(energies) < 0.0).all()
+
+
+def test_the_residual_of_a_minimum_is_that_of_automatic_differentiation():
+    space, terms, placement = basis(6), potential(), placed()
+    result = solved(space)
+    columns, turns = torch.from_numpy(space), torch.from_numpy(placement.turns)
+
+    def energy(q: torch.Tensor) -> torch.Tensor:
+        offsets = columns @ q
+        x = torch.from_numpy(placement.centre) + (turns @ offsets[..., None])[..., 0]
+        inertia = terms.energies[-1]
+        total = sum(term.energy(x).sum() for term in terms.energies[:-1])
+        return total + inertia.energy(x, torch.from_numpy(inertia.x_hat)).sum()
+
+    q = torch.from_numpy(np.einsum("vik,vi->k", space, placement.unposed(result.positions)))
+    weight = terms.cloth.masses.mean() * 9.81
+    assert float(energy(q)) == pytest.approx(result.energy, rel=1e-10)
+    at_minimum = gradient_of(energy, q).abs().max() / weight
+    assert at_minimum < 2e-6 and result.gradient_norm < 1e-6
+    # Elsewhere too, and second derivatives.
+    elsewhere = q + 0.01 * torch.randn(len(q), generator=torch.Generator().manual_seed(0), dtype=q.dtype)
+    x = placement.posed(np.einsum("vik,k->vi", space, elsewhere.numpy()))
+    solver = SubspaceNewton(terms, basis=space, placements=iter(()), offsets=placement.unposed(x))
+    free = terms.cloth.free
+    posed = np.einsum("vij,vjk->vik", placement.turns, space)[free].reshape(3 * free.sum(), -1)
+    assert isinstance(solver.hessian, SubspaceHessian)
+    solver.hessian.basis = posed
+    run = SubspaceRun(solver, x, None)
+    gradient, hessian = gradient_of(energy, elsewhere).numpy(), functional.hessian(energy, elsewhere).numpy()
+    assert run.gradient_norm() == pytest.approx(np.abs(gradient).max() / weight, rel=1e-8)
+    hessian += 1e3 * posed.T @ (solver.hessian.metric[:, None] * posed)
+    assert run.factorise(run.assemble(0.0), 1e3)
+    direction = posed @ np.linalg.solve(hessian, -gradient)
+    assert np.abs(run.solve(-run.g) - direction).max() < 1e-8 * np.abs(direction).max()
+    assert not run.factorise(run.assemble(0.0), -1e3)  # not positive definite
+
+
+def test_each_step_starts_from_the_last_ones_offsets():
+    first, second = placed(), Placement(placed().turns, SHEET + np.array([0.0, 0.0, 0.01]))
+    solver = SubspaceNewton(
+        potential(),
+        basis=basis(4),
+        placements=iter([first, second]),
+        offsets=np.zeros((COUNT, 3)),
+        max_iterations=0,
+    )
+    before = solver.minimise(SHEET).positions
+    after = solver.minimise(SHEET).positions
+    free = potential().cloth.free
+    assert np.allclose((after - before)[free], [0.0, 0.0, 0.01], atol=1e-12)
+
+
+def test_columns_that_others_express_are_left_out():
+    columns = np.random.default_rng(0).normal(size=(9, 3))
+    space = orthonormal(np.concatenate([columns, columns @ [[1.0], [2.0], [3.0]]], axis=1))
+    assert space.shape == (9, 3) and np.allclose(space.T @ space, np.eye(3))
+    assert np.allclose(space @ (space.T @ columns), columns)

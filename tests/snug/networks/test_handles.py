@@ -1,0 +1,108 @@
+"""Handles: their shape functions, what they express, and a network of them through training and file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from snug.body.skeleton import rotation_matrices
+from snug.networks.handles.shape_functions import HandleError, farthest_points, shape_functions, span
+from snug.networks.roll_out import roll_out
+from snug.networks.trained_model import TrainedModel
+from snug.recipes.named import HANDLES
+from snug.training.train_network import train_network, untrained_model
+from tests.snug.training.dressing import swaying, tube_dress
+
+COUNT = 20
+
+
+@pytest.fixture(scope="module")
+def garment():
+    return replace(tube_dress().garment, pins=np.array([3, 77]))
+
+
+@pytest.fixture(scope="module")
+def trained():
+    return train_network(
+        "handles-20", tube_dress(), [swaying(12)], steps=3, seed=0, recipe=HANDLES, progress=False
+    )
+
+
+def test_weights_are_a_partition_of_unity_without_the_pins(garment):
+    weights = shape_functions(garment, COUNT)[..., 3]
+    free = np.setdiff1d(np.arange(len(weights)), garment.pins)
+    assert (weights >= 0.0).all() and np.abs(weights[free].sum(1) - 1.0).max() < 1e-14
+    assert not weights[garment.pins].any()
+    assert 1 < (weights[free] > 0).sum(1).max() < COUNT  # compact
+    # Smooth to where a handle ends: its least weights are small.
+    assert max(w[w > 0].min() for w in weights[free].T) < 0.05
+
+
+@pytest.mark.parametrize("count", [1, 2, COUNT])
+def test_handles_move_the_garment_rigidly_and_affinely_without_error(count):
+    garment = tube_dress().garment
+    rest = np.asarray(garment.rest_positions)
+    rotation = rotation_matrices(np.array([0.4, -1.1, 0.3]))
+    columns = span(shape_functions(garment, count))
+    for matrix in (rotation, np.diag([1.1, 0.8, 1.0]) @ rotation):
+        offsets = (rest @ matrix.T + [0.1, -0.2, 0.3] - rest).ravel()
+        numbers = np.linalg.lstsq(columns, offsets)[0]
+        assert np.abs(columns @ numbers - offsets).max() < 1e-12
+    bent = (rest[:, 1:2] ** 2 * [1.0, 0.0, 0.0]).ravel()
+    numbers = np.linalg.lstsq(columns, bent)[0]
+    assert count > 2 or np.abs(columns @ numbers - bent).max() > 1e-3
+
+
+def test_centres_are_farthest_points_and_more_of_them_keep_the_first():
+    rest = np.asarray(tube_dress().garment.rest_positions)
+    few, many = farthest_points(rest, 8), farthest_points(rest, 30)
+    assert (many[:8] == few).all() and len(set(many)) == 30
+
+    def radius(centres):
+        return np.linalg.norm(rest[:, None] - rest[centres], axis=2).min(1).max()
+
+    assert radius(many) < radius(few)
+    chosen = np.linalg.norm(rest[few][:, None] - rest[few], axis=2)[~np.eye(8, dtype=bool)]
+    assert chosen.min() >= radius(few)
+
+
+@pytest.mark.parametrize("count", [0, 150])
+def test_a_number_that_the_garment_cannot_have_is_refused(count):
+    with pytest.raises(HandleError, match=f"{count} handles.*150 vertices has 1 to 149"):
+        shape_functions(tube_dress().garment, count)
+
+
+def test_a_network_starts_as_skinning():
+    motion, recipe = swaying(6), HANDLES
+    model = untrained_model("handles-20", tube_dress(), [motion], seed=0, recipe=recipe)
+    skinned = tube_dress().skinned(motion, smoothing=recipe.smoothing)
+    assert np.abs(roll_out(model, tube_dress(), motion).positions - skinned).max() > 1e-3
+    for parameter in model.network.last_layers()[0].parameters():
+        torch.nn.init.zeros_(parameter)
+    assert np.abs(roll_out(model, tube_dress(), motion).positions - skinned).max() < 1e-6
+
+
+def test_training_moves_the_numbers_and_leaves_the_shape_functions(trained):
+    functions = shape_functions(tube_dress().garment, COUNT)
+    assert np.abs(trained.network.functions.numpy() - functions).max() < 1e-6
+    assert trained.network.numbers.weight.abs().max() > 0.0
+    assert trained.history[-1]["loss"] < trained.history[0]["loss"] or len(trained.history) == 1
+
+
+def test_offsets_lie_in_the_space_that_the_network_names(trained):
+    columns, centre = trained.network.offset_space()
+    features = torch.randn(1, 4, len(trained.network.input_mean))
+    offsets = trained.network(features)[0].flatten(-2)[0]
+    network = trained.network
+    numbers = network.output_scale * network.numbers(network.activations(network.normalise(features)))[0]
+    assert torch.allclose(offsets, numbers @ columns.T + centre, atol=1e-6) and offsets.abs().max() > 1e-5
+
+
+def test_a_file_gives_the_same_network(trained, tmp_path):
+    loaded = TrainedModel.load(trained.save(tmp_path / "handles.safetensors"))
+    motion = swaying(5)
+    first, again = (roll_out(model, tube_dress(), motion).positions for model in (trained, loaded))
+    assert np.array_equal(first, again) and loaded.megabytes == trained.megabytes
