@@ -131,7 +131,7 @@ def _sampling() -> dict[str, Any]:
     from benchmarks.metrics.surface import body_intersections, surface_distance, swept_crossings
 
     return {
-        "presets": {preset.name: asdict(replace(preset, description="")) for preset in PRESETS},
+        "presets": {preset.name: asdict(replace(preset, description="", steps={})) for preset in PRESETS},
         "gap": (energy_gap.PRECISION, energy_gap.NEGLIGIBLE, energy_gap.ITERATIONS),
         "hem": (hem.HELD, hem.SHIFTING, hem.MAX_LAG, hem.SHORTEST, hem.NO_MOTION),
         "body": (body_intersections.SAMPLED_FRAMES, body_intersections.OFFSET),

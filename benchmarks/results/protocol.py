@@ -17,9 +17,9 @@ DIGESTS = {
     "scenes": "2949e3d57aec722f",
     "materials": "832890dcb5d69952",
     "motions": "dc71f7b3a0e629a9",
-    "metrics": "a5eab060bbe89364",
+    "metrics": "3aafcf42de3f3d3f",
     "reference": "28da648b87037fbc",
-    "sampling": "50c7bfe97f3707d7",
+    "sampling": "5cb5be5dcae80426",
     "statistics": "bbdacc941ceaa26a",
 }
 DIGEST = digest(DIGESTS)
