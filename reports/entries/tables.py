@@ -16,12 +16,12 @@ from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.relative_excess import excess_of
 from reports.tables.table import Cell, Column, Table
 
-DYNAMICS, PENETRATION, TIME = "dynamics/common_amplitude", "penetration/surface", "cost/frame"
+DYNAMICS, PENETRATION, TIME = "dynamics/common_correlation", "penetration/surface", "cost/frame"
 ROLES = ("bound", "baseline", "network", "solver", "external")  # of the project's own methods
 COLUMNS = (
     Column("entry", "Entry", text=True),
     Column("relative_excess/total", "Relative excess", "%"),
-    Column(DYNAMICS, "Dynamic amplitude"),
+    Column(DYNAMICS, "Dynamic correlation"),
     Column(PENETRATION, "Surface inside", "%"),
     Column(TIME, "Time", "ms"),
     Column("clock", "Time is", text=True),
