@@ -50,9 +50,9 @@ class Recipe:
         window: frames of a sub-sequence.
         batch: sub-sequences of a step.
         window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
-        even: parts of an epoch that each pass over all motions, each taking one sub-sequence of so many: by
-            chance alone (1) a hard pose may come so late that the network, by then settled, meets it with
-            joules.
+        even: parts of an epoch, each of which passes over all motions and takes one sub-sequence of so many.
+            With 1 the order is random, and a hard pose may first appear after the network has settled,
+            with a loss of joules.
         shape_range: bodies get shape numbers from U(-r, r).
         shape_of: receivers of a shape: each `window` in each step anew, as the paper has it, or each
             augmented `clip` once, while original motions stay on the mean body: all that is known of a frame
