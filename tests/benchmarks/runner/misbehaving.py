@@ -17,6 +17,9 @@ from benchmarks.method import Method
 from benchmarks.runner.local_executor import LocalExecutor
 from reference_sim.trajectory.trajectory import Trajectory
 
+# No other test starts a process by this text, so that the test which looks for it finds its own alone.
+HANGING_CHILD = "import time; time.sleep(61.5)"
+
 
 class Misbehaving(Method):
     """Skips all physics; `how` says what it does instead of its work."""
@@ -71,7 +74,7 @@ class Misbehaving(Method):
         return None
 
     def _hang(self, _) -> None:
-        subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+        subprocess.Popen([sys.executable, "-c", HANGING_CHILD])
         while True:
             time.sleep(0.05)
 

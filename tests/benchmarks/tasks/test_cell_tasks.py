@@ -30,6 +30,7 @@ from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import SCENES as DECLARED
 from benchmarks.tasks.cell_task import CellProcess
 from benchmarks.tasks.task import Context, Outcome, failure
+from tests.benchmarks.runner.misbehaving import HANGING_CHILD
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = {scene.name: scene for scene in DECLARED}
@@ -175,7 +176,10 @@ def test_a_cell_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="hang", preset=dataclasses.replace(TINY, cell_seconds=4.0))
     outcome = outcome_of(plan)
     assert outcome.status == "timeout" and "4 s" in outcome.reason
-    assert of_session(os.getsid(0), "time.sleep(60)") == []
+    deadline = time.monotonic() + 5.0  # what was killed may take a moment to go
+    while of_session(os.getsid(0), HANGING_CHILD) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert of_session(os.getsid(0), HANGING_CHILD) == []
 
 
 LEAVING = """
