@@ -60,15 +60,12 @@ RUNS = {
         ("textile_errors",),
     ),
     "ablations": PublishedRun(
-        "each energy left out of the loss; springs; Santesteban 2019 and TailorNet",
-        _validation("simulation-springs,simulation-pbns-springs,snug,snug+cleanup,snug-springs,pbns,"
-                    "pbns-springs,santesteban2019,tailornet,snug-no-*"),
+        "each energy left out of the loss, windows, first states, forms of inertia, springs; Santesteban 2019 "
+        "and TailorNet; vertices optimised directly",
+        _validation("simulation-springs,simulation-pbns-springs,direct-optimisation,snug,snug+cleanup,"
+                    "snug-paper,snug-springs,snug-no-*,snug-noise-alone,snug-window6,snug-window12,"
+                    "snug-detached-past,snug-two-transitions,pbns,pbns-springs,santesteban2019,tailornet"),
         ("frames_tshirt-sudden_stop",),
-    ),
-    "windows": PublishedRun(
-        "longer windows of the loss, first states, vertices optimised directly",
-        _validation("snug,snug-paper,snug-no-noise,snug-noise-alone,snug-window6,snug-window12,"
-                    "direct-optimisation"),
     ),
     "equal_data": PublishedRun(
         "networks with the same frames and numbers of steps",
