@@ -12,7 +12,9 @@ from reports.statistics.pareto import Point, front
 
 SOLVERS = Style("Solvers stopped early", "#A3324B", "X")
 STARTED = ("warm-started",)  # role of solvers that start from another method
-OF_REFERENCE = ("reference-variant",)  # role of methods that only say how the reference depends on its options
+OF_REFERENCE = (
+    "reference-variant",
+)  # role of methods that only say how the reference depends on its options
 
 
 @dataclass(frozen=True)

@@ -64,9 +64,7 @@ def place_labels(
         text.set_in_layout(False)
         letters = text.get_window_extent()
         places = _places(spot, letters.width, letters.height, pixels)
-        costs = [
-            cost * letters.height + _cost(box, lead, frame, taken, marks) for box, lead, cost in places
-        ]
+        costs = [cost * letters.height + _cost(box, lead, frame, taken, marks) for box, lead, cost in places]
         place = int(np.argmin(costs))
         box, lead, _ = places[place]
         free = costs[place] < MOST_COST * letters.height**2 and not len(lead)
@@ -108,7 +106,7 @@ def _places(
 def _cost(
     box: np.ndarray, lead: np.ndarray, frame: np.ndarray, taken: np.ndarray, marks: np.ndarray
 ) -> float:
-    """Return what a place of a label costs for all that it covers, and its leading line for what it crosses."""
+    """Return what a place of a label costs: for all that it covers and that its leading line crosses."""
     width, height = box[2:] - box[:2]
     covered = ON_LABEL * _shared(box, taken) + ON_MARK * _shared(box, marks)
     crossed = sum(ON_LABEL * _shared(piece, taken) + ON_MARK * _shared(piece, marks) for piece in lead)
