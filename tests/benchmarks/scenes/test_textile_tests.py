@@ -59,6 +59,8 @@ def test_a_copy_of_gauge_brings_its_fabrics_and_the_repeatability_of_its_experim
     assert {"gauge_repeatability_bending_satin", "gauge_spread_bending_satin"} < {c.name for c in plan.cases}
     methods = {cell.method for cell in plan.cells if cell.scene.name == "fabric/cantilever/gauge/satin"}
     assert {"simulation", *(entry.name for entry in METHODS if entry.role == "solver")} < methods
+    alone = plan_of("--suite", "fabric", "--gauge", folder, "--scenes", "gauge_*_bending_*")
+    assert len(alone.cases) == 2 and not alone.cells
     with pytest.raises(PlanError, match=r"--gauge .*: only suite fabric"):
         plan_of("--gauge", folder)
     with pytest.raises(PlanError, match="--gauge: its files lie on this machine alone"):
