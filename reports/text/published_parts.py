@@ -1,6 +1,6 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
-`headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
+`headline of RUN`, `excess METHOD of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
 `claims exploratory of RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of
 reports/published, and the first run that has both methods of a claim judges it. `rooms of PACKAGE`,
 `attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of NAME, ...`, `clips of the
@@ -21,14 +21,16 @@ from reports.tables import TABLES
 from reports.tables.table import Table
 from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
 from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, recipe_rows
+from reports.text.excess_terms import excess_terms
 from reports.text.rooms import room_rows
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.motion.composition import clip_rows, distance_rows
 
 FORMS = (
-    "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
-    "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; rooms of PACKAGE; attributes of MODULE.CLASS; docstring of MODULE; recipes of "
+    "headline of RUN; excess METHOD of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
+    "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; rooms of PACKAGE; "
+    "attributes of MODULE.CLASS; docstring of MODULE; recipes of "
     f"NAME, ...; clips of the library; distances of the library; {'; '.join(PARTS)}"
 )
 
@@ -56,6 +58,8 @@ def published_part(words: str) -> str:
         return markdown_table(list(LIBRARY_TABLES[kind]()))
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
+    if kind == "excess":
+        return excess_terms(read_published(folders[0]), name)
     if kind == "table":
         wanted = [column.strip() for column in columns.split(",") if column.strip()]
         table = _table(folders[0], name)
