@@ -54,7 +54,7 @@ class NewtonCloth(EngineCloth):
         self._states = self.model.state(), self.model.state()
 
     def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions (V, 3) [m] and velocities [m/s] a time step of dt [s] after x and v, in float64."""
+        """Return positions (V, 3) [m] and velocities [m/s] a time step of dt [s] later, in float64."""
         now, then = self._states
         now.particle_q.assign(x.astype(np.float32))
         now.particle_qd.assign(v.astype(np.float32))
@@ -63,7 +63,7 @@ class NewtonCloth(EngineCloth):
 
 
 def build_model(cloth: Cloth, solver: str) -> Any:
-    """Build the newton.Model of `cloth` for "VBD", "XPBD" or "Style3D", with the parameters of the table above."""
+    """Build the newton.Model of `cloth` for "VBD", "XPBD" or "Style3D", by the table above."""
     import newton
     import warp
 

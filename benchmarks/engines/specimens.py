@@ -53,7 +53,7 @@ def thrown() -> Specimen:
     cloth = _sheet()
     x = cloth.rest_positions
     spin = SPIN * np.stack([x[:, 2], np.zeros(len(x)), -x[:, 0]], axis=1)
-    return Specimen(cloth, x, spin + [SPEED, 0.0, 0.0])
+    return Specimen(cloth, x, spin + np.array([SPEED, 0.0, 0.0]))
 
 
 def hanging() -> Specimen:
