@@ -44,12 +44,6 @@ def claim_rows(claims: JudgedClaims, *, primary: bool) -> list[list[str]]:
     return [HEAD, *(_row(claim, claims) for claim in (PRIMARY if primary else EXPLORATORY))]
 
 
-def rows_of_earlier_runs(current: JudgedClaims, earlier: JudgedClaims) -> list[list[str]]:
-    """Return a heading and a row of each claim that earlier runs alone can judge."""
-    only = [claim for claim in (*PRIMARY, *EXPLORATORY) if claim in earlier.verdicts]
-    return [HEAD, *(_row(claim, earlier) for claim in only if claim not in current.verdicts)]
-
-
 def claim_counts(claims: JudgedClaims) -> str:
     """Return how many claims came out how, the primary ones first."""
     lines = []

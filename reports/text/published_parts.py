@@ -1,11 +1,10 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
 `headline of RUN`, `excess METHOD of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
-`claims exploratory of RUN, ...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`,
-`runs of RUN, ...`; RUN is a folder of reports/published. Earlier runs judge claims that the runs before them
-cannot. `rooms of PACKAGE`, `attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of
-NAME, ...`, `clips of the library`, `distances of the library` and the parts that `code_parts.PARTS` names
-come from the code.
+`claims exploratory of RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of
+reports/published, and the first run that has both methods of a claim judges it. `rooms of PACKAGE`,
+`attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of NAME, ...`, `clips of the
+library`, `distances of the library` and the parts that `code_parts.PARTS` names come from the code.
 """
 
 from __future__ import annotations
@@ -20,13 +19,7 @@ from reports.run.reading import read_run_with_trainings
 from reports.statistics.published import PUBLISHED
 from reports.tables import TABLES
 from reports.tables.table import Table
-from reports.text.claim_rows import (
-    JudgedClaims,
-    claim_counts,
-    claim_rows,
-    judge_in_first,
-    rows_of_earlier_runs,
-)
+from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
 from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, recipe_rows
 from reports.text.excess_terms import excess_terms
 from reports.text.rooms import room_rows
@@ -36,8 +29,8 @@ from snug.motion.composition import clip_rows, distance_rows
 
 FORMS = (
     "headline of RUN; excess METHOD of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
-    "claims exploratory of RUN, ...; claims earlier of RUN, ...; EARLIER RUN, ...; counts of RUN, ...; "
-    "runs of RUN, ...; rooms of PACKAGE; attributes of MODULE.CLASS; docstring of MODULE; recipes of "
+    "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; rooms of PACKAGE; "
+    "attributes of MODULE.CLASS; docstring of MODULE; recipes of "
     f"NAME, ...; clips of the library; distances of the library; {'; '.join(PARTS)}"
 )
 
@@ -72,9 +65,6 @@ def published_part(words: str) -> str:
         table = _table(folders[0], name)
         rows = text_rows(read_published(folders[0]), table, wanted)
         return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
-    if words.startswith("claims earlier"):
-        earlier = [PUBLISHED / run.strip() for run in columns.split(",")]
-        return markdown_table(rows_of_earlier_runs(_claims(*folders), _claims(*earlier)))
     if kind == "claims":
         return markdown_table(claim_rows(_claims(*folders), primary=name == "primary"))
     if kind == "counts":
