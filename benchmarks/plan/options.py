@@ -74,8 +74,9 @@ def make_parser() -> argparse.ArgumentParser:
     add_scene_options(parser)
     add = parser.add_argument
     add("--suite", action="append", default=[], metavar="NAME",
-        help="garments, speed, validation, extremes, shapes, fabric, performance or all, in full; repeat or "
-        "separate by commas (default: the quick subset of each but shapes, fabric, performance)")  # fmt: skip
+        help="garments, speed, validation, extremes, shapes, fabric, engines, performance or all, in full; "
+        "repeat or separate by commas (default: the quick subset of each but shapes, fabric, engines, "
+        "performance)")  # fmt: skip
     file = "; a file (mine.py) means all that it declares"
     add(
         "--scenes",

@@ -221,6 +221,12 @@ SUITES = (
         default=False,
     ),
     Suite(
+        name="engines",
+        description="cloth of other engines: laws of mechanics, distance from their own limit, time; only "
+        "where it is named",
+        default=False,
+    ),
+    Suite(
         name="performance",
         description="microbenchmarks: a solver step, a training step, a frame of a network; only where it is "
         "named",

@@ -59,6 +59,10 @@ RUNS = {
         {"": "--suite fabric"},
         ("textile_errors",),
     ),
+    "engines": PublishedRun(
+        "laws of mechanics and distance from their own limit, of cloth of other engines",
+        {"": "--suite engines"},
+    ),
     "ablations": PublishedRun(
         "each energy left out of the loss, windows, first states, forms of inertia, springs; Santesteban "
         "2019 and TailorNet; vertices optimised directly",

@@ -280,7 +280,7 @@ class Schedule:
     def case(self, case: Case) -> RunCase:
         """Return the task of a known answer or a stress test."""
         return RunCase(
-            name=case.name, label=case.name, case=case, deadline=case.seconds,
+            name=case.name, label=case.name, case=case, deadline=case.seconds, process=case.process,
             inputs=self.inputs.machine() | {"declared": declared(case)},
             modules=(case.module, "benchmarks.validation.case", f"{TASKS}.case"),
         )  # fmt: skip

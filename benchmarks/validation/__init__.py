@@ -7,6 +7,7 @@
 | dynamics | discrete laws of backward Euler, orders in dt, dependence on mesh and time step |
 | curvature | the curvature metric on known surfaces |
 | fabric | textile tests: the master curve, bending lengths and drape, of suite fabric |
+| engines | laws that any engine owes, and its distance from its own limit, of suite engines |
 | solvers | derivatives of all terms, properties of the minimisers |
 | stress | single steps that converge truly or fail and say so |
 

@@ -39,6 +39,9 @@ class Case:
         long: whether it is left out where no suite is named.
         seconds: after which the case's process is ended; None: never.
         map_point: (factor on the stiffness, time step [s]) of a point of a stability map, which its scene is.
+        method: of its row.
+        process: where it has a name, the case is timed: it runs alone on the machine, in the process of this
+            name, after others of this name.
     """
 
     name: str
@@ -57,6 +60,8 @@ class Case:
     long: bool = False
     seconds: float | None = None
     map_point: tuple[float, float] | None = None
+    method: str = METHOD
+    process: str = ""
 
     def run(self) -> Row:
         """Measure here and now and return the row. What is raised becomes a failed row with its reason."""
@@ -101,7 +106,7 @@ class Case:
         return Row(
             suite=self.suite,
             scene=self.scene or self.name,
-            method=METHOD,
+            method=self.method,
             seed=0,
             metric=self.metric,
             unit=self.unit,

@@ -11,6 +11,7 @@ from benchmarks.validation.case import Case
 from benchmarks.validation.contact import cases as contact
 from benchmarks.validation.curvature import cases as curvature
 from benchmarks.validation.dynamics import cases as dynamics
+from benchmarks.validation.engines import cases as engines
 from benchmarks.validation.fabric import cases as fabric
 from benchmarks.validation.friction import cases as friction
 from benchmarks.validation.membrane import cases as membrane
@@ -37,4 +38,4 @@ REFERENCES: tuple[Case, ...] = (
 
 KNOWN_ANSWERS: tuple[Case, ...] = (*EXACT, *ORDERS, *REFERENCES)
 STRESS_TESTS: tuple[Case, ...] = stress.CASES
-CASES: tuple[Case, ...] = (*KNOWN_ANSWERS, *STRESS_TESTS, *fabric.TEXTILE_TESTS)
+CASES: tuple[Case, ...] = (*KNOWN_ANSWERS, *STRESS_TESTS, *fabric.TEXTILE_TESTS, *engines.CASES)

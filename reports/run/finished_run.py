@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from reference_sim.trajectory.trajectory import Trajectory
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
-SUITES = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "performance")
+SUITES = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "engines", "performance")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
 from reports.tables.dictionary import dictionary
 from reports.tables.equal_data import EQUAL_DATA
+from reports.tables.fabric.engines import engine_audit, engine_laws
 from reports.tables.fabric.textile_tests import (
     fabric_bands,
     fabric_drape,
@@ -53,6 +54,8 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     fabric_drape,
     fabric_bands,
     fabric_repeatability,
+    engine_audit,
+    engine_laws,
     validation,
     extremes,
     endings,

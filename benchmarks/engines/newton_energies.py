@@ -17,8 +17,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from benchmarks.methods.solvers.newton_physics import spring_stiffness
-from reference_sim import Cloth
+from benchmarks.engines.newton_cloth import spring_stiffness
+from reference_sim.cloth import Cloth
+from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.energy import Energy
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class StableNeoHookean(Energy):
         self.mu, self.lam = cloth.material.lame_mu, cloth.material.lame_lambda
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return the energy (N,) [J] of each element at u (N, k, 3) [m]."""
         import torch
 
         area = torch.as_tensor(self.cloth.areas).to(u)
@@ -59,8 +61,17 @@ class UnequalSprings(Energy):
         self.stiffness = spring_stiffness(cloth)
 
     def element_energy(self, u: Tensor) -> Tensor:
+        """Return the energy (N,) [J] of each element at u (N, k, 3) [m]."""
         import torch
 
         length = torch.linalg.vector_norm(u[..., 1, :] - u[..., 0, :], dim=-1)
         rest = torch.as_tensor(self.cloth.edge_lengths).to(u)
         return 0.5 * torch.as_tensor(self.stiffness).to(u) * (length - rest) ** 2
+
+
+def energies_of(solver: str, cloth: Cloth) -> tuple[Energy, ...]:
+    """Return the static terms that "VBD" or "XPBD" minimises, gravity aside; none for "Style3D"."""
+    membranes: dict[str, type[StableNeoHookean] | type[UnequalSprings]] = {
+        "VBD": StableNeoHookean, "XPBD": UnequalSprings,
+    }  # fmt: skip
+    return (membranes[solver](cloth), BendHinge(cloth)) if solver in membranes else ()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.methods.solvers.newton_physics import NewtonCloth, build_model, spring_stiffness
+from benchmarks.engines.newton_cloth import NewtonCloth, build_model, spring_stiffness
+from benchmarks.engines.newton_energies import StableNeoHookean, UnequalSprings
 from benchmarks.performance.sheet import DT, regular_sheet
 from reference_sim import Potential, simulate
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import Newton
-from tests.reference_sim.energies.newton_energies import StableNeoHookean, UnequalSprings
 
 
 def test_stable_neo_hookean_meets_its_closed_form_and_stvk_at_rest():
@@ -43,7 +43,7 @@ def test_springs_have_the_stiffness_of_the_area_around_them():
 
 @pytest.mark.parametrize("solver", ["VBD", "XPBD"])
 def test_newton_is_given_our_cloth(solver):
-    pytest.importorskip("newton", reason="needs the extra `peers`")
+    pytest.importorskip("newton", reason="needs the extra `engines`")
     cloth = regular_sheet(5)
     model = build_model(cloth, solver)
     free = np.setdiff1d(np.arange(cloth.vertex_count), cloth.pins)
@@ -74,7 +74,7 @@ def test_newton_is_given_our_cloth(solver):
 )
 def test_newton_descends_the_energy_that_we_say_it_does(solver, energy, iterations, dt):
     """Many iterations of one step end within float32 of the minimum that our Newton finds in float64."""
-    pytest.importorskip("newton", reason="needs the extra `peers`")
+    pytest.importorskip("newton", reason="needs the extra `engines`")
     cloth = regular_sheet(6)
     start = cloth.rest_positions + np.random.default_rng(0).normal(0, 1e-4, cloth.rest_positions.shape)
     start[cloth.pins] = cloth.rest_positions[cloth.pins]

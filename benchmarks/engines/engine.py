@@ -1,0 +1,115 @@
+"""Engine: declaration of a cloth solver under test, and what its adapter has to do."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.provenance import package_version
+
+if TYPE_CHECKING:
+    from benchmarks.engines.specimens import Specimen
+    from reference_sim.energies.energy import Energy
+
+FRAME = 1 / 30  # [s] between frames
+ITERATIONS, SUBSTEPS = "iterations", "substeps"
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """State at the end of a frame.
+
+    Attributes:
+        x: positions (V, 3) [m].
+        v: velocities (V, 3) [m/s]; None where the engine does not tell.
+        before: x and v one time step earlier; None where the engine does not tell.
+    """
+
+    x: np.ndarray
+    v: np.ndarray | None = None
+    before: tuple[np.ndarray, np.ndarray] | None = None
+
+
+class EngineCloth:
+    """Cloth of an engine, ready to step. An adapter defines `advance`, or `frames` where it has no state.
+
+    Attributes:
+        energies: static terms that the engine minimises, gravity aside; empty where they are not documented.
+    """
+
+    energies: Sequence[Energy] = ()
+
+    def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions (V, 3) [m] and velocities [m/s] a time step of dt [s] after x and v."""
+        raise NotImplementedError
+
+    def frames(self, specimen: Specimen, substeps: int) -> Iterator[Frame]:
+        """Yield frame after frame without end, `substeps` time steps each."""
+        x, v = specimen.start, specimen.velocity
+        while True:
+            for _ in range(substeps):
+                before = x, v
+                x, v = self.advance(x, v, FRAME / substeps)
+            yield Frame(x, v, before)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Engine:
+    """Declaration of an engine: cheap to list, nothing is imported before `make`.
+
+    Attributes:
+        name: without a slash; first part of the names of its cases.
+        title: for people.
+        module: that is imported; package: the distribution whose version counts; both empty for the project.
+        licence: SPDX identifier.
+        install: command that installs it.
+        substeps, iterations: of its default settings, per frame of 1/30 s and per time step.
+        settings: where these defaults come from.
+        grows: ITERATIONS or SUBSTEPS, what is multiplied to give it a larger budget.
+        factors: of the budgets, the default first.
+        throws: whether a sheet can be given a velocity.
+        make: (specimen, iterations) -> EngineCloth.
+    """
+
+    name: str
+    title: str
+    module: str = ""
+    package: str = ""
+    licence: str
+    install: str = ""
+    substeps: int
+    iterations: int = 1
+    settings: str
+    grows: str = ITERATIONS
+    factors: tuple[int, ...]
+    throws: bool = True
+    make: Callable[[Specimen, int], EngineCloth]
+
+    @property
+    def absent(self) -> str:
+        """Why it cannot run, with the command that mends it; empty where it is installed."""
+        if not self.module or importlib.util.find_spec(self.module) is not None:
+            return ""
+        return f"{self.title} is not installed: {self.install}"
+
+    @property
+    def version(self) -> str:
+        """Name, version and licence, for every row."""
+        version = package_version(self.package or "neural-garment-benchmark")
+        return f"{self.package or 'this project'} {version}, {self.licence}"
+
+    def budget(self, factor: int) -> tuple[int, int]:
+        """Return sub-steps per frame and iterations per time step of that multiple of the default.
+
+        Raises:
+            ValueError: the factor is below 1.
+        """
+        if factor < 1:
+            raise ValueError(f"engine {self.name}: factor {factor}: give 1 or more")
+        if self.grows == SUBSTEPS:
+            return factor * self.substeps, self.iterations
+        return self.substeps, factor * self.iterations

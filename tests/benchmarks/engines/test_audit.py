@@ -1,0 +1,114 @@
+"""Audit of engines: known answers by fake engines, the reference, and the true engines where installed."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.engines import laws
+from benchmarks.engines.engine import EngineCloth
+from benchmarks.engines.registry import ENGINES, REFERENCE, find_engine
+from benchmarks.engines.roll_outs import EngineDiverged, roll_out
+from benchmarks.engines.specimens import specimen
+from benchmarks.plan.choose_cells import choose_suites
+from benchmarks.validation.engines import audit
+from benchmarks.validation.engines.cases import CASES
+from reference_sim.material import GRAVITY
+
+
+class Falling(EngineCloth):
+    """Free particles whose gravity and velocity are multiplied by what a fault would."""
+
+    def __init__(self, gravity=1.0, kept=1.0):
+        self.gravity, self.kept = gravity, kept
+
+    def advance(self, x, v, dt):
+        v = self.kept * (v - [0.0, self.gravity * GRAVITY * dt, 0.0])
+        return x + dt * v, v
+
+
+def fake(**fault):
+    return dataclasses.replace(REFERENCE, substeps=4, make=lambda sample, iterations: Falling(**fault))
+
+
+def test_backward_eulers_free_fall_is_exact_and_a_halved_one_a_violation():
+    exact = roll_out(fake(), specimen("falling"))
+    assert laws.fall_over_discrete_law(exact) == pytest.approx(1.0, abs=1e-12)
+    assert laws.fall_over_continuous_law(exact) == pytest.approx(121 / 120, abs=1e-12)
+    halved = roll_out(fake(gravity=0.5), specimen("falling"))
+    assert laws.fall_over_discrete_law(halved) == pytest.approx(0.5, abs=1e-12)
+
+
+def test_damped_velocity_violates_momentum():
+    assert laws.momentum_error(roll_out(fake(), specimen("thrown"))) < 1e-10
+    n = np.arange(1, 121)
+    expected = 100 * (1 - (0.998**n).mean())
+    damped = laws.momentum_error(roll_out(fake(kept=0.998), specimen("thrown")))
+    assert damped == pytest.approx(expected, rel=1e-9)
+
+
+def test_asymmetry_is_that_of_one_moved_vertex():
+    run = roll_out(fake(), specimen("hanging"))
+    assert laws.asymmetry(run) < 1e-10
+    moved = run.positions.copy()
+    moved[5, 3, 2] += 0.1
+    crooked = dataclasses.replace(run, positions=moved)
+    assert laws.asymmetry(crooked) == pytest.approx(10.0 / laws.motion(crooked), rel=1e-6)
+
+
+def test_an_engine_that_explodes_says_when():
+    with pytest.raises(EngineDiverged, match="frame 1: a vertex"):
+        roll_out(fake(gravity=1e9), specimen("falling"))
+
+
+def test_the_reference_keeps_all_laws():
+    for case in CASES:
+        if case.method == "reference" and case.function == "law" and "strip" not in case.options.values():
+            row = case.run()
+            assert row.status == "ok", row.reason
+            assert row.tolerance is None or abs(row.value - row.expected) < 1e-3 * row.tolerance
+            assert "MIT" in row.reason and row.method == "reference"
+
+
+def test_the_least_budget_is_one_from_which_all_are_near():
+    run = roll_out(fake(), specimen("falling"))
+    far = dataclasses.replace(run, positions=run.positions + 0.5 * (run.positions - run.positions[:1]))
+    assert audit._within({1: far, 4: run, 16: run}, 1.0) == 4
+    assert audit._within({1: run, 4: far, 16: run}, 1.0) is None
+
+
+def test_an_absent_engine_is_skipped_with_its_command(monkeypatch):
+    absent = dataclasses.replace(find_engine("mujoco.euler"), module="no_such_package")
+    monkeypatch.setattr(audit, "find_engine", lambda name: absent)
+    row = next(case for case in CASES if case.name == "mujoco.euler.budget").run()
+    assert row.status == "skipped"
+    assert row.reason == "MuJoCo, Euler is not installed: pip install 'neural-garment-benchmark[engines]'"
+
+
+def test_the_suite_takes_part_only_where_it_is_named():
+    assert "engines" not in choose_suites(()) and "engines" in choose_suites(["all"])
+    assert {case.process for case in CASES} == {f"engine-{engine.name}" for engine in ENGINES}
+    assert len({case.name for case in CASES}) == len(CASES) == len({(c.scene, c.metric) for c in CASES})
+
+
+@pytest.mark.slow
+def test_mujoco_falls_as_it_should_and_its_pins_hold_the_weight():
+    pytest.importorskip("mujoco", reason="needs the extra `engines`")
+    engine = find_engine("mujoco.euler")
+    assert laws.fall_over_discrete_law(roll_out(engine, specimen("falling"))) == pytest.approx(1, abs=1e-6)
+    assert laws.reaction_over_weight(roll_out(engine, specimen("strip"))) == pytest.approx(1, abs=0.05)
+
+
+@pytest.mark.slow
+def test_style3d_damps_a_free_fall():
+    """It multiplies every velocity by 0.998, so that more steps fall less far."""
+    pytest.importorskip("newton", reason="needs the extra `engines`")
+    run = roll_out(find_engine("newton.style3d"), specimen("falling"))
+    v, fallen = 0.0, 0.0
+    for _ in range(120):
+        v += GRAVITY * run.step
+        fallen += v * run.step
+        v *= 0.998
+    assert -laws.centre(run)[-1, 1] == pytest.approx(fallen, rel=1e-3)
