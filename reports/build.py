@@ -27,7 +27,7 @@ class Built:
     Attributes:
         pdf: path of the PDF.
         problems: a sentence for each file that could not be read.
-        answer: table and sentences of page one as text, empty for a run that has none.
+        answer: page one in few lines of text, empty for a run that has none.
     """
 
     pdf: Path

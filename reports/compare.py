@@ -26,7 +26,7 @@ What counts as a change:
   a mean   beyond 2 % of an energy and 5 % of another answer, with p below 0.05, corrected by Holm for all
            means compared, and more than the uncertainties of both runs together (column uncertainty). Where
            nothing was repeated, three times the uncertainties decide in place of p. Of total and gravity,
-           whose zero is a choice, 2 % are of skinning's excess over the simulation.
+           whose zero is a choice, 2 points of relative excess.
   a motion of a garment: so, over its seeds, whose scatter is pooled over all motions; p is corrected for all
            of these tests. Without seeds, beyond three times the uncertainties.
   a time   repeated: all of its interval beyond 15 %, on the same hardware; memory likewise. Taken once:

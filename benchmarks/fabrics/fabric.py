@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from reference_sim.material import GRAVITY, Material
@@ -37,6 +38,15 @@ class Fabric:
     def bending_length(self) -> float:
         """Bending length c = (rigidity / weight per area)^(1/3) [m] (Peirce 1930)."""
         return (self.rigidity / (self.density * GRAVITY)) ** (1 / 3)
+
+
+def plain_name(text: str) -> str:
+    """Return a fabric's name as scenes can carry it, maybe empty.
+
+    >>> plain_name(" twill 2/1 ")
+    'twill_2_1'
+    """
+    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text.strip()).strip("_")
 
 
 def isotropic(name: str, density: float, bending_length: float) -> Fabric:

@@ -18,7 +18,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.fabrics.fabric import Fabric
+from benchmarks.fabrics.fabric import Fabric, plain_name
 
 # Head of a column, without its blanks -> field of a Fabric and its unit in SI.
 HEADS = {
@@ -81,9 +81,8 @@ def _fabric(where: str, number: int, line: Sequence[str], columns: dict[str, tup
                 f"--fabrics {where}: {field} {text} is {values[field]:g} in SI units, outside {low:g} to "
                 f"{high:g}: check its unit"
             )
-    name = line[columns["name"][0]].strip() if "name" in columns else ""
-    name = re.sub(r"[^A-Za-z0-9_.+-]+", "_", name).strip("_") or f"line_{number}"
-    return Fabric(name, **values)
+    name = plain_name(line[columns["name"][0]]) if "name" in columns else ""
+    return Fabric(name or f"line_{number}", **values)
 
 
 def spread_sample(fabrics: Sequence[Fabric]) -> tuple[Fabric, ...]:

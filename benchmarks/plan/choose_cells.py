@@ -94,7 +94,8 @@ def choose_cells(
         DeclarationError: two scenes or methods of one name.
     """
     declared, methods = selection.declared_scenes, selection.declared_methods
-    _check_words("scene", selection.scenes, [*declared, *(entry.name for entry in MEASURED)])
+    measured = (*MEASURED, *selection.fabric_cases)
+    _check_words("scene", selection.scenes, [*declared, *(entry.name for entry in measured)])
     _check_words("method", selection.methods, list(methods))
     chosen: dict[tuple[str, str, int], Cell] = {}
     for suite, scene, entry in _pairs(selection):

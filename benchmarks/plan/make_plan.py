@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets.inputs import LIBRARY, read_inputs
 from benchmarks.performance.microbenchmark import SUITE
@@ -23,6 +23,10 @@ from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
 from benchmarks.scenes.textile_tests import textile_tests
 from reference_sim.files.atomic_files import demand_writable_folder
 from snug.garments.options import GarmentFile
+
+if TYPE_CHECKING:
+    from benchmarks.fabrics.fabric import Fabric
+    from benchmarks.validation.case import Case
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 
@@ -91,17 +95,28 @@ def make_plan(request: Request) -> Plan:
 
 
 def tests_of_fabrics(request: Request, suites: Sequence[str]) -> dict[str, Any]:
-    """Return the fields of a Selection that a user's file of fabrics fills. Raises ValueError."""
-    if request.fabrics is None:
-        return {}
-    if "fabric" not in suites:
-        raise PlanError(f"--fabrics {request.fabrics}: only suite fabric tests fabrics: add --suite fabric")
-    from benchmarks.fabrics.measured import read_fabrics, spread_sample
-    from benchmarks.validation.fabric.cases import percentiles
+    """Return the fields of a Selection that a user's files of fabrics fill. Raises ValueError."""
+    options = {"--fabrics": request.fabrics, "--gauge": request.gauge}
+    named = [f"{option} {path}" for option, path in options.items() if path is not None]
+    if named and "fabric" not in suites:
+        raise PlanError(f"{named[0]}: only suite fabric tests fabrics: add --suite fabric")
+    sample: list[Fabric] = []
+    cases: list[Case] = []
+    if request.fabrics is not None:
+        from benchmarks.fabrics.measured import read_fabrics, spread_sample
+        from benchmarks.validation.fabric.cases import percentiles
 
-    fabrics = read_fabrics(request.fabrics)
-    sample = [replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)]
-    return {"fabric_scenes": textile_tests(sample), "fabric_cases": percentiles(fabrics)}
+        fabrics = read_fabrics(request.fabrics)
+        sample += [replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)]
+        cases += percentiles(fabrics)
+    if request.gauge is not None:
+        from benchmarks.fabrics.gauge import read_tasks  # loads numpy
+        from benchmarks.validation.fabric.cases import gauge_repeatability
+
+        tasks = read_tasks(request.gauge)
+        sample += [replace(fabric, name=f"gauge/{fabric.name}") for fabric in tasks[0].fabrics]
+        cases += gauge_repeatability(request.gauge, tasks)
+    return {"fabric_scenes": textile_tests(sample), "fabric_cases": tuple(cases)}
 
 
 def choose_metrics(files: Sequence[str]) -> tuple[str, ...]:
@@ -191,8 +206,9 @@ def check_scheduler_fits(request: Request) -> None:
         raise PlanError(
             f"--device {request.device}: on a cluster networks train on cpu; leave out --scheduler"
         )
-    if request.roll_outs:
-        raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
+    for option, given in (("--rollout", request.roll_outs), ("--gauge", request.gauge)):
+        if given:
+            raise PlanError(f"{option}: its files lie on this machine alone; leave out --scheduler")
     from benchmarks.process.cluster_address import check_scheduler  # loads dask
 
     check_scheduler(request.scheduler)

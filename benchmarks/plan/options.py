@@ -98,6 +98,9 @@ def make_parser() -> argparse.ArgumentParser:
         help="motions that the suites measure: test (default), or validation, to choose recipes")  # fmt: skip
     add("--fabrics", metavar="FILE",
         help="measured fabrics, a CSV of density and bending, for suite fabric (docs/fabric.md)")  # fmt: skip
+    add("--gauge", metavar="DIR",
+        help="a copy of GAUGE-Dataset, for suite fabric: its fabrics, and how well its experiments repeat "
+        "(docs/fabric.md)")  # fmt: skip
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("--trained", nargs="?", const=FOLDER, metavar="DIR", help="measure without training: networks of the "
@@ -163,6 +166,7 @@ def request_of_run(options: argparse.Namespace, command_line: Sequence[str]) -> 
         roll_outs=tuple(map(parse_roll_out, options.rollout)),
         split=options.split,
         fabrics=Path(options.fabrics) if options.fabrics else None,
+        gauge=Path(options.gauge) if options.gauge else None,
         seeds=parse_seeds(options.seeds),
         device=options.device,
         folder=Path(options.out) if options.out else None,

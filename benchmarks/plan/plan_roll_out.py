@@ -22,7 +22,9 @@ from benchmarks.plan.plan import Plan
 from benchmarks.plan.request import Request
 
 SOLVED_AGAIN = "speed"  # the suite in which steps are solved again: gaps and one-step errors
-NO_REFERENCE = "left out by --no-reference: curvature error and histogram, distances, dynamics, relative gap"
+NO_REFERENCE = (
+    "left out by --no-reference: curvature error and histogram, distances, dynamics, relative energy gap"
+)
 
 
 def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:

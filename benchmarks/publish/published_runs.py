@@ -63,7 +63,7 @@ RUNS = {
         "each energy left out of the loss, windows, first states, forms of inertia, springs; Santesteban "
         "2019 and TailorNet; vertices optimised directly",
         _validation("simulation-springs,simulation-pbns-springs,direct-optimisation,snug,snug+cleanup,"
-                    "snug-paper,snug-springs,snug-no-*,snug-noise-alone,snug-window6,snug-window12,"
+                    "snug-springs,snug-no-*,snug-noise-alone,snug-window6,snug-window12,"
                     "snug-detached-past,snug-two-transitions,pbns,pbns-springs,santesteban2019,tailornet"),
         ("frames_tshirt-sudden_stop",),
     ),

@@ -25,6 +25,8 @@ ROLES = (
 OF_TRAINING = ("cost/setup", "cost/train")  # [s] a network, on the machine that trained it
 BEFORE_FRAMES = ("cost/data", *OF_TRAINING)  # [s] all that it costs before its first frame
 REFERENCE_TOLERANCE = 1e-6  # of the reference's minimisations
+DECLARED = "declared by its author, not measured"  # reason of such a run time
+PRETRAINED = "pretrained network"  # how the remark begins that a row's network is of a file
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,17 @@ class Row:
     def passed(self) -> bool:
         """True where the row counts as fine: ok, or skipped with its reason."""
         return self.status in ("ok", "skipped")
+
+    @property
+    def declared(self) -> bool:
+        """True where the value is a run time that its author declared."""
+        return self.reason == DECLARED
+
+    @property
+    def pretrained(self) -> str:
+        """Remark on the row's network where it is of a file; empty where there is none or it was trained."""
+        found = re.search(rf"(?:^|; )({PRETRAINED} .*)", self.reason)
+        return found[1] if found else ""
 
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))

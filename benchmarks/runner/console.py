@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from benchmarks.results.row import USABLE, Row
-from benchmarks.runner.rows import DECLARED, NOT_FALLING, SPREAD
-from benchmarks.tasks.pretrained_network import PRETRAINED
+from benchmarks.results.row import DECLARED, USABLE, Row
+from benchmarks.runner.rows import NOT_FALLING, SPREAD
 
 COLUMNS = (
     ("energy/total", "total J"),
@@ -24,10 +24,11 @@ COLUMNS = (
 DASH = "-"
 FEWER = "*"
 MEANS = ("garments", "speed")  # suites of which the methods' means are shown; of others, counts of endings
+MOST_NAMED = 3  # cells, tasks or stages that a line names
 
 
 def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str = "") -> str:
-    """Return means over scenes and seeds of each suite and method, counts of cases, and stage times.
+    """Return means over scenes and seeds of each suite and method, and one line of counts and times.
 
     answer: text of page one, which stands in place of the means where there is one.
     """
@@ -36,34 +37,57 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str =
         of_suite = [row for row in rows if row.suite == suite]
         for title, kept in _groups(suite, of_suite):
             parts.append(_table(title, kept))
+    last = []
     for suite in dict.fromkeys(row.suite for row in rows if row.suite not in MEANS):
-        kept = [row for row in rows if row.suite == suite]
-        if kept:
-            counts = {s: sum(row.status == s for row in kept) for s in dict.fromkeys(r.status for r in kept)}
-            parts.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in counts.items()))
-    parts.append("stages: " + "; ".join(f"{stage['name']} {stage['seconds']:.0f} s" for stage in stages))
-    return "\n\n".join(parts)
+        statuses = Counter(row.status for row in rows if row.suite == suite)
+        last.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in statuses.items()))
+    times: Counter[str] = Counter()
+    for stage in stages:
+        times[stage["name"]] += stage["seconds"]
+    longest = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in times.most_common(MOST_NAMED))
+    last += [f"time: {times.total():.0f} s ({longest})"] if times else []
+    return "\n".join(filter(None, ["\n\n".join(parts), "; ".join(last)]))
 
 
 def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> list[str]:
-    """Return remarks for whoever reads the times, a line each. outdated: task -> what has changed since."""
+    """Return remarks for whoever reads the numbers, a line each. outdated: task -> what has changed since."""
     rows, lines = list(rows), []
     if reused:
         lines.append(f"{reused} results taken from earlier runs in this folder")
-    lines += [f"{label}: {remark}" for label, remark in outdated.items()]
+    lines += named([f"{label}: {remark}" for label, remark in outdated.items()], "outdated in run.json")
     spreads = {f"{row.scene} x {row.method}": row.value or 0.0 for row in rows if row.metric == "cost/spread"}
-    wide = [f"{cell} ({percent:.0f} %)" for cell, percent in spreads.items() if percent > 100.0 * SPREAD]
+    wide = {cell: percent for cell, percent in spreads.items() if percent > 100.0 * SPREAD}
     if wide:
-        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {', '.join(wide)}")
-    declared = dict.fromkeys(row.method for row in rows if row.reason == DECLARED)
+        cells = [f"{cell} ({wide[cell]:.0f} %)" for cell in sorted(wide, key=lambda cell: -wide[cell])]
+        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {_first_of(cells)}")
+    declared = dict.fromkeys(row.method for row in rows if row.declared)
     if declared:
         lines.append(f"run time {DECLARED}: {', '.join(declared)}")
-    pretrained = {row.reason[row.reason.index(PRETRAINED) :] for row in rows if PRETRAINED in row.reason}
-    lines += [f"not trained here: {remark}" for remark in sorted(pretrained)]
+    pretrained = {row.method: row.pretrained for row in rows if row.pretrained}
+    if pretrained:
+        differences = {remark.partition("; ")[2] for remark in pretrained.values()}
+        same = differences.pop() if len(differences) == 1 else "the reasons of their rows say what differs"
+        lines.append(f"pretrained, not trained here: {', '.join(pretrained)}; {same}")
     rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(NOT_FALLING)]
     if rising:
-        lines.append(f"more iterations or a smaller tolerance, and a larger gap: {', '.join(rising)}")
+        cells = _first_of(list(dict.fromkeys(rising)))
+        lines.append(f"more iterations or a smaller tolerance, and a larger gap: {cells}")
     return lines
+
+
+def named(lines: Sequence[str], where: str, most: int = MOST_NAMED) -> list[str]:
+    """Return the first lines, and one that says how many more there are.
+
+    >>> named(["a", "b", "c", "d", "e"], "in results.csv")
+    ['a', 'b', 'c', 'and 2 more in results.csv']
+    """
+    more = len(lines) - most
+    return [*lines[:most], *([f"and {more} more {where}"] if more > 0 else [])]
+
+
+def _first_of(names: Sequence[str]) -> str:
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _groups(suite: str, rows: list[Row]) -> list[tuple[str, list[Row]]]:

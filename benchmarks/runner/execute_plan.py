@@ -10,7 +10,7 @@ from benchmarks.plan.plan import Plan
 from benchmarks.process.errors import one_line
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.console import remarks, summary
+from benchmarks.runner.console import named, remarks, summary
 from benchmarks.runner.local_executor import Executor, LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
@@ -20,6 +20,8 @@ from benchmarks.tasks.task import RunStopped
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
+
+MOST_FAILURES = 8  # that the end of a run names; its files have all
 
 
 def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) -> int:
@@ -50,11 +52,14 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     answer = make_report(log) if report else ""
     print(summary(log.rows, log.stages, answer or ""), flush=True)
     failed = [row for row in log.rows if not accepted(row)]
-    for line in dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed):
-        print(line, file=sys.stderr)
+    ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
     broken = runner.broken()
-    for label, reason in broken.items():
-        print(f"{label}: {reason}", file=sys.stderr)
+    for line in named(list(ends), "failed in results.csv", MOST_FAILURES):
+        print(line, file=sys.stderr)
+    for line in named(
+        [f"{label}: {reason}" for label, reason in broken.items()], "failed in run.json", MOST_FAILURES
+    ):
+        print(line, file=sys.stderr)
     for line in remarks(log.rows, len(runner.reused), runner.outdated()):
         print(line, file=sys.stderr)
     if looks := log.config["test_looks"]:

@@ -14,15 +14,14 @@ from benchmarks.plan.plan import Plan
 from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
 from benchmarks.results.ensemble import is_member, spread
 from benchmarks.results.protocol import BEFORE, OWN
-from benchmarks.results.row import REFERENCE_TOLERANCE, Row
-from benchmarks.tasks.pretrained_network import PRETRAINED
+from benchmarks.results.row import DECLARED, PRETRAINED, REFERENCE_TOLERANCE, Row
+from benchmarks.tasks.pretrained_network import NAME
 from benchmarks.tasks.task import Outcome, Task
 from benchmarks.tasks.training import TrainNetwork
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
 GAP = "gap/energy"
-DECLARED = "declared by its author, not measured"
 MOST_NAMED = 3  # names of what differs in a remark
 NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
 ROUND_OFF = 1e-6  # [J] a gap below it counts as none: who is called lower there is chance
@@ -192,7 +191,7 @@ def model_costs(
         "cost/train_steps": "steps", "cost/train_frames": "frames",
     }  # fmt: skip
     costs = {metric: outcome.result[name] for metric, name in names.items()}
-    if PRETRAINED in outcome.result:
+    if NAME in outcome.result:
         return {"cost/data": outcome.result["data_seconds"]} | costs
     return {"cost/data": sum(outcomes[id].seconds for id in taught_by if id in outcomes)} | costs
 
@@ -201,7 +200,7 @@ def machines_of(trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes:
     """Return metric -> hardware that measured its seconds, of tasks other than the cell."""
     if trained is None:
         return {}
-    if trained in outcomes and PRETRAINED in outcomes[trained].result:
+    if trained in outcomes and NAME in outcomes[trained].result:
         taught_by = (trained,)
     metrics = {"cost/data": taught_by, "cost/setup": (trained,), "cost/train": (trained,)}
     origins = {
@@ -225,14 +224,14 @@ def not_learned(trained: TaskId | None, outcomes: Outcomes) -> str:
 def taken(trained: TaskId | None, outcomes: Outcomes) -> str:
     """Return a remark where the cell's network is of a file, with what a training here would differ in."""
     outcome = outcomes.get(trained) if trained else None
-    if outcome is None or PRETRAINED not in outcome.result:
+    if outcome is None or NAME not in outcome.result:
         return ""
     differing = outcome.result["differing"]
     more = f" and {len(differing) - MOST_NAMED} more" * (len(differing) > MOST_NAMED)
     same = "a training here gives the same bits"
     if differing:
         same = f"a training here differs in {', '.join(differing[:MOST_NAMED])}{more}"
-    return f"{PRETRAINED} network {outcome.result[PRETRAINED]} of {outcome.result['trained_at']}; {same}"
+    return f"{PRETRAINED} {outcome.result[NAME]} of {outcome.result['trained_at']}; {same}"
 
 
 def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:

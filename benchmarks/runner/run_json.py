@@ -22,7 +22,6 @@ from benchmarks.results.row import OF_TRAINING, Row, with_provenance
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
-from benchmarks.tasks.pretrained_network import PRETRAINED
 from snug.trained import FOLDER
 
 if TYPE_CHECKING:
@@ -206,12 +205,12 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         }
         for name, entry in methods.items()
     }  # fmt: skip
-    for name in {row.method for row in rows if row.metric == "cost/frame" and row.value is not None}:
-        if name in methods and not methods[name].timed:
-            of_methods[name]["label"] = f"{methods[name].label or name} (declared time)"
-    for name in {row.method for row in rows if PRETRAINED in row.reason}:
+    for name in {row.method for row in rows if row.declared}:
         if name in methods:
-            of_methods[name]["label"] = f"{of_methods[name]['label'] or name} ({PRETRAINED})"
+            of_methods[name]["label"] = f"{methods[name].label or name} (declared time)"
+    for name in {row.method for row in rows if row.pretrained}:
+        if name in methods:
+            of_methods[name]["label"] = f"{of_methods[name]['label'] or name} (pretrained)"
     cases = {
         case.name: {
             "description": case.description, "suite": case.suite, "scene": case.scene or case.name,

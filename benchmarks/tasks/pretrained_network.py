@@ -21,7 +21,7 @@ from benchmarks.tasks.training import TrainNetwork, facts_of
 from snug.networks.tensor_file import TensorFileError, read_header
 from snug.trained import SUFFIX, network_name
 
-PRETRAINED = "pretrained"  # in the result of a task, and first word of a remark: its network is of a file
+NAME = "pretrained"  # in the result of a task: name of the file that its network is of
 MACHINE = "machine"  # the input of a task that says where it runs
 PACKAGE = "package "  # how the name of a package begins among the parts of a task
 # Files of benchmarks that decide the bits of a network; others carry out, store and report.
@@ -65,7 +65,7 @@ class TakeNetwork(Task):
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
         facts = {
-            PRETRAINED: self.source.stem,
+            NAME: self.source.stem,
             "trained_at": model.origin["commit"],
             "differing": list(self.differing),
             "data_seconds": model.origin["data_seconds"],

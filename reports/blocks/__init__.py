@@ -52,6 +52,7 @@ BLOCKS: tuple[Block, ...] = (
     TableBlock("fabric_order", most=40),
     TableBlock("fabric_drape"),
     TableBlock("fabric_bands"),
+    TableBlock("fabric_repeatability"),
     Heading("Validation"),
     FigureBlock("known_answers"),
     TableBlock("validation", printed=failed_checks),

@@ -47,7 +47,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
 
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
-    """Say which relative excess energy each network of page one has, and which of the first two has less."""
+    """Say which relative excess each network of page one has, and which of the first two has less energy."""
     names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
@@ -61,8 +61,8 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     motions = f"{count} {unseen}motion{'' if count == 1 else 's'}{_independent(excess)}"
     sentences = [
         f"On {motions} {run.label(first)} has a "
-        f"relative excess energy of {_share(excess)}{f', {beside}' if beside else ''}, where the reference "
-        "simulation has 0 % and skinning alone 100 %",
+        f"relative excess of {_share(excess)}{f', {beside}' if beside else ''}, where the energy of the "
+        "reference simulation is 0 % and that of skinning alone 100 %",
         _against_reference(excess),
         *(f"{run.label(name)} has {_share(known[name])}" for name in others),
         *(_less_of(run, worn, first, name) for name in others[:1]),
@@ -147,8 +147,8 @@ def _moves(run: Run, worn: pd.DataFrame) -> str:
         swing, alike, inside = (value_of(worn, method, name) for name in (SWING, ALIKE, INSIDE))
         if swing is not None:
             sentence = (
-                f"{run.label(method)} has {_secondary_motion(swing)} secondary motion: its hem has "
-                f"{number(100.0 * swing, 2)} % of the simulation's dynamic amplitude"
+                f"{run.label(method)} has {_secondary_motion(swing)} secondary motion: its hem amplitude is "
+                f"{number(100.0 * swing, 2)} % of the simulation's"
             )
             same = ", where 1 is the same motion" if not sentences else ""
             correlated = "" if alike is None else f", with a correlation of {number(alike, 2)}{same}"
@@ -206,7 +206,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
         strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
         words = [
             f"{what} {number(one.value / other.value, 2)} times"
-            for what, (one, other) in (("its strain is", strain), ("its hem's amplitude", amplitude))
+            for what, (one, other) in (("its strain is", strain), ("its hem amplitude", amplitude))
             if one and other and other.value
         ]
         sentences.append(
@@ -256,7 +256,7 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         )
         sentences = [
             f"{snug} has an energy gap, the energy above the minimum of each time step, of "
-            f"{number(network.error)} J{network.fewer}; {others} is as fast with a smaller gap"
+            f"{number(network.error)} J{network.fewer}; {others} is as fast with a smaller one"
         ]
     else:
         within = " within repeats" if best.time > network.time else ""
@@ -268,7 +268,7 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         ]
     if solver:
         costs = f"{run.label(solver.method)}, {number(solver.time)} ms a frame"
-        sentences.append(f"the fastest solver stopped early with as small a gap is {costs}")
+        sentences.append(f"the fastest solver stopped early with as small an energy gap is {costs}")
     return sentences
 
 

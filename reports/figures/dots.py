@@ -1,19 +1,29 @@
-"""Values behind the means: a dot for each motion and seed, a bar at the mean."""
+"""Values behind the means: a dot for each motion and seed, a bar at the mean.
+
+Relative excess takes the place of the total energy where the run has it. It spans decades and may be below
+zero, so it is drawn on the scale of its statistics, arcsinh(x / 1 %).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from benchmarks.results.protocol import SOFTENING
 from reports.figures.figure import Drawing, Figure
 from reports.figures.method_styles import leading, style
-from reports.figures.plotting import PAGE_WIDTH, grid, log_axis, new_figure, wrapped
+from reports.figures.plotting import PAGE_WIDTH, arcsinh_axis, grid, log_axis, new_figure, wrapped
 from reports.run.finished_run import Run
-from reports.statistics.means_and_spreads import means
+from reports.statistics.means_and_spreads import Mean, means
+from reports.statistics.relative_excess import RELATIVE_EXCESS, TOTAL, excess_of, with_relative_excess
 
-METRICS = ("energy/total", "curvature/error", "penetration/vertices")
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+METRICS = (TOTAL, "curvature/error", "penetration/vertices")
 MOST_METHODS = 24  # methods that have room below each other
 
 
@@ -32,31 +42,50 @@ class Dots(Figure[tuple[pd.DataFrame, list[str]]]):
     def draw(self, run: Run, data: tuple[pd.DataFrame, list[str]]) -> Iterator[Drawing]:
         """Draw a panel for each metric, a line for each method."""
         rows, methods = data
-        metrics = [name for name in METRICS if name in set(rows["metric"])]
+        rows = with_relative_excess(run, rows)
+        names = [name for name in METRICS if name in set(rows["metric"])]
+        excess = RELATIVE_EXCESS.name if RELATIVE_EXCESS.name in set(rows["metric"]) else ""
+        if excess:
+            names[0] = excess
         by_method = means(rows, "method", "metric")
         labels = [wrapped(run.label(method), 28) for method in methods]
         lines = max(label.count("\n") + 1 for label in labels)
         figure = new_figure(PAGE_WIDTH, 0.65 + (0.04 + 0.13 * lines) * len(methods))
-        panels = np.atleast_1d(figure.subplots(1, len(metrics), sharey=True))
-        for axes, name in zip(panels, metrics):
-            shown: list[float] = []
-            for place, method in enumerate(methods):
-                mean = by_method.get((method, name))
-                if mean is None:
-                    continue
-                look, values = style(run, method), np.array(list(mean.cells.values()))
-                shown += values.tolist()
-                axes.plot(
-                    values, np.full(len(values), place), look.marker, color=look.colour, alpha=0.55,
-                    markersize=4, linestyle="none",
-                )  # fmt: skip
-                axes.plot([mean.value] * 2, [place - 0.36, place + 0.36], color="#111111", linewidth=1.4)
-            if min(shown) > 0.0 and max(shown) > 20.0 * min(shown):
+        panels = np.atleast_1d(figure.subplots(1, len(names), sharey=True))
+        for axes, name in zip(panels, names):
+            of_methods = [by_method.get((method, name)) for method in methods]
+            bars = [mean and mean.value for mean in of_methods]
+            if name == excess:
+                bars = [known and known.typical for known in (excess_of(run, rows, m) for m in methods)]
+            shown = _draw_panel(axes, run, methods, of_methods, bars)
+            if name == excess:
+                arcsinh_axis(axes, shown, SOFTENING)
+            elif min(shown) > 0.0 and max(shown) > 20.0 * min(shown):
                 axes.set_xlim(min(shown) / 1.3, max(shown) * 1.3)
                 log_axis(axes, "x")
-            axes.set_xlabel(run.metrics[name].heading)
+            axes.set_xlabel((RELATIVE_EXCESS if name == excess else run.metrics[name]).heading)
             grid(axes, "x")
         panels[0].set_yticks(range(len(methods)), labels)
         panels[0].set_ylim(len(methods) - 0.4, -0.6)
-        caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean."
+        caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean"
+        caption += ", of the relative excess its typical value." if excess else "."
         yield Drawing(figure, self.name, caption)
+
+
+def _draw_panel(
+    axes: Axes, run: Run, methods: list[str], of_methods: list[Mean | None], bars: list[float | None]
+) -> list[float]:
+    """Draw a line of dots for each method, and its bar where it has one; return the values drawn."""
+    shown: list[float] = []
+    for place, (method, mean, bar) in enumerate(zip(methods, of_methods, bars)):
+        if mean is None:
+            continue
+        look, values = style(run, method), np.array(list(mean.cells.values()))
+        shown += values.tolist()
+        axes.plot(
+            values, np.full(len(values), place), look.marker, color=look.colour, alpha=0.55,
+            markersize=4, linestyle="none",
+        )  # fmt: skip
+        if bar is not None:
+            axes.plot([bar] * 2, [place - 0.36, place + 0.36], color="#111111", linewidth=1.4)
+    return shown

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.results.json_file import ResultsError
-from reports.figures.error_against_time import draw_legend, draw_points, hollow_remark, missing_remark
+from reports.figures.error_against_time import hollow_remark, missing_remark
 from reports.figures.figure import Drawing
+from reports.figures.plane.curves import families
+from reports.figures.plane.labels import lay_out
+from reports.figures.plane.points import draw_points, write_labels
 from reports.figures.plotting import PAGE_WIDTH, file_name, grid, new_figure
 from reports.run.finished_run import SUITES, Run
 from reports.statistics.pareto import points_of
@@ -43,14 +46,15 @@ def metric_against_metric(run: Run, x: str, y: str, scenes: Sequence[str] = ()) 
                 f"{metric} of {point.method} is {value:.4g}: it has no place on a logarithmic axis; "
                 "name another metric"
             )
-    figure = new_figure(PAGE_WIDTH * 0.75, 3.6)
+    figure = new_figure(PAGE_WIDTH, 3.6)
     axes = figure.subplots()
-    below = draw_points(axes, run, points, None, 0.0)
+    drawn = draw_points(axes, run, families(run, points), None, 0.0)
     axes.set(xlabel=f"{x} [{run.metrics[x].unit}]", ylabel=f"{y} [{run.metrics[y].unit}]")
     grid(axes)
-    draw_legend(figure, run, points, None)
+    lay_out(figure)
+    write_labels(axes, drawn)
     caption = f"{y} against {x}, means over {', '.join(scenes)}."
-    caption += hollow_remark(run, below) + missing_remark(run, points)
+    caption += hollow_remark(run, drawn.below) + missing_remark(run, points)
     zero = ", ".join(run.label(point.method) for point in all_points if point not in points)
     caption += f" Left out, for {x} is zero: {zero}." if zero else ""
     return Drawing(figure, file_name(f"{y}_against_{x}"), caption)

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
 LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as the page
-MOST_LINES = 13  # of a legend beside a figure
 GRID = "#E3E3E3"
 _LOOK: dict[Any, Any] = {
     # Each has what those before it lack; the last draws a box that names the script.
@@ -77,6 +76,23 @@ def log_axis(axes: Axes, which: str) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=7))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_text(value)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def arcsinh_axis(axes: Axes, values: Sequence[float], softening: float) -> None:
+    """Make the x axis of these values logarithmic on both sides of 0, and linear below `softening`."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    ends = np.arcsinh(np.array([min(values), max(values)]) / softening)
+    low, high = softening * np.sinh(ends + np.array([-0.05, 0.05]) * max(np.ptp(ends), 1.0))
+    powers = math.floor(math.log10(max(-low, high, softening) / softening))
+    decades = [softening * 10.0**power for power in range(powers % 2, powers + 1, 2 if powers > 2 else 1)]
+    ticks = [0.0, *decades, *(-decade for decade in decades)]
+    apart = [t for t in ticks if t == 0.0 or abs(t) > softening or powers < 2]
+    axes.set_xscale("asinh", linear_width=softening)
+    axes.set_xlim(low, high)
+    axes.xaxis.set_major_locator(FixedLocator([tick for tick in apart if low <= tick <= high]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: power_text(value)))
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def power_text(value: float) -> str:
@@ -136,17 +152,6 @@ def save(figure: Figure, folder: Path, name: str, *, vector: bool = True) -> Pat
 
 def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
     """Draw one legend for all panels, above them: of lines, or else of markers."""
-    letters = [len(look.label) + 8 for look in entries]
-    columns = _columns(letters, figure.get_figwidth() / PAGE_WIDTH)
-    _legend(figure, entries, lines, loc="outside upper center", ncols=columns)
-
-
-def legend_beside(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
-    """Draw one legend for all panels in columns to the right."""
-    _legend(figure, entries, lines, loc="outside right center", ncols=-(-len(entries) // MOST_LINES))
-
-
-def _legend(figure: Figure, entries: Sequence[Style], lines: bool, **more: Any) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
@@ -163,11 +168,12 @@ def _legend(figure: Figure, entries: Sequence[Style], lines: bool, **more: Any) 
     ]
     figure.legend(
         handles=handles,
+        loc="outside upper center",
+        ncols=_columns([len(look.label) + 8 for look in entries], figure.get_figwidth() / PAGE_WIDTH),
         frameon=False,
         handlelength=1.6 if lines else 0.8,
         handletextpad=0.5,
         columnspacing=1.4,
-        **more,
     )
 
 

@@ -13,7 +13,12 @@ from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
 from reports.tables.dictionary import dictionary
 from reports.tables.equal_data import EQUAL_DATA
-from reports.tables.fabric.textile_tests import fabric_bands, fabric_drape, fabric_order
+from reports.tables.fabric.textile_tests import (
+    fabric_bands,
+    fabric_drape,
+    fabric_order,
+    fabric_repeatability,
+)
 from reports.tables.findings import (
     errors_in_spreads,
     findings,
@@ -47,6 +52,7 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     fabric_order,
     fabric_drape,
     fabric_bands,
+    fabric_repeatability,
     validation,
     extremes,
     endings,

@@ -45,7 +45,7 @@ def ablation_effects(run: Run) -> list[Table]:
     caption = (
         "Each variant beside its base, over the scenes that both have: × the variant over the base, of "
         "geometric means; of the total, whose zero is a choice, the variant less the base in points of "
-        "skinning's excess; where another value is not positive, the difference in the unit above."
+        "relative excess; where another value is not positive, the difference in the unit above."
     )
     note = "Below: 95 % intervals over motions and seeds, each for itself."
     columns = (*HEAD, *map(metric_column, metrics))

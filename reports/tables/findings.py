@@ -11,7 +11,7 @@ from reports.tables.table import GARMENT, METHOD, SCENE, Cell, Column, Table, ta
 
 CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero "
-    "is a choice, points of skinning's excess between the two; of frames, the first's share less half. Below "
+    "is a choice, points of relative excess between the two; of frames, the first's share less half. Below "
     "it the 95 % interval over motions and seeds, of costs the range. p: of a primary claim by Holm for "
     "the whole primary family, of an exploratory one as it is. Tie: all of the interval lies within 5 % "
     "of equality, or within the spread of the reference's ensemble if that is wider. A claim holds, or does "
@@ -79,7 +79,8 @@ def relative_excess(run: Run) -> list[Table]:
         Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
     caption = (
-        "Relative excess energy, (E - E_reference) / (E_skinning - E_reference), over all motions and seeds."
+        "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E, over all "
+        "motions and seeds."
     )
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
 

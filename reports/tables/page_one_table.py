@@ -23,8 +23,8 @@ GAP = "gap/energy"
 def overview(run: Run) -> list[Table]:
     """Tabulate reference, baselines and networks of the first garment, and the solvers as good as SNUG.
 
-    Relative excess, penetration and dynamics are means over its motions, gaps and times over the scenes in
-    which solvers were timed.
+    Relative excess, penetration and dynamics are means over its motions, energy gaps and times over the
+    scenes in which solvers were timed.
     """
     garment = run.first_garment
     rows_of_garment = run.garment_rows[run.garment_rows["garment"] == garment]
@@ -70,7 +70,7 @@ def overview(run: Run) -> list[Table]:
         f"{garment}: relative excess as a geometric mean over recordings, the rest as means over motions"
     )
     caption = of_motions if garment else f"Means over {timed_in}"
-    caption += f"; gaps and run times over {timed_in}." if garment and scenes else "."
+    caption += f"; energy gaps and run times over {timed_in}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)
 

@@ -1,6 +1,6 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
-`headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
+`headline of RUN`, `excess METHOD of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
 `claims exploratory of RUN, ...`, `claims earlier of RUN, ...; EARLIER RUN, ...`, `counts of RUN, ...`,
 `runs of RUN, ...`; RUN is a folder of reports/published. Earlier runs judge claims that the runs before them
 cannot. `rooms of PACKAGE`, `attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of
@@ -28,13 +28,14 @@ from reports.text.claim_rows import (
     rows_of_earlier_runs,
 )
 from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, recipe_rows
+from reports.text.excess_terms import excess_terms
 from reports.text.rooms import room_rows
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.motion.composition import clip_rows, distance_rows
 
 FORMS = (
-    "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
+    "headline of RUN; excess METHOD of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
     "claims exploratory of RUN, ...; claims earlier of RUN, ...; EARLIER RUN, ...; counts of RUN, ...; "
     "runs of RUN, ...; rooms of PACKAGE; attributes of MODULE.CLASS; docstring of MODULE; recipes of "
     f"NAME, ...; clips of the library; distances of the library; {'; '.join(PARTS)}"
@@ -64,6 +65,8 @@ def published_part(words: str) -> str:
         return markdown_table(list(LIBRARY_TABLES[kind]()))
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
+    if kind == "excess":
+        return excess_terms(read_published(folders[0]), name)
     if kind == "table":
         wanted = [column.strip() for column in columns.split(",") if column.strip()]
         table = _table(folders[0], name)

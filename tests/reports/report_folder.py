@@ -65,7 +65,7 @@ TABLES = {
 }  # fmt: skip
 TITLES = {
     "gap/energy": "Energy gap",
-    "gap/relative": "Relative gap",
+    "gap/relative": "Relative energy gap",
     "curvature/error": "Curvature error",
     "energy/total": "Total",
     "roll_out/drift": "Drift",

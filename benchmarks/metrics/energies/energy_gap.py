@@ -62,7 +62,7 @@ METRICS = (
         "frames",
     ),
     Metric(
-        name="gap/relative", unit="1", title="Relative gap", table="speed", lower_is_better=True,
+        name="gap/relative", unit="1", title="Relative energy gap", table="speed", lower_is_better=True,
         definition="the same over what skinning, or the first guess, lies above the steps of the simulation: "
         "one scale a scene, the same for all methods",
     ),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from reports.figures.error_against_time import draw_legend, draw_points
 from reports.figures.figure import Drawing, Figure
+from reports.figures.plane.curves import families
+from reports.figures.plane.labels import lay_out
+from reports.figures.plane.points import draw_points, write_labels
 from reports.figures.plotting import PAGE_WIDTH, grid, new_figure
 from reports.run.finished_run import Run
 from reports.statistics.fabric.order import ERROR, rows_of_test
@@ -36,12 +38,17 @@ class TextileErrors(Figure[dict[str, list[Point]]]):
     def draw(self, run: Run, data: dict[str, list[Point]]) -> Iterator[Drawing]:
         """Draw the panels side by side."""
         figure = new_figure(PAGE_WIDTH, 3.1)
-        for axes, (test, points) in zip(figure.subplots(1, len(data), squeeze=False)[0], data.items()):
-            reference = value_of(rows_of_test(run, test), run.reference, TIME)
-            draw_points(axes, run, points, reference, indistinct(run, rows_of_test(run, test), ERROR))
+        panels = figure.subplots(1, len(data), squeeze=False)[0]
+        drawn = []
+        for axes, (test, points) in zip(panels, data.items()):
+            rows = rows_of_test(run, test)
+            reference, band = value_of(rows, run.reference, TIME), indistinct(run, rows, ERROR)
+            drawn.append(draw_points(axes, run, families(run, points), reference, band))
             axes.set(xlabel="run time [ms per frame]", title=PANELS[test])
             grid(axes)
-        draw_legend(figure, run, [p for points in data.values() for p in points], None)
+        lay_out(figure)
+        for axes, panel in zip(panels, drawn):
+            write_labels(axes, panel)
         caption = (
             "Textile tests: mean error over the fabrics against run time; lower left is better. Bending "
             "length: distance from the exact one. Drape coefficient: difference from the reference's; bars: "

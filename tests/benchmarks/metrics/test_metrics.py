@@ -283,7 +283,7 @@ def test_hem_drift_follows_the_hem_against_the_pelvis():
 
 def test_training_distance_is_of_judged_frames_to_the_nearest_training_pose():
     poses = np.zeros((23, 24, 3))
-    poses[:, JOINT["right_knee"], 0] = np.deg2rad(22.0 * np.arange(23) / 2)  # 0, .5, 1 ... 11 degrees / joint
+    poses[:, JOINT["right_knee"], 0] = np.deg2rad(22.0 * np.arange(23) / 2)  # 0, 0.5 ... 11 degrees / joint
     scene = SimpleNamespace(dressed=SimpleNamespace(motion=SimpleNamespace(poses=poses)))
     known = np.zeros((2, 24, 3))
     known[1] = poses[22]
@@ -426,7 +426,7 @@ def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
     assert found[2].reason == "the error does not fall here: newton-4, the coarser one, has a gap of 0.1"
     assert remarked([dataclasses.replace(rising[0], reason="kept"), *falling])[0].reason == "kept"
     known_roughly = [dataclasses.replace(r, uncertainty=0.04) for r in (falling[1], rising[0])]
-    assert remarked(known_roughly) == known_roughly  # .1 and .2, by less than two standard errors of both
+    assert remarked(known_roughly) == known_roughly  # 0.1, 0.2: by less than two standard errors of both
 
 
 def test_families_hold_every_level_from_coarse_to_fine():

@@ -186,6 +186,40 @@ def test_the_remarks_name_repeats_that_lie_apart_gaps_that_rise_and_what_is_out_
     assert remarks([base], 0, {}) == []
 
 
+def test_remarks_name_few_and_count_the_others():
+    cells = [Row("speed", f"s{k}", "snug", 0, "cost/spread", "%", 30.0 + k) for k in range(5)]
+    (line,) = remarks(cells, 0, {})
+    assert (
+        line
+        == "repeats more than 20 % apart: s4 x snug (34 %), s3 x snug (33 %), s2 x snug (32 %) and 2 more"
+    )
+    old = remarks([], 0, {f"cell {k}": "kept" for k in range(5)})
+    assert old == ["cell 0: kept", "cell 1: kept", "cell 2: kept", "and 2 more outdated in run.json"]
+
+
+def test_the_closing_lines_are_ten_with_an_answer():
+    rows = [Row(suite, "c", "simulation", 0, "check", "1", 0.0) for suite in ("validation", "extremes")]
+    stages = [{"name": name, "seconds": 60.0 + k} for k, name in enumerate(("a", "b", "c", "d", "a"))]
+    lines = summary(rows, stages, "\n".join("answer" for _ in range(8))).splitlines()
+    last = "validation: 1 ok; extremes: 1 ok; time: 310 s (a 124 s, d 63 s, c 62 s)"
+    assert len(lines) == 9 and lines[-1] == last  # the path of the report follows
+
+
+def test_what_a_reason_says_of_times_and_networks_has_one_definition():
+    row = Row(
+        "garments", "s", "mine", 0, "cost/frame", "ms", 1.0, reason="declared by its author, not measured"
+    )
+    assert row.declared and not row.pretrained
+    taken = dataclasses.replace(
+        row, reason="its network learned without a; pretrained network n of 1; the same bits"
+    )
+    assert taken.pretrained == "pretrained network n of 1; the same bits" and not taken.declared
+    refused = dataclasses.replace(
+        row, value=None, status="skipped", reason="no pretrained network n: train it"
+    )
+    assert not refused.pretrained and not refused.declared
+
+
 def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch):
     facts = {"processor": "a processor", "cores": 2, "device": "cuda", "accelerator": "a GPU"}
     monkeypatch.setattr(provenance, "hardware", lambda device: facts)

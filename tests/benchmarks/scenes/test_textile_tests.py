@@ -19,6 +19,7 @@ from benchmarks.scenes.textile_tests import TEXTILE_TESTS
 from benchmarks.validation.fabric.cases import CANTILEVER, DRAPE, MASTER_CURVE
 from reference_sim import simulate
 from reference_sim.trajectory.trajectory import Trajectory
+from tests.benchmarks.fabrics.gauge_folder import make_folder
 
 TINY = replace(find_preset("smoke"), sheet_cells=6, sheet_frames=12)
 TABLE = "name,density[g/m2],bending warp[uN.m],bending weft[uN.m]\nvoile,62,2.1,1.4\n"
@@ -49,6 +50,21 @@ def test_a_users_fabrics_are_tested_and_snug_is_placed_among_them(tmp_path):
     assert {"percentile_snug", "percentile_snug_printed"} < {case.name for case in plan.cases}
     with pytest.raises(PlanError, match="add --suite fabric"):
         plan_of("--fabrics", str(path))
+
+
+def test_a_copy_of_gauge_brings_its_fabrics_and_the_repeatability_of_its_experiments(tmp_path):
+    folder = str(make_folder(tmp_path))
+    plan = plan_of("--suite", "fabric", "--preset", "smoke", "--gauge", folder)
+    assert {"fabric/drape/gauge/satin", "fabric/cantilever/gauge/oxford"} < {s.name for s in plan.scenes}
+    assert {"gauge_repeatability_bending_satin", "gauge_spread_bending_satin"} < {c.name for c in plan.cases}
+    methods = {cell.method for cell in plan.cells if cell.scene.name == "fabric/cantilever/gauge/satin"}
+    assert {"simulation", *(entry.name for entry in METHODS if entry.role == "solver")} < methods
+    alone = plan_of("--suite", "fabric", "--gauge", folder, "--scenes", "gauge_*_bending_*")
+    assert len(alone.cases) == 2 and not alone.cells
+    with pytest.raises(PlanError, match=r"--gauge .*: only suite fabric"):
+        plan_of("--gauge", folder)
+    with pytest.raises(PlanError, match="--gauge: its files lie on this machine alone"):
+        plan_of("--suite", "fabric", "--gauge", folder, "--scheduler", "tcp://127.0.0.1:1")
 
 
 @pytest.fixture(scope="module")

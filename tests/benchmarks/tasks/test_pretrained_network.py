@@ -156,7 +156,10 @@ def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
     theirs = {row.metric for row in rows if row.hardware == "a processor of theirs"}
     assert theirs == set(BEFORE_FRAMES)
     assert described(plan, rows)["methods"]["pbns"]["label"] == "PBNS (pretrained)"
-    assert [line for line in remarks(rows, 0, {}) if line.startswith(f"not trained here: {remark}")]
+    assert remarks(rows, 0, {}) == ["pretrained, not trained here: pbns; a training here gives the same bits"]
+    another = dataclasses.replace(rows[0], method="snug", reason=f"{remark}; a training here differs in a")
+    (line,) = remarks([*rows, another], 0, {})
+    assert line.endswith("here: pbns, snug; the reasons of their rows say what differs")
     differing = dataclasses.replace(done, result={**done.result, "differing": ["a", "b", "c", "d", "e"]})
     rows = rows_of(plan, tasks_of(plan), outcomes | {taken.id: differing})
     assert any("a training here differs in a, b, c and 2 more" in row.reason for row in rows)

@@ -27,12 +27,12 @@ from reference_sim.energies import (
 from tests.reference_sim.meshes import box
 
 FRAMES = 12
-ANGLE = 0.7  # [rad]: tan is .84, a sheet slides
+ANGLE = 0.7  # [rad]: tan is 0.84, a sheet slides
 TURN = np.array([[np.cos(ANGLE), -np.sin(ANGLE), 0], [np.sin(ANGLE), np.cos(ANGLE), 0], [0, 0, 1]])
 
 
 def on_a_belt(*, barrier: bool = False) -> BuiltScene:
-    """A jagged sheet on a slope whose skin moves across the way down at .3 m/s."""
+    """A jagged sheet on a slope whose skin moves across the way down at 0.3 m/s."""
     x, z = np.meshgrid(np.linspace(0, 0.2, 5), np.linspace(0, 0.2, 5), indexing="ij")
     flat = np.stack([x.ravel(), np.zeros(25), z.ravel()], axis=1)
     a = (np.arange(4)[:, None] * 5 + np.arange(4)).ravel()

@@ -5,31 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.results.run_folder import RunFolder
-from reports.figures import error_against_time, hem, histograms, known_answers, method_styles, stability_maps
+from reports.figures import hem, histograms, known_answers, method_styles, stability_maps
 from reports.figures.against_vertices import AgainstVertices
 from reports.figures.chosen_roll_outs import SceneRollOuts
 from reports.figures.dots import Dots
-from reports.figures.plotting import file_name, new_figure, printable
+from reports.figures.plotting import file_name, printable
 from reports.figures.training_curves import TrainingCurves
 from reports.run import reading
 from reports.run.finished_run import shown_seeds
 from reports.run.reading import read_run_with_trainings
 from reports.statistics.outcomes import map_points, stress_tests
-from reports.statistics.pareto import Point
 from tests.reports.report_folder import FRAMES, declaration, mesh, row, run_of, sheet, write_model
-
-
-def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
-    axes = new_figure(3, 3).subplots()
-    run = run_of([row(method=method) for method in ("snug", "newton-8")])
-    points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
-    hollow = error_against_time.draw_points(axes, run, points, 20.0, band=0.0)
-    assert hollow == {"newton-8"}
-    low, high = axes.get_ylim()
-    shown = [
-        y for line in axes.get_lines() for y in np.atleast_1d(line.get_ydata()) if len(line.get_xdata()) == 1
-    ]
-    assert len(shown) >= 2 and all(low < y < high for y in shown[:2])
 
 
 def test_methods_keep_their_order_and_their_look():
@@ -165,7 +151,26 @@ def test_a_dot_stands_for_each_motion_and_seed():
     (drawing,) = Dots().drawings(run_of(rows))
     dots, bar = drawing.canvas.axes[0].get_lines()
     assert sorted(dots.get_xdata()) == [1.0, 1.0, 3.0, 3.0] and list(bar.get_xdata()) == [2.0, 2.0]
+    assert drawing.canvas.axes[0].get_xlabel() == "Total [J]"
     assert Dots().drawings(run_of([row("flag", garment="")])) == []
+
+
+def test_dots_of_relative_excess_stand_on_a_logarithmic_axis_on_both_sides_of_zero():
+    values = {"simulation": (1.0, 1.0), "skinning": (2.0, 2.0), "snug": (0.9, 41.0)}
+    rows = [
+        row(scene, method, "energy/total", value)
+        for method, of_scenes in values.items()
+        for scene, value in zip(("tshirt/a", "tshirt/b"), of_scenes)
+    ]
+    (drawing,) = Dots().drawings(run_of(rows))
+    axes = drawing.canvas.axes[0]
+    assert (axes.get_xlabel(), axes.get_xscale()) == ("Relative excess [%]", "asinh")
+    lines = {float(np.mean(line.get_ydata())): line.get_xdata() for line in axes.get_lines()[::2]}
+    assert np.allclose(sorted(lines[2.0]), [-10.0, 4000.0]) and np.allclose(lines[1.0], 100.0)
+    bar = axes.get_lines()[5].get_xdata()[0]
+    assert np.isclose(bar, np.sinh((np.arcsinh(-10.0) + np.arcsinh(4000.0)) / 2.0))
+    low, high = axes.get_xlim()
+    assert low < -10.0 and high > 4000.0 and list(axes.get_xticks()) == [0.0, 10.0, 1000.0, -10.0]
 
 
 def test_errors_are_drawn_against_the_vertices_that_scenes_declare():

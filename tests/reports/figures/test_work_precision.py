@@ -34,7 +34,7 @@ from reports.tables.speed import crossings, error_rivals, reference_uncertainty
 from tests.reports.report_folder import declaration, run_of
 from tests.reports.report_folder import row as any_row
 
-# method: ms a frame, relative gap, curvature error
+# method: ms a frame, relative energy gap, curvature error
 WORN = {
     "simulation": (100.0, 0.0, None),
     "newton-1": (12.0, 0.2, 3.0),
@@ -296,8 +296,8 @@ def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays(
     run = run_of(all_rows())
     assert cost_sentence(run).endswith(
         " SNUG has an energy gap, the energy above the minimum of each time step, of 0.100 J; no other "
-        "method is as fast with a smaller gap. The fastest solver stopped early with as small a gap is "
-        "L-BFGS, 20 iterations, 16.0 ms a frame."
+        "method is as fast with a smaller one. The fastest solver stopped early with as small an energy gap "
+        "is L-BFGS, 20 iterations, 16.0 ms a frame."
     )
     (table,) = error_rivals(run)
     assert table.rows == (
@@ -332,7 +332,7 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
     run = run_of(rows)
     frame = run.cells("speed", "garments")
     (sentence,) = page_one_sentences._rivals(run, frame, ["a", "b"])
-    others = "of the methods measured in all of these scenes, none is as fast with a smaller gap"
+    others = "of the methods measured in all of these scenes, none is as fast with a smaller one"
     assert sentence.endswith(others)
     assert page_one_sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
 
