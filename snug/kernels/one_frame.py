@@ -17,8 +17,8 @@ from reference_sim.kernels.kernel_cache import njit
 
 # Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU); a cell;
 # squared distances of x from the rows of W; the mean of the rows of W that have the least distances; offsets
-# of a block of vertices by one handle, and those added.
-PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, DISTANCES, NEAREST, HANDLE, HANDLE_ADDED = range(9)
+# of a block of vertices by one handle, and those added; y += x.
+PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, DISTANCES, NEAREST, HANDLE, HANDLE_ADDED, SUM = range(10)
 ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
 VERTEX_BLOCK = 64  # vertices that are skinned together
 FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
@@ -88,11 +88,11 @@ def run_frame(
 
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
     begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where its
-    recurrent part begins; of NEAREST the terms begin with the number of rows that share, and what is added to
-    each distance; of HANDLE rows is how far apart two coordinates of a vertex are written, and columns how
-    far apart their numbers are read. terms: mean and spread of the features (D,), which are normalised into
-    work[:D], then factors and biases of each matrix. The offsets are the last of `work`. The others are those
-    of skin_frame.
+    recurrent part begins; of SUM rows is its size; of NEAREST the terms begin with the number of rows that
+    share, and what is added to each distance; of HANDLE rows is how far apart two coordinates of a vertex are
+    written, and columns how far apart their numbers are read. terms: mean and spread of the features (D,),
+    which are normalised into work[:D], then factors and biases of each matrix. The offsets are the last of
+    `work`. The others are those of skin_frame.
     """
     inputs = len(features)
     for i in range(inputs):
@@ -102,6 +102,9 @@ def run_frame(
         source, y = work[operations[i, 5] :], work[operations[i, 6] :]
         if kind == CELL:
             _cell(source, work[columns:], y, rows)
+        elif kind == SUM:
+            for j in range(rows):
+                y[j] += source[j]
         elif kind == DISTANCES:
             _distances(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
         elif kind == NEAREST:

@@ -12,6 +12,7 @@ from snug.networks.garment_network import GarmentNetwork
 from snug.networks.handles.network import Handles20, Handles40, Handles80
 from snug.networks.initialisation import initialise, zero
 from snug.networks.motion_perceptron import MotionPerceptron
+from snug.networks.ncs.network import StaticBranch, TwoBranches
 from snug.networks.pbns import PoseSpaceDeformation
 from snug.networks.regressor import Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
@@ -30,6 +31,8 @@ ARCHITECTURES: dict[str, type[GarmentNetwork]] = {
     "handles-20": Handles20,
     "handles-40": Handles40,
     "handles-80": Handles80,
+    "ncs": TwoBranches,
+    "ncs-static": StaticBranch,
 }
 
 

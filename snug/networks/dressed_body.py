@@ -18,11 +18,12 @@ from snug.body.skinning import skin
 from snug.garments.garment import Garment, smooth_weights
 from snug.motion.motion import Motion
 from snug.networks.motion_features import HISTORY, motion_history
+from snug.networks.ncs.joint_motion import joint_motion
 from snug.recipes.recipe import Recipe
 
 # The sets of inputs, and the number of earlier frames that each is made from: rates are first and second
 # differences.
-FEATURE_SETS = {"motion": 1, "pose": 0, "pose_shape": 0, "history": HISTORY + 1}
+FEATURE_SETS = {"motion": 1, "pose": 0, "pose_shape": 0, "history": HISTORY + 1, "joint_motion": 2}
 
 
 class DressedBody:
@@ -114,7 +115,8 @@ class DressedBody:
             betas: shape numbers; None is the mean body.
             feature_set: `pose`; `motion`: pose, root velocity and shape; `pose_shape`: pose and shape, with
                 zeros behind it up to SHAPES numbers; `history`: pose and the rates of root and joints, now
-                and before (snug.networks.motion_features).
+                and before (snug.networks.motion_features); `joint_motion`: pose and rates of single joints
+                (snug.networks.ncs.joint_motion), whatever the recipe says.
             still: as if each pose were held, whatever came before it.
 
         Raises:
@@ -122,6 +124,9 @@ class DressedBody:
         """
         if feature_set not in FEATURE_SETS:
             raise ValueError(f"unknown features {feature_set!r}: use one of {tuple(FEATURE_SETS)}")
+        if feature_set == "joint_motion":
+            pose, rates = joint_motion(self.body, motion, betas)
+            return torch.from_numpy(np.concatenate([pose, rates * (not still)], axis=1).astype(np.float32))
         rotations = rotation_matrices(motion.poses)
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if feature_set == "motion":

@@ -25,6 +25,7 @@ from snug.kernels.one_frame import (
     RECTIFIED,
     ROWS,
     SMOOTH,
+    SUM,
     VERTEX_BLOCK,
     run_frame,
     skin_frame,
@@ -135,13 +136,18 @@ class FramePlan:
         size = gru.hidden_size
         inputs, recurrent = self._place(3 * size), self._place(3 * size)
         for layer in gru.all_weights:
-            w_i, w_h, b_i, b_h = (weight.detach().numpy() for weight in layer)
+            w_i, w_h, *biases = (weight.detach().numpy() for weight in layer)
+            b_i, b_h = biases or [np.zeros(3 * size, np.float32)] * 2
             state = self._place(size)
             self._product(PRODUCT, w_i, b_i, x, inputs.start)
             self._product(PRODUCT, w_h, b_h, state, recurrent.start)
             self._operations.append((CELL, size, recurrent.start, 0, 0, inputs.start, state.start))
             x = state
         return x
+
+    def add_sum(self, place: slice, x: slice) -> None:
+        """Add the numbers at x to those at a place of the same size."""
+        self._operations.append((SUM, x.stop - x.start, 0, 0, 0, x.start, place.start))
 
     def add_offsets(self, network: GarmentNetwork, *parts: tuple[nn.Linear, slice]) -> None:
         """Add the offsets (3 V,), the sum of linear layers of the numbers at places; to be called last."""

@@ -23,6 +23,7 @@ class GarmentNetwork(nn.Module):
         feature_set: inputs it reads, one of snug.networks.dressed_body.FEATURE_SETS.
         sequential: whether it carries a state from frame to frame.
         fitted: whether `learn` teaches it, in one go, in place of training steps.
+        lead: frames before a training window that it reads first, from a state of zero, with their gradient.
         closed_form: whether it trains by snug.kernels.gru, on a CPU; its next state then has no gradient.
         pins: vertices without offset, which the body carries; see snug.networks.architectures.make_network.
         output_scale: factor on the predicted offsets.
@@ -31,6 +32,7 @@ class GarmentNetwork(nn.Module):
     feature_set: ClassVar[str]
     sequential: ClassVar[bool]
     fitted: ClassVar[bool] = False
+    lead: ClassVar[int] = 0
     closed_form: bool = False
     pins: tuple[int, ...] = ()
     input_mean: Tensor
@@ -57,6 +59,10 @@ class GarmentNetwork(nn.Module):
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor | None:
         """Draw the state that a training window starts from; None for a network without one."""
         return None
+
+    def state_after(self, features: Tensor) -> Tensor:
+        """Return the state after frames with features (N, T, D), for a network with `lead`."""
+        raise NotImplementedError
 
     def learn(self, features: Tensor, offsets: Tensor) -> None:
         """Learn offsets (F, V, 3) [m] of frames with features (F, D), for a network that is `fitted`."""

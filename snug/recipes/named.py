@@ -75,6 +75,17 @@ POSE_REGRESSION = replace(TAILORNET, name="pose-regression")
 PBNS = replace(DEFAULT, name="pbns", learning_rate=2e-3)
 # The default as it is: no rate was searched for.
 HANDLES = replace(DEFAULT, name="handles")
+# As its authors train it: inertia about a detached past, first states of zero half a second before, Adam
+# without decay, batches of 32 windows. All else is the default's: rates that fall, the start, mixed motions.
+NCS = replace(
+    DEFAULT,
+    name="ncs",
+    inertia_form="detached_past",
+    weight_decay=0.0,
+    h0_sigma=0.0,
+    remembered=False,
+    batch=32,
+)
 PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_samples="vertices")
 
 # Inertia about a simulation's past begins at joules, which are no divergence.
@@ -125,6 +136,8 @@ RECIPE_OF_KIND = {
     "handles-20": HANDLES,
     "handles-40": HANDLES,
     "handles-80": HANDLES,
+    "ncs": NCS,
+    "ncs-static": NCS,
 }
 
 

@@ -20,7 +20,7 @@
 
 >>> from snug.training import KINDS
 >>> [name for name, kind in KINDS.items() if kind.physics]
-['snug', 'dynamic', 'pbns', 'handles-20', 'handles-40', 'handles-80']
+['snug', 'dynamic', 'pbns', 'handles-20', 'handles-40', 'handles-80', 'ncs', 'ncs-static']
 """
 
 import lazy_loader

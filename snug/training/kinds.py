@@ -47,6 +47,7 @@ KINDS = {
     "nearest-poses": Kind(ARCHITECTURES["nearest-poses"], targets=VertexTargets),
     "pose-regression": Kind(ARCHITECTURES["pose-regression"], targets=VertexTargets),
     **{name: Kind(ARCHITECTURES[name]) for name in ("handles-20", "handles-40", "handles-80")},
+    **{name: Kind(ARCHITECTURES[name]) for name in ("ncs", "ncs-static")},
 }
 
 

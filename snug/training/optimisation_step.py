@@ -243,10 +243,12 @@ class Trainer:
     def start_state(self, count: int, mine: slice, batch: Batch) -> Tensor | None:
         """Return the state before the windows of a batch: noise of the recipe's sigma plus the cached state.
 
-        For TailorNet it is the dropout masks.
+        For TailorNet it is the dropout masks; a network with a lead reads the frames before.
 
         Noise is drawn for all `count` windows of the step; only that of this process is kept.
         """
+        if self.network.lead:
+            return self.network.state_after(self.data.before(batch.frames[:, 0], self.network.lead))
         state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
         if state is None:
             return None

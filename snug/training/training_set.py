@@ -136,6 +136,12 @@ class TrainingSet:
             return batch
         return self._dressed(batch, self.shapes[self.motion_of(frames[:, 0])])
 
+    def before(self, frames: np.ndarray, count: int) -> Tensor:
+        """Return the features (N, count, D) before rows (N,), in place of missing ones a motion's first."""
+        first = self.first[self.motion_of(frames)]
+        rows = np.maximum(frames[:, None] - np.arange(count, 0, -1), first[:, None])
+        return self.features[torch.as_tensor(rows, device=self.device)]
+
     def batch(self, windows: np.ndarray, betas: np.ndarray | None = None) -> Batch:
         """Return windows (N,) as tensors, each on the body of its motion, or of its shape in betas (N, S)."""
         batch = self.at(self.starts[windows][:, None] + np.arange(self.window))

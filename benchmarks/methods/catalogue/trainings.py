@@ -12,6 +12,7 @@ from snug.recipes.named import (
     ABLATIONS,
     DYNAMIC,
     HANDLES,
+    NCS,
     NEAREST_POSES,
     PAPER,
     PBNS,
@@ -34,6 +35,8 @@ TRAININGS = {
     "nearest-poses": Training("nearest-poses", NEAREST_POSES, Simulated()),
     "pose-regression": Training("pose-regression", POSE_REGRESSION, Simulated()),
     **{f"handles-{count}": Training(f"handles-{count}", HANDLES) for count in (20, 40, 80)},
+    "ncs": Training("ncs", NCS),
+    "ncs-static": Training("ncs-static", NCS),
     "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
     # Each deviation has as many steps as the recipe that it changes.

@@ -1,0 +1,134 @@
+"""Neural Cloth Simulation: inputs at rest, branches apart, training, file and ONNX."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from snug.motion.motion import Motion
+from snug.networks.architectures import make_network
+from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES, joint_motion
+from snug.networks.ncs.network import LEAD
+from snug.networks.roll_out import prepare_frame_inputs, roll_out
+from snug.networks.trained_model import TrainedModel
+from snug.onnx_file import write_onnx
+from snug.recipes.named import NCS
+from snug.training.optimisation_step import Trainer
+from snug.training.train_network import train_network
+from tests.snug.networks.test_regressor import turned
+from tests.snug.training.dressing import leaning, swaying, tube_dress
+
+INPUTS = POSE_NUMBERS + len(DESCRIBED) * RATES
+
+
+def held(motion: Motion, frame: int, frames: int) -> Motion:
+    """The pose of one frame, kept."""
+    rows = [frame] * frames
+    return Motion("held", motion.poses[rows], motion.translations[rows], fps=motion.fps)
+
+
+@pytest.fixture
+def network():
+    network = make_network("ncs", INPUTS, 7, NCS, seed=0)
+    torch.nn.init.normal_(network.offsets.weight)
+    return network
+
+
+@pytest.fixture(scope="module")
+def trained() -> TrainedModel:
+    return train_network("ncs", tube_dress(), [swaying(24)], steps=4, seed=0, recipe=NCS, progress=False)
+
+
+def test_a_fall_without_turning_is_gravity_in_the_axes_of_each_joint():
+    motion = leaning(held(swaying(), 5, 12))
+    motion.translations[:, 1] -= 0.5 * 9.81 * (np.arange(12) / motion.fps) ** 2
+    pose, rates = joint_motion(tube_dress().body, motion)
+    rates = rates.reshape(12, len(DESCRIBED), RATES)
+    down = pose[:, -3 * len(DESCRIBED) :].reshape(12, -1, 3)
+    assert np.abs(np.linalg.norm(down, axis=2) - 1.0).max() < 1e-12
+    assert np.abs(rates[2:, :, 9:] - 9.81 * down[2:]).max() < 1e-9 and not rates[:, :, :9].any()
+
+
+def test_inputs_know_no_heading_and_no_place():
+    body, motion = tube_dress().body, leaning(swaying())
+    other = turned(motion, 2.0, np.array([3.0, 0.5, -1.0]))
+    for first, second in zip(joint_motion(body, motion), joint_motion(body, other)):
+        assert np.abs(first - second).max() < 1e-9
+
+
+def test_one_frame_at_a_time_has_the_inputs_of_the_whole(trained):
+    motion = swaying(6)
+    whole = tube_dress().features(motion, NCS, feature_set="joint_motion")
+    inputs = prepare_frame_inputs(trained, tube_dress(), motion)
+    assert all(torch.allclose(inputs(t)[0], whole[t], atol=1e-4) for t in range(6))
+
+
+def test_the_dynamic_branch_adds_nothing_where_nothing_moves(network):
+    mean, std = np.random.default_rng(0).normal(size=INPUTS), np.full(INPUTS, 0.7)
+    network.normalise_by(mean, std)
+    features = torch.randn(2, 9, INPUTS)
+    features[..., POSE_NUMBERS:] = 0.0
+    code, state = network.dynamic_code(features, None)
+    assert not code.any() and not state.any()
+    network.eval()
+    assert torch.equal(network(features)[0], network.decode(network.static_code(features)))
+
+
+def test_the_static_code_knows_no_past_and_the_dynamic_one_no_pose(network):
+    network.eval()
+    features, other = torch.randn(1, 9, INPUTS), torch.randn(1, 9, INPUTS)
+    later = torch.cat([other[:, :5], features[:, 5:]], 1)
+    assert torch.equal(network.static_code(later)[:, 5:], network.static_code(features)[:, 5:])
+    assert (network(later)[0] - network(features)[0])[:, 5:].abs().max() > 1e-5
+    posed = features.clone()
+    posed[..., :POSE_NUMBERS] = other[..., :POSE_NUMBERS]
+    assert torch.equal(network.dynamic_code(posed, None)[0], network.dynamic_code(features, None)[0])
+
+
+def test_strange_codes_teach_the_decoder_alone_and_not_by_inertia(network):
+    features = torch.randn(10, 3, INPUTS)
+    offsets = network(features)[0]
+    assert (offsets[:2] - network.eval()(features)[0][:2]).abs().max() > 1e-6
+    offsets[:2].square().sum().backward(retain_graph=True)
+    learning = {
+        name.partition(".")[0]
+        for name, p in network.named_parameters()
+        if p.grad is not None and p.grad.any()
+    }
+    assert learning == {"decoder", "offsets"}
+    network.zero_grad()
+    offsets[:2, 2].sum().backward(retain_graph=True)
+    assert not any(p.grad is not None and p.grad.any() for p in network.parameters())
+    offsets[2:].square().sum().backward()
+    assert all(p.grad is not None and p.grad.any() for p in network.parameters() if p.ndim == 2)
+
+
+def test_a_window_begins_with_the_state_that_its_lead_leaves():
+    trainer = Trainer("ncs", tube_dress(), [swaying(40)], steps=1, seed=0, recipe=NCS)
+    windows = np.array([0, 4, 20])
+    batch = trainer.data.batch(windows)
+    state = trainer.start_state(3, slice(None), batch)
+    assert not state[:, 0].any() and state.requires_grad
+    for row, first in enumerate(windows[1:], 1):
+        features = trainer.data.features[None, max(first - LEAD, 0) : first]
+        expected = trainer.network.state_after(features)[:, 0]
+        assert torch.allclose(state[:, row], expected, atol=1e-6) and expected.any()
+
+
+def test_poses_held_have_the_static_answer_and_a_file_gives_the_same(trained, tmp_path):
+    motion = swaying(8)
+    loaded = TrainedModel.load(trained.save(tmp_path / "ncs.safetensors"))
+    still, again = (roll_out(model, tube_dress(), motion, quasi_static=True) for model in (trained, loaded))
+    one = roll_out(loaded, tube_dress(), held(motion, 5, 20)).positions
+    assert np.abs(one - one[0]).max() < 1e-6 and np.abs(one[0] - still.positions[5]).max() < 2e-6
+    assert np.array_equal(still.positions, again.positions)
+    assert np.abs(roll_out(loaded, tube_dress(), motion).positions - still.positions).max() > 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of the exporter, about its own parts
+def test_an_onnx_file_gives_the_same(trained, tmp_path):
+    pytest.importorskip("onnxruntime")
+    pytest.importorskip("onnxscript")
+    assert write_onnx(trained, tube_dress(), swaying(6), tmp_path / "ncs.onnx") < 1e-5
