@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from benchmarks.engines.engine import ITERATIONS, SUBSTEPS, Engine, EngineCloth
 from benchmarks.engines.specimens import Specimen
 
@@ -36,7 +38,7 @@ def _newton(specimen: Specimen, solver: str, iterations: int) -> EngineCloth:
     return made
 
 
-def _mujoco(specimen: Specimen, iterations: int) -> EngineCloth:
+def _mujoco_euler(specimen: Specimen, iterations: int) -> EngineCloth:
     from benchmarks.engines.mujoco_cloth import MujocoCloth
 
     return MujocoCloth(specimen, "Euler")
@@ -53,37 +55,37 @@ REFERENCE = Engine(
     settings="one step a frame, minimised to 1e-6", factors=(1, 4), make=_reference,
 )  # fmt: skip
 
-_NEWTON = {"module": "newton", "package": "newton", "licence": "Apache-2.0", "install": INSTALL}
-_MUJOCO = {"module": "mujoco", "package": "mujoco", "licence": "Apache-2.0", "install": INSTALL}
+_of_newton = partial(Engine, module="newton", package="newton", licence="Apache-2.0", install=INSTALL)
+_of_mujoco = partial(Engine, module="mujoco", package="mujoco", licence="Apache-2.0", install=INSTALL)
 
 ENGINES: tuple[Engine, ...] = (
     REFERENCE,
-    Engine(
-        name="newton.vbd", title="newton, VBD", **_NEWTON, substeps=20, iterations=10, make=_vbd,
+    _of_newton(
+        name="newton.vbd", title="newton, VBD", substeps=20, iterations=10, make=_vbd,
         settings=f"20 sub-steps of 10 iterations: {NEWTON_EXAMPLE}", grows=ITERATIONS,
         factors=(1, 4, 16, 64),
     ),
-    Engine(
-        name="newton.vbd_frame", title="newton, VBD, one step a frame", **_NEWTON, substeps=1, iterations=10,
+    _of_newton(
+        name="newton.vbd_frame", title="newton, VBD, one step a frame", substeps=1, iterations=10,
         settings="one step of 10 iterations: the solver's default", make=_vbd, grows=ITERATIONS,
         factors=(1, 4, 16, 64, 256, 1024),
     ),
-    Engine(
-        name="newton.xpbd", title="newton, XPBD", **_NEWTON, substeps=20, iterations=10, make=_xpbd,
+    _of_newton(
+        name="newton.xpbd", title="newton, XPBD", substeps=20, iterations=10, make=_xpbd,
         settings=f"20 sub-steps of 10 iterations: {NEWTON_EXAMPLE}", grows=ITERATIONS,
         factors=(1, 4, 16, 64),
     ),
-    Engine(
-        name="newton.style3d", title="newton, Style3D", **_NEWTON, substeps=4, iterations=10, make=_style3d,
+    _of_newton(
+        name="newton.style3d", title="newton, Style3D", substeps=4, iterations=10, make=_style3d,
         settings=f"4 sub-steps of 10 iterations: {NEWTON_EXAMPLE}", grows=ITERATIONS, factors=(1, 4, 16, 64),
     ),
-    Engine(
-        name="mujoco.euler", title="MuJoCo, Euler", **_MUJOCO, substeps=17, make=_mujoco,
+    _of_mujoco(
+        name="mujoco.euler", title="MuJoCo, Euler", substeps=17, make=_mujoco_euler,
         settings="17 steps a frame, of 1.96 ms; the default is 2 ms and integrator Euler", grows=SUBSTEPS,
         factors=(1, 4, 16, 64, 256),
     ),
-    Engine(
-        name="mujoco.discrete", title="MuJoCo, discrete", **_MUJOCO, substeps=17, make=_mujoco_discrete,
+    _of_mujoco(
+        name="mujoco.discrete", title="MuJoCo, discrete", substeps=17, make=_mujoco_discrete,
         settings="17 steps a frame, of 1.96 ms; integrator discrete, as its manual advises", grows=SUBSTEPS,
         factors=(1, 4, 16, 64),
     ),

@@ -70,8 +70,8 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
         lines.append(f"pretrained, not trained here: {', '.join(pretrained)}; {same}")
     rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(NOT_FALLING)]
     if rising:
-        cells = _first_of(list(dict.fromkeys(rising)))
-        lines.append(f"more iterations or a smaller tolerance, and a larger gap: {cells}")
+        named_cells = _first_of(list(dict.fromkeys(rising)))
+        lines.append(f"more iterations or a smaller tolerance, and a larger gap: {named_cells}")
     return lines
 
 
