@@ -55,7 +55,8 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
         return ""
     first, *others = known
     excess = known[first]
-    unseen = "" if set(worn["scene"]) <= set(run.trained_on) else "unseen "
+    kind = "validation " if run.config.get("split") == "validation" else "unseen "
+    unseen = "" if set(worn["scene"]) <= set(run.trained_on) else kind
     count = len(excess.by_motion)
     beside = published_beside(run, first)
     motions = f"{count} {unseen}motion{'' if count == 1 else 's'}{_independent(excess)}"

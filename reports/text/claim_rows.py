@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from reports.run.finished_run import Run
@@ -13,6 +13,7 @@ from reports.tables.number_texts import DASH, number
 
 HEAD = ["Claim", "Measure", "First", "Claimed", "Second", "Effect", "Interval", "p", "Verdict", "Run"]
 NOT_MEASURED = "not measured"
+TIMES = ("s", "ms")  # units
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,18 @@ class JudgedClaims:
     labels: Mapping[str, str]
 
 
-def judge_in_first(runs: Sequence[tuple[str, Run]]) -> JudgedClaims:
-    """Judge each claim by the first of these (name, run) that has both of its methods."""
+def judge_in_first(runs: Sequence[tuple[str, Run]], timed: Collection[str] | None = None) -> JudgedClaims:
+    """Judge each claim by the first of these (name, run) that has both of its methods.
+
+    timed: names of the runs that judge claims on times; None for all. A run that shared its machine with
+        other work judges none: its methods may have had different shares of the processors.
+    """
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
     for name, run in runs:
         for line in judged(run):
-            verdicts.setdefault(line.claim, (name, line))
+            if timed is None or name in timed or line.compared.metric.unit not in TIMES:
+                verdicts.setdefault(line.claim, (name, line))
         labels = {method: run.label(method) for method in run.methods} | labels
     return JudgedClaims(verdicts, labels)
 

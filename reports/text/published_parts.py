@@ -12,6 +12,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from benchmarks.publish.published_runs import RUNS
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks.page_one_sentences import headline
 from reports.run.finished_run import Run
@@ -78,7 +79,8 @@ def published_part(words: str) -> str:
 
 @cache
 def _claims(*folders: Path) -> JudgedClaims:
-    return judge_in_first([(folder.name, read_published(folder)) for folder in folders])
+    timed = [name for name, run in RUNS.items() if run.timed]
+    return judge_in_first([(folder.name, read_published(folder)) for folder in folders], timed)
 
 
 def _table(folder: Path, name: str) -> Table:
