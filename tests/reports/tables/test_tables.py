@@ -318,6 +318,8 @@ def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
 
     assert said(SCENES[1]).startswith("On 1 unseen motion SNUG has a relative excess of 5.0 %,")
     assert said(*SCENES).startswith("On 2 motions SNUG has")
+    checked = dict(headline(run_of(rows, split="validation")))["How near"].replace("\u00a0", " ")
+    assert checked.startswith("On 2 validation motions SNUG has")
 
 
 def test_run_times_are_of_the_scenes_that_both_have():
