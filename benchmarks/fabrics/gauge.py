@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from benchmarks.fabrics.fabric import Fabric, plain_name
 from benchmarks.fabrics.markers import FULL_ANGLES, Markers
@@ -170,6 +169,8 @@ def _order(path: Path, start: np.ndarray, rest: np.ndarray) -> np.ndarray:
     apart = np.linalg.norm(rest[:, None] - rest[None], axis=-1)
     most = apart[apart > 0].min() / 2  # beyond half the spacing two markers could be taken for each other
     distance = np.linalg.norm(rest[:, None] - start[None], axis=-1)
+    from scipy.optimize import linear_sum_assignment
+
     ours, theirs = linear_sum_assignment(distance)
     if (far := distance[ours, theirs].max()) > most:
         raise GaugeFileError(

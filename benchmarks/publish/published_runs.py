@@ -23,13 +23,11 @@ class PublishedRun:
         parts: name -> options of `benchmarks.run`; several parts are merged into one folder. They are apart
             where a part has other scenes or times.
         pictures: figures that the documents show, by their names in the folder `figures` of the report.
-        timed: whether it was made on a machine with nothing beside, so that it judges claims on times.
     """
 
     question: str
     parts: dict[str, str]
     pictures: tuple[str, ...] = ()
-    timed: bool = False
 
 
 def _validation(methods: str, more: str = THREE) -> dict[str, str]:
@@ -47,7 +45,6 @@ RUNS = {
             "--scenes tshirt/push_recovery@clip,tshirt/01_01_a@clip",
         },
         ("energy_series_tshirt-01_01_a", "error_against_time", "frames_tshirt-01_01_a", "training"),
-        timed=True,
     ),
     "paper_text": PublishedRun(
         "the recipe of the paper's text and PBNS by it, 136,000 steps at 4378 vertices, on 22 test motions",

@@ -159,7 +159,7 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     said = capsys.readouterr()
     assert "tshirt-walk/snug.vtkhdf" in said.err and "snug-seed0.safetensors" in said.err
     assert said.out.splitlines()[-1] == str(run.report_path) and run.report_path.is_file()
-    assert said.out.startswith("Method ") and "SNUG has a relative excess energy of" in said.out
+    assert said.out.startswith("Method ") and "SNUG has a relative excess of" in said.out
 
 
 def test_curves_beside_a_trajectory_are_its_own(tmp_path):

@@ -12,6 +12,7 @@ from snug.garments import tailor_tshirt
 from snug.networks.architectures import ARCHITECTURES, make_network
 from snug.networks.dressed_body import DressedBody
 from snug.networks.initialisation import initialise
+from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES
 from snug.networks.regressor import Regressor
 from snug.recipes.named import PAPER, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
@@ -57,8 +58,9 @@ def test_every_kind_follows_the_rules_of_its_recipe(kind):
 
 @pytest.mark.parametrize("kind", ARCHITECTURES)
 def test_a_last_layer_of_zero_starts_at_the_template(kind):
-    network = make_network(kind, 151, 5, replace(DEFAULT, initialisation="keras"), seed=1)
-    offsets, _ = network(torch.randn(3, 4, 151))
+    inputs = POSE_NUMBERS + RATES * len(DESCRIBED)  # what ncs reads; the others read any number
+    network = make_network(kind, inputs, 5, replace(DEFAULT, initialisation="keras"), seed=1)
+    offsets, _ = network(torch.randn(3, 4, inputs))
     assert offsets.shape == (3, 4, 5, 3) and not offsets.any()
     assert all(not p.any() for layer in network.last_layers() for p in layer.parameters())
 
