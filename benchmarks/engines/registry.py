@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 from benchmarks.engines.engine import ITERATIONS, SUBSTEPS, Engine, EngineCloth
-from benchmarks.engines.specimens import Specimen
+
+if TYPE_CHECKING:
+    from benchmarks.engines.specimens import Specimen
 
 NEWTON_EXAMPLE = "newton's example cloth_hanging"
 INSTALL = "pip install 'neural-garment-benchmark[engines]'"
