@@ -8,6 +8,6 @@
 | roll_outs | roll-outs of engines, with their time |
 | laws | what any engine owes: free fall, momentum, symmetry, reaction |
 | newton_cloth, newton_energies | NVIDIA's newton and the energies that its solvers minimise |
-| mujoco_cloth, blender_cloth | MuJoCo and Blender |
+| mujoco_cloth | MuJoCo |
 | reference_cloth | the reference, as one more engine |
 """

@@ -71,7 +71,6 @@ class Engine:
         settings: where these defaults come from.
         grows: ITERATIONS or SUBSTEPS, what is multiplied to give it a larger budget.
         factors: of the budgets, the default first.
-        throws: whether a sheet can be given a velocity.
         make: (specimen, iterations) -> EngineCloth.
     """
 
@@ -86,7 +85,6 @@ class Engine:
     settings: str
     grows: str = ITERATIONS
     factors: tuple[int, ...]
-    throws: bool = True
     make: Callable[[Specimen, int], EngineCloth]
 
     @property

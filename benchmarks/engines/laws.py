@@ -1,4 +1,4 @@
-"""What any engine owes, whatever its energy: free fall, momentum, symmetry, reaction; and its own minimum.
+"""Laws that an engine keeps whatever its energy: free fall, momentum, symmetry, reaction, own minimum.
 
 Free fall. A step that adds g h to the velocity and moves by the new velocity, as backward Euler and
 semi-implicit Euler do, has fallen g h^2 N (N + 1) / 2 after N steps; the continuous law is g t^2 / 2.

@@ -90,9 +90,7 @@ def build_model(cloth: Cloth, solver: str) -> Any:
         edge_kd=0.0,
         particle_radius=0.0,
     )
-    builder.particle_mass[:] = cloth.masses.tolist()
-    for pin in cloth.pins:
-        builder.particle_mass[pin] = 0.0
+    _set_masses(builder, cloth)
     edges = np.array(builder.edge_indices)
     rest_angle = builder.edge_rest_angle
     rest_angle[:] = [0.0] * len(rest_angle)  # what BendHinge takes by default
@@ -137,6 +135,11 @@ def _add_style3d(builder: Any, cloth: Cloth) -> None:
         tri_lift=0.0,
         particle_radius=0.0,
     )
+    _set_masses(builder, cloth)
+
+
+def _set_masses(builder: Any, cloth: Cloth) -> None:
+    """Give the particles the masses of the cloth, and pins none, which holds them."""
     builder.particle_mass[:] = cloth.masses.tolist()
     for pin in cloth.pins:
         builder.particle_mass[pin] = 0.0

@@ -166,11 +166,11 @@ def _is_cloud(value: Any, count: int) -> bool:
 
 def _order(path: Path, start: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Return which marker of a trial, at start (M, 3), is which of the metadata. Raises GaugeFileError."""
+    from scipy.optimize import linear_sum_assignment
+
     apart = np.linalg.norm(rest[:, None] - rest[None], axis=-1)
     most = apart[apart > 0].min() / 2  # beyond half the spacing two markers could be taken for each other
     distance = np.linalg.norm(rest[:, None] - start[None], axis=-1)
-    from scipy.optimize import linear_sum_assignment
-
     ours, theirs = linear_sum_assignment(distance)
     if (far := distance[ours, theirs].max()) > most:
         raise GaugeFileError(

@@ -36,7 +36,7 @@ exit status: 0 all are published; 1 a run failed and is left as it was; 2 the re
 
 
 class PublishError(ValueError):
-    """What cannot be published; the message says why."""
+    """A run cannot be published; the message says why."""
 
 
 @command(PROGRAM, goes_on="the same command goes on from there")

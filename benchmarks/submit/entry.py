@@ -77,7 +77,7 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """Of the folder and of the method in rows."""
+        """Name of the folder, and of the method in rows."""
         return self.path.resolve().name
 
     @property

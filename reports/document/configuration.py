@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from reports.statistics.page_one_methods import LEARNED
 from reports.tables.number_texts import DASH, duration, number
 
 # Declarations and files: not how the rows were made. run.json has it all.
@@ -17,7 +18,7 @@ NOT_SHOWN = (
 )  # fmt: skip
 UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
 MOST_LETTERS = 420  # letters of a value
-LEARNED = ("network", "ablation", "warm-started")  # roles of methods that were trained
+TRAINED = (*LEARNED, "warm-started")  # roles of methods that were trained
 
 
 def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[list[str]]:
@@ -46,7 +47,7 @@ def _of_rows(motions: Any, frame: pd.DataFrame) -> Any:
     """
     if not isinstance(motions, dict):
         return motions
-    of_rows, trained = set(frame["motion"]), frame["role"].isin(LEARNED).any()
+    of_rows, trained = set(frame["motion"]), frame["role"].isin(TRAINED).any()
     kept = {
         name: [motion for motion in of_part if motion in of_rows or (trained and not name.startswith("test"))]
         for name, of_part in motions.items()

@@ -29,17 +29,17 @@ class JudgedClaims:
     labels: Mapping[str, str]
 
 
-def judge_in_first(runs: Sequence[tuple[str, Run]], timed: Collection[str] | None = None) -> JudgedClaims:
+def judge_in_first(runs: Sequence[tuple[str, Run]], timed: Collection[str]) -> JudgedClaims:
     """Judge each claim by the first of these (name, run) that has both of its methods.
 
-    timed: names of the runs that judge claims on times; None for all. A run that shared its machine with
-        other work judges none: its methods may have had different shares of the processors.
+    timed: names of the runs that judge claims on times. A run that shared its machine with other work judges
+        none: its methods may have had different shares of the processors.
     """
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
     for name, run in runs:
         for line in judged(run):
-            if timed is None or name in timed or line.compared.metric.unit not in TIMES:
+            if name in timed or line.compared.metric.unit not in TIMES:
                 verdicts.setdefault(line.claim, (name, line))
         labels = {method: run.label(method) for method in run.methods} | labels
     return JudgedClaims(verdicts, labels)

@@ -33,24 +33,24 @@ def law(engine: str, name: str, sample: str) -> Measurement:
 
 def distance(engine: str, factor: int) -> Measurement:
     """Return the distance of a budget's roll-out from the engine's own limit [%]."""
+    return _of_budget(
+        engine, factor, lambda runs, remark: (laws.distance(runs[factor], runs[max(runs)]), remark)
+    )
+
+
+def milliseconds(engine: str, factor: int) -> Measurement:
+    """Return the processor time of a frame of the hanging sheet at that budget [ms]."""
+    return _of_budget(engine, factor, lambda runs, _: (runs[factor].milliseconds, ""))
+
+
+def _of_budget(engine: str, factor: int, number: Callable[[dict[int, RollOut], str], Answer]) -> Measurement:
+    """Evaluate a number of the engine's ladder and its remark, where the ladder has that budget."""
 
     def measure(found: Engine) -> Answer:
         runs, remark = ladder(engine)
         if factor not in runs:
             return None, f"nothing moved any more at {max(runs)} times the default"
-        return laws.distance(runs[factor], runs[max(runs)]), remark
-
-    return measurement(engine, measure)
-
-
-def milliseconds(engine: str, factor: int) -> Measurement:
-    """Return the processor time of a frame of the hanging sheet at that budget [ms]."""
-
-    def measure(found: Engine) -> Answer:
-        runs, _ = ladder(engine)
-        if factor not in runs:
-            return None, f"nothing moved any more at {max(runs)} times the default"
-        return runs[factor].milliseconds, ""
+        return number(runs, remark)
 
     return measurement(engine, measure)
 
