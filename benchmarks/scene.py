@@ -42,6 +42,7 @@ class Scene:
         start_of: another scene whose settled start is that of this one too.
         networks_only: whether nobody simulates it, so that it has neither start nor posed body.
         own_garment: whether it tailors a garment that no network of the run was trained for.
+        self_contact: whether the cloth of its simulations does not cross itself.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Scene:
     start_of: str = ""
     networks_only: bool = False
     own_garment: bool = False
+    self_contact: bool = False
 
     @property
     def timed(self) -> bool:
@@ -154,6 +156,8 @@ class BuiltScene:
         kept: frames of the motion that a trajectory holds, or None for all.
         repeated: two sets of frames of the trajectory that show the same motion.
         specimen: of a textile test, which measures itself, or None.
+        self_contact: whether the cloth of simulations does not cross itself; nothing is measured by that term.
+        settle_uncrossed: like `settle`, with self-contact; None where a start is not simulated.
 
     Raises:
         ValueError: a warm-up below two.
@@ -176,6 +180,8 @@ class BuiltScene:
     kept: np.ndarray | None = None
     repeated: tuple[np.ndarray, np.ndarray] | None = None
     specimen: Specimen | None = None
+    self_contact: bool = False
+    settle_uncrossed: Callable[[], np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         by_name("energy", self.energies)  # rows of one would overwrite those of the other

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 GUESSES = ("previous", "extrapolated", "body_transported")
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
 LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
+# What a step goes on with where terms join late, as L-BFGS does behind its first phase; and what it takes over.
+ENDING = {"method": "newton", "reuse": True, "start_projected": True}
+LIMITS = ("tolerance", "max_iterations", "timeout")
 APPROACH_SHARE = 0.8  # of the way to the next touch: closer, a barrier grows stiff
 
 
@@ -90,7 +93,14 @@ class TimeStepper:
         # The preconditioner of L-BFGS knows nothing of pairs that come and go.
         method = "newton" if any(energy.dynamic for energy in energies) else "lbfgs"
         self.quasi_static, self.options = quasi_static, {"method": method} | options
-        self.minimiser = make_minimiser(self.potential, **self.options)
+        self.late = [energy for energy in energies if energy.joins_late]
+        early = Potential([energy for energy in self.potential.energies if not energy.joins_late])
+        self.opening: Minimiser | None = None
+        self.ending = self.options
+        if self.late and not early.impassable:
+            self.opening = make_minimiser(early, **{"method": "lbfgs"} | options)
+            self.ending = ENDING | {name: options[name] for name in LIMITS if name in options}
+        self.minimiser = make_minimiser(self.potential, **self.ending)
 
     def check_start(self, x: np.ndarray, v: np.ndarray) -> None:
         """Raise ValueError where x (V, 3) [m] at frame 0 is impossible for a term that nothing may pass."""
@@ -114,7 +124,7 @@ class TimeStepper:
                 handles = (1 - share) * handles + share * pins
             step = (frame - 1) * self.substeps + j
             guess = self.prepare(step, x, v, handles)
-            results.append(self.reach(x, guess))
+            results.append(self.open(x, guess) if self.opening else self.reach(x, guess))
             for _ in range(self.refreeze):
                 if not np.isfinite(results[-1].positions).all():
                     break
@@ -179,6 +189,24 @@ class TimeStepper:
         self.prepare(last * self.substeps, before[0], before[1], x[pins])
         return State(x, self.velocity(x, before[0]), before if self.substeps > 1 else None)
 
+    def open(self, x: np.ndarray, guess: np.ndarray) -> Result:
+        """Minimise without the terms that join late, and with them only where they have something to say.
+
+        The minimum without them is the answer if the way there is free and they are zero around it. If not,
+        the minimisation with them starts on the way there: from `guess` on if that can be reached, else from
+        x on. Cloth meets itself late on such a way, for a guess moves it with the body.
+        """
+        assert self.opening is not None
+        potential, opened = self.potential, self.opening.minimise(guess)
+        y = opened.positions if np.isfinite(opened.positions).all() else guess
+        free = potential.ccd_fraction(x, y, 0.0) == 1
+        terms = potential.terms(y)
+        if free and opened.status == "converged" and not any(terms[term.name] for term in self.late):
+            return replace(opened, terms=terms)
+        if not free and potential.ccd_fraction(x, guess, 0.0) == 1:
+            x = guess
+        return self.reach(x, y)
+
     def reach(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
 
@@ -220,7 +248,7 @@ class TimeStepper:
     @cached_property
     def rough_minimiser(self) -> Minimiser:
         """Minimiser of few iterations, which gains distance half-way."""
-        options: dict[str, Any] = self.options | {"max_iterations": 8, "tolerance": 1e-2}
+        options: dict[str, Any] = self.ending | {"max_iterations": 8, "tolerance": 1e-2}
         return make_minimiser(self.potential, **options)
 
     def provenance(self) -> dict[str, Any]:

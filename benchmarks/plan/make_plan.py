@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets.inputs import LIBRARY, read_inputs
+from benchmarks.method import installed
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.plan import user_files
 from benchmarks.plan.choose_cells import Selection, choose_cells, choose_suites, names_no_motion
@@ -63,6 +64,10 @@ def make_plan(request: Request) -> Plan:
         )  # fmt: skip
     if request.garment:
         motions = replace(motions, worn=(scenes_of_file(request.garment), *motions.worn[1:]))
+    if request.self_contact:
+        if not installed("ipctk"):
+            raise PlanError("--self-contact needs the package ipctk: pip install ipctk")
+        motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
     cells, cases, microbenchmarks = choose_cells(
         Selection(
             suites=suites, full=bool(request.suites), preset=request.preset, motions=motions,

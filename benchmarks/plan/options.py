@@ -146,6 +146,9 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
         help="your own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; its scenes are "
         "<name of the file>/<motion>. python -m snug.check FILE tells whether it can be used")  # fmt: skip
     add_garment_options(parser)
+    add("--self-contact", action="store_true",
+        help="simulations of <garment>/<motion>, settling and training data included, keep the cloth from "
+        "crossing itself (needs ipctk)")  # fmt: skip
 
 
 def request_of_run(options: argparse.Namespace, command_line: Sequence[str]) -> Request:
@@ -198,6 +201,7 @@ def scene_fields(options: argparse.Namespace) -> dict[str, Any]:
         "motion_options": parse_motion_options(options),
         "test_motions": split(options.test_motions),
         "validation_motions": split(options.validation_motions),
+        "self_contact": options.self_contact,
         "body": Path(options.body) if options.body else None,
         "garment": garment,
     }

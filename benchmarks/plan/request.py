@@ -26,6 +26,7 @@ class Request:
     motions: paths, or "library"; motion_options: how to read them; test_motions, validation_motions: names of
     those that have these roles; split: the role that is measured, "test" or "validation".
     fabrics: a user's file of measured fabrics, for suite fabric; gauge: a user's copy of GAUGE, for it too.
+    self_contact: whether the cloth of dressed scenes' simulations does not cross itself.
     body, garment: a user's own files; None: the package's. seeds: of trainings; device: where they run.
     folder: of the run; None: a new one. only: states of what the folder holds in which a task is done again;
     empty: the usual ones; fresh: nothing of the folder is reused. workers: processes side by side; None: as
@@ -49,6 +50,7 @@ class Request:
     split: str = "test"
     fabrics: Path | None = None
     gauge: Path | None = None
+    self_contact: bool = False
     body: Path | None = None
     garment: GarmentFile | None = None
     seeds: tuple[int, ...] = (0,)

@@ -91,12 +91,14 @@ def further_scenes(garment: str) -> tuple[Scene, ...]:
 class GarmentScenes:
     """Scenes of a garment of snug.garments: named "<garment>/<motion>" and "<garment>/<motion>@clip".
 
-    dynamic: whether its motions are those that stop within a frame, instead of the run's own.
+    dynamic: whether its motions are those that stop within a frame, instead of the run's own. self_contact:
+    whether the cloth of simulations does not cross itself.
     """
 
     garment: str
     title: str
     dynamic: bool = False
+    self_contact: bool = False
 
     def scene(self, motion: str, part: str = "whole") -> Scene:
         """Return the scene of a body in this garment doing that motion, or its liveliest part."""
@@ -109,6 +111,7 @@ class GarmentScenes:
             garment=self.garment,
             motion=motion,
             part=part,
+            self_contact=self.self_contact,
         )
 
 

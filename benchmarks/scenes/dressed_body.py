@@ -14,6 +14,7 @@ import numpy as np
 
 from benchmarks.assets.assets import Assets
 from benchmarks.scene import BuiltScene, Dressed, Scene
+from benchmarks.scenes.self_contact import demand_uncrossed, with_self_contact
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.contact_penalty.definition import ContactPenalty
@@ -51,11 +52,14 @@ def build(
     motion = assets.motion(scene.motion, scene.part)
     before = assets.before(scene.motion, scene.part)
 
-    def settle() -> np.ndarray:
+    def settle(terms: tuple[Energy, ...]) -> np.ndarray:
         if before is None:
-            return settled(cloth, energies, assets, garment, motion, settle_frames, shape)
-        start = settled(cloth, energies, assets, garment, before, settle_frames, shape)
-        return moved_along(cloth, energies, body, garment, before.followed_by(motion.cut(0, 1)), start, shape)
+            return settled(cloth, terms, assets, garment, motion, settle_frames, shape)
+        start = settled(cloth, terms, assets, garment, before, settle_frames, shape)
+        return moved_along(cloth, terms, body, garment, before.followed_by(motion.cut(0, 1)), start, shape)
+
+    def settle_uncrossed() -> np.ndarray:
+        return settle(with_self_contact(energies))
 
     cloth = garment.cloth()
     handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
@@ -69,7 +73,9 @@ def build(
         energies=energies,
         dt=1.0 / motion.fps,
         frames=motion.frames,
-        settle=settle,
+        settle=settle_uncrossed if scene.self_contact else lambda: settle(energies),
+        self_contact=scene.self_contact,
+        settle_uncrossed=settle_uncrossed,
         obstacle=obstacle,
         origin_heights=dressed.pelvis[:, 1],
         dressed=dressed,
@@ -101,7 +107,8 @@ def settled(
 ) -> np.ndarray:  # fmt: skip
     """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
-    Raises RuntimeError when the simulation of the approach did not stay finite.
+    Raises RuntimeError when the simulation of the approach did not stay finite, and ValueError for a garment
+    that crosses itself before it where that is not allowed.
     """
     body = assets.body
     first = motion.poses[0]
@@ -113,6 +120,7 @@ def settled(
     # The garment, unposed on that body, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1], betas)[0, 0]
     start = garment.rest_for(body, betas) @ root[:, :3].T + root[:, 3]
+    demand_uncrossed(start, energies, f"garment {garment.name}")
     way = replace(motion, poses=poses, translations=translations)
     return _simulated(cloth, energies, body, garment, way, start, betas, "come to rest in the first pose")[-1]
 

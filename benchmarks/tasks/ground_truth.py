@@ -219,13 +219,15 @@ class SimulateQuasiStatic(Task):
         """Simulate each frame held still and write the trajectory."""
         import numpy as np
 
+        from benchmarks.scenes.self_contact import with_self_contact
         from reference_sim import simulate
 
         scene = build_scene(self.scene, context)
+        energies = with_self_contact(scene.energies) if scene.self_contact else scene.energies
         path = context.folder.quasi_static_path(scene.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory = simulate(
-            scene.cloth, scene.energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
+            scene.cloth, energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
             start=scene.start, quasi_static=True, tolerance=TOLERANCE, pin_positions=scene.pin_positions,
         )  # fmt: skip
         context.tell(self.units)

@@ -135,7 +135,9 @@ def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
         help="IPC's barrier in place of the penalty: nothing passes, twelve times the time (needs ipctk)",
     )
     contact.add_argument(
-        "--self-contact", action="store_true", help="the cloth meets itself too, by the barrier"
+        "--self-contact",
+        action="store_true",
+        help="the cloth never crosses itself: a barrier, beside the penalty or with --barrier (needs ipctk)",
     )
     contact.add_argument(
         "--barrier-distance", type=_positive, metavar="M", help="where it begins [m] (default 0.002)"

@@ -23,6 +23,7 @@ BARRIER_FLAGS = ("barrier_distance", "barrier_stiffness")
 def check_terms(options: Namespace) -> None:
     """Raise BadInput where flags ask for what they cannot have, with the remedy."""
     barrier = options.barrier or options.self_contact
+    penalty = options.obstacle is not None and not options.barrier
     given = [name for name in PENALTY_FLAGS + BARRIER_FLAGS if getattr(options, name) is not None]
     penalty_only = [_flag(name) for name in given if name in PENALTY_FLAGS]
     barrier_only = [_flag(name) for name in given if name in BARRIER_FLAGS]
@@ -33,7 +34,7 @@ def check_terms(options: Namespace) -> None:
             raise BadInput("--barrier needs an --obstacle; without one give --self-contact")
         if penalty_only:
             raise BadInput(f"{penalty_only[0]} needs an --obstacle")
-    if barrier and penalty_only:
+    if barrier and not penalty and penalty_only:
         raise BadInput(f"{penalty_only[0]} belongs to the penalty, which a barrier replaces: leave it out")
     if barrier_only and not barrier:
         raise BadInput(f"{barrier_only[0]} needs --barrier or --self-contact")
@@ -55,9 +56,11 @@ def make_terms(cloth: Cloth, options: Namespace) -> list[Energy]:
         from reference_sim.energies.area_barrier import AreaBarrier
 
         declared.append(AreaBarrier(cloth, stiffness=options.area_barrier))
+    if options.obstacle and not options.barrier:
+        declared += _penalty(cloth, options)
     if options.barrier or options.self_contact:
-        return declared + _barrier(cloth, options)
-    return declared + (_penalty(cloth, options) if options.obstacle else [])
+        declared += _barrier(cloth, options)
+    return declared
 
 
 def _penalty(cloth: Cloth, options: Namespace) -> list[Energy]:
@@ -83,11 +86,15 @@ def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
         for name in BARRIER_FLAGS
         if getattr(options, name) is not None
     }
+    beside_penalty = options.obstacle is not None and not options.barrier
     try:
-        contact = ContactBarrier(cloth, self_contact=options.self_contact, **values)
+        contact = ContactBarrier(
+            cloth, self_contact=options.self_contact, obstacle=not beside_penalty, **values
+        )
     except ImportError as error:
         raise ValueError(str(error)) from None
-    friction = [BarrierFriction(contact, coefficient=options.friction)] if options.friction else []
+    rubs = options.friction and not beside_penalty  # the penalty's friction is that on the body
+    friction = [BarrierFriction(contact, coefficient=options.friction)] if rubs else []
     return [contact, *friction]
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from reference_sim.cloth import Cloth
 
 BOX_MARGIN = 0.05  # [m] between the cloth and the sides of the box
+LONGEST_STEP = 0.05  # [m] of a vertex in a line search: a metre, which some directions ask for, has most pairs
 NO_OBSTACLE = (np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
@@ -44,7 +45,7 @@ class NearMesh:
 
     def holds(self, x: np.ndarray) -> bool:
         """Return whether positions x (V, 3) [m] lie in the box."""
-        return bool((x >= self.low).all() and (x <= self.high).all())
+        return self.low[0] == -np.inf or bool((x >= self.low).all() and (x <= self.high).all())
 
 
 class Collisions:
@@ -67,16 +68,19 @@ class Collisions:
         self.cloth, self.distance, self.self_contact = cloth, float(distance), self_contact
         self._slack = self.distance / 4  # how far vertices may move before candidates are searched again
         self._ccd = self.package.AdditiveCCD()
+        self._obstacle_faces = NO_OBSTACLE[0]
+        self._near: NearMesh | None = None
         self.begin(*NO_OBSTACLE)
 
     def begin(self, faces: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
         """Begin a step in which an obstacle (faces (Fb, 3)) moves from before to after (B, 3) [m].
 
-        It is put at the end. Nothing is kept from the step before, so that sums have one order, whatever was
-        asked earlier, and a resumed run gives the same bits.
+        It is put at the end. Nothing is kept from the step before but the mesh of a cloth alone, so that sums
+        have one order, whatever was asked earlier, and a resumed run gives the same bits.
         """
+        if len(faces) or len(self._obstacle_faces):
+            self._near = None
         self._obstacle_faces, self._before, self._after = faces, before, after
-        self._near: NearMesh | None = None
         self.place(1.0)
 
     def place(self, progress: float) -> None:
@@ -98,7 +102,8 @@ class Collisions:
         """Return the mesh whose box holds all these positions (V, 3) [m]; the last one if it does."""
         if self._near is None or not all(map(self._near.holds, positions)):
             stacked = np.concatenate(positions)
-            self._near = self._build(stacked.min(axis=0) - BOX_MARGIN, stacked.max(axis=0) + BOX_MARGIN)
+            margin = BOX_MARGIN if len(self._obstacle_faces) else np.inf
+            self._near = self._build(stacked.min(axis=0) - margin, stacked.max(axis=0) + margin)
             self._forget()
         return self._near
 
@@ -137,6 +142,9 @@ class Collisions:
             return False
         a, b = self._way
         way = b - a
+        if b is a or not way.any():
+            off = x - a
+            return bool(np.einsum("vi,vi->v", off, off).max() <= self._slack**2)
         t = np.einsum("vi,vi->v", x - a, way) / np.maximum(np.einsum("vi,vi->v", way, way), 1e-300)
         off = x - a - np.clip(t, 0.0, 1.0)[:, None] * way
         return bool(np.einsum("vi,vi->v", off, off).max() <= self._slack**2)
@@ -155,14 +163,16 @@ class Collisions:
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         """Return the share of `direction` (V, 3) [m] that the cloth may go while the obstacle stands."""
-        goal = x + direction
         pairs, near, positions = self.pairs(x)
         gap = min(self.distance, pairs.compute_minimum_distance(near.mesh, positions) ** 0.5)
-        if 2 * np.sqrt(np.einsum("vi,vi->v", direction, direction).max()) < gap:
+        farthest = float(np.sqrt(np.einsum("vi,vi->v", direction, direction).max()))
+        if 2 * farthest < gap:
             return 1.0  # nothing is close enough to be reached
+        part = min(1.0, LONGEST_STEP / farthest)
+        goal = x + part * direction
         candidates = self._candidates(x, goal)
         near, obstacle = self.mesh_around(x, goal), self.obstacle_at(self.progress)
-        return candidates.compute_collision_free_stepsize(
+        return part * candidates.compute_collision_free_stepsize(
             near.mesh, near.stack(x, obstacle), near.stack(goal, obstacle), 0.0, self._ccd
         )
 

@@ -14,6 +14,10 @@ Beyond a touch the energy means nothing: a distance has no sign. Hence `largest_
 search by continuous collision detection, and a step starts without an intersection: `ccd_fraction` and
 `set_progress` let the simulator move cloth and body together from the start of the step as far as nothing
 meets, minimise there to gain distance, and go on, until the body is where the frame has it.
+
+Without the obstacle the barrier is self-contact alone, beside another term for contact with the body. Where
+the body leaves less room than the cloth needs, as between arm and chest, that other term gives way: cloth
+goes into the body and never through itself.
 """
 
 from __future__ import annotations
@@ -42,10 +46,12 @@ class ContactBarrier(Energy):
         distance: dhat [m], where the barrier begins; must be below every height of a rest triangle.
         stiffness: kappa [Pa].
         self_contact: whether the cloth meets itself.
+        obstacle: whether the cloth meets the obstacle; if not, another term keeps it out of the body.
 
     Raises:
         ImportError: ipctk is not installed.
-        ValueError: distance or stiffness not positive, or distance above a height of a rest triangle.
+        ValueError: distance or stiffness not positive, distance above a height of a rest triangle, or nothing
+            to meet.
     """
 
     name = "barrier"
@@ -59,15 +65,19 @@ class ContactBarrier(Energy):
         distance: float = DEFAULT_DISTANCE,
         stiffness: float = DEFAULT_STIFFNESS,
         self_contact: bool = True,
+        obstacle: bool = True,
     ) -> None:
         for name, value in (("distance", distance), ("stiffness", stiffness)):
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"ContactBarrier {name} = {value!r}: must be a finite number above 0")
+        if not (self_contact or obstacle):
+            raise ValueError("ContactBarrier: meets nothing: give self_contact=True or obstacle=True")
         if self_contact:
             _check_heights(cloth, distance)
         self.cloth = cloth
         self.stencils = np.zeros((0, 4), dtype=np.int64)
         self.distance, self.stiffness = float(distance), float(stiffness)
+        self.obstacle, self.joins_late = obstacle, not obstacle
         self.collisions = Collisions(cloth, distance, self_contact=self_contact)
         ipctk = self.collisions.package
         self.potential = ipctk.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
@@ -87,6 +97,7 @@ class ContactBarrier(Energy):
             "distance_m": self.distance,
             "stiffness_Pa": self.stiffness,
             "self_contact": self.collisions.self_contact,
+            "obstacle": self.obstacle,
             "package": f"ipctk {self.collisions.package.__version__}",
         }
 
@@ -104,7 +115,7 @@ class ContactBarrier(Energy):
         way to its place goes on from where it stopped.
         """
         last, self.step = self.step, step
-        if step.obstacle is None:
+        if step.obstacle is None or not self.obstacle:
             self.collisions.begin(*NO_OBSTACLE)
             return
         after = step.obstacle.at(step.frame)

@@ -54,6 +54,8 @@ class Energy:
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
             judged without preparing the one before it.
         impassable: whether an obstacle may have to stop on its way to the end of a step.
+        joins_late: whether a step is minimised without the term first. It is zero wherever nothing is near,
+            so most steps end there.
         kernels: fast kernels by use, "module:function" each, or the name of a function of the term's own
             file; the uses are listed in kernels.fast_kernels. A subclass does not inherit them.
     """
@@ -65,6 +67,7 @@ class Energy:
     constant: tuple[int, ...] = ()
     remembers: bool = False
     impassable: bool = False
+    joins_late: bool = False
     kernels: ClassVar[Mapping[str, str]] = {}
 
     def energy(self, x: Tensor) -> Tensor:

@@ -151,6 +151,15 @@ SOLVERS = (
             ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
         )
     ),
+    MethodEntry(
+        name="simulation-self-contact",
+        label="Simulation, self-contact",
+        description="the reference with a barrier that keeps the cloth from crossing itself",
+        module="benchmarks.methods.solvers.self_contact",
+        package="ipctk",
+        role="ablation",
+        reporting=Reporting(base="simulation"),
+    ),
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
         (1, 2, 4, 8), **_NEWTON,

@@ -1,0 +1,80 @@
+"""Self-contact alone, beside another term for the body: known answers, and that it changes nothing elsewhere.
+
+Whether edges cut faces is asked here with determinants of its own, not with the package under test.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from reference_sim import Cloth, Material, Obstacle, simulate
+from reference_sim.energies import BendHinge, ContactBarrier, ContactPenalty, Gravity, StretchStVK
+from tests.reference_sim.energies.barriers import assert_free, cuts, folded, sheet
+from tests.reference_sim.meshes import box, grid
+
+pytest.importorskip("ipctk", reason="ipctk is not installed: no barrier to test")
+
+
+def self_contact(cloth: Cloth) -> ContactBarrier:
+    return ContactBarrier(cloth, distance=1e-3, obstacle=False)
+
+
+def two_sheets() -> tuple[Cloth, int]:
+    """A sheet that is held, and one 3 mm above it, not vertex over vertex; the number of vertices held."""
+    x, faces = grid(4, 4, width=0.08, depth=0.08)
+    y, more = grid(3, 3, width=0.05, depth=0.05)
+    both = np.concatenate([x, y + np.array([0.0131, 3e-3, 0.0147])])
+    return Cloth(both, np.concatenate([faces, more + len(x)]), Material(), pins=np.arange(len(x))), len(x)
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_sheet_pressed_on_another_keeps_a_gap_and_its_weight_is_carried(held):
+    """The barrier pushes up as much as the sheet weighs; without it the sheet falls freely."""
+    cloth, lower = two_sheets()
+    weight = Gravity(cloth, acceleration=40.0)
+    barrier = self_contact(cloth)
+    terms = [StretchStVK(cloth), BendHinge(cloth), weight, *([barrier] if held else [])]
+    fall = simulate(cloth, terms, frames=6, quasi_static=True)
+    assert fall.status == "converged", fall.reason
+    x = fall.positions[-1]
+    if not held:
+        assert x[lower:, 1].max() < -0.1
+        return
+    assert_free(fall, cloth, None)
+    push = barrier.value_and_gradient(x)[1][lower:]
+    assert -push.sum(axis=0)[1] == pytest.approx(40.0 * cloth.masses[lower:].sum(), rel=1e-3)
+    assert 0 < x[lower:, 1].min() and x[lower:, 1].max() < 1e-3  # the barrier reaches 1 mm
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_a_folded_strip_on_a_floor_of_penalty_comes_to_rest_on_itself(apart):
+    cloth, start = folded(5)
+    floor = Obstacle(*box((-1, -0.1, -1), (1.1, 0, 1.2)))
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth, acceleration=60.0), ContactPenalty(cloth)]
+    rest = simulate(
+        cloth, [*terms, *([self_contact(cloth)] if apart else [])], obstacle=floor, start=start, frames=15
+    )
+    assert rest.status == "converged", rest.reason
+    if apart:
+        assert_free(rest, cloth, None)
+    else:
+        assert any(cuts(x, cloth.edges, x, cloth.faces).any() for x in rest.positions)
+
+
+def test_frames_in_which_nothing_is_near_are_those_without_it():
+    cloth = sheet(4, 0.2, (0.0, 0.0, 0.0), pins=[0, 4])
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+    without = simulate(cloth, terms, frames=5)
+    beside = simulate(cloth, [*terms, self_contact(cloth)], frames=5)
+    assert np.array_equal(without.positions, beside.positions)
+    assert list(beside.frame_fields["energy/barrier"][1:]) == [0.0] * 4
+
+
+def test_a_start_that_crosses_itself_is_refused_and_so_is_a_barrier_against_nothing():
+    strip, start = folded(5)
+    start[strip.rest_positions[:, 0] > 0.11, 1] -= 0.0175  # the upper half, through the lower
+    with pytest.raises(ValueError, match=r"edge \(\d+, \d+\) of the cloth cuts face \d+ of the cloth"):
+        simulate(strip, [StretchStVK(strip), self_contact(strip)], start=start, frames=2)
+    with pytest.raises(ValueError, match="meets nothing: give self_contact=True or obstacle=True"):
+        ContactBarrier(strip, self_contact=False, obstacle=False)
