@@ -17,7 +17,7 @@ import numpy as np
 from reference_sim.cloth import Cloth
 
 BOX_MARGIN = 0.05  # [m] between the cloth and the sides of the box
-LONGEST_STEP = 0.05  # [m] of a vertex in a line search: a metre, which some directions ask for, has most pairs
+LONGEST_STEP = 0.05  # [m] of a vertex in a line search: a step of a metre would meet nearly every pair
 NO_OBSTACLE = (np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
@@ -44,7 +44,7 @@ class NearMesh:
         return np.asfortranarray(np.concatenate([x, obstacle[self.vertices]]))
 
     def holds(self, x: np.ndarray) -> bool:
-        """Return whether positions x (V, 3) [m] lie in the box."""
+        """Return whether positions x (V, 3) [m] lie in the box, which has no sides where no obstacle is."""
         return self.low[0] == -np.inf or bool((x >= self.low).all() and (x <= self.high).all())
 
 
@@ -141,12 +141,10 @@ class Collisions:
         if self._way is None:
             return False
         a, b = self._way
-        way = b - a
-        if b is a or not way.any():
-            off = x - a
-            return bool(np.einsum("vi,vi->v", off, off).max() <= self._slack**2)
-        t = np.einsum("vi,vi->v", x - a, way) / np.maximum(np.einsum("vi,vi->v", way, way), 1e-300)
-        off = x - a - np.clip(t, 0.0, 1.0)[:, None] * way
+        way, off = b - a, x - a
+        if way.any():
+            t = np.einsum("vi,vi->v", off, way) / np.maximum(np.einsum("vi,vi->v", way, way), 1e-300)
+            off -= np.clip(t, 0.0, 1.0)[:, None] * way
         return bool(np.einsum("vi,vi->v", off, off).max() <= self._slack**2)
 
     def pairs(self, x: np.ndarray) -> tuple[Any, NearMesh, np.ndarray]:

@@ -193,6 +193,15 @@ def test_a_barrier_takes_the_place_of_the_penalty_and_nothing_passes(folder):
     assert Trajectory.load("b.vtkhdf").provenance["terms"]["barrier"]["self_contact"]
 
 
+def test_self_contact_stands_beside_the_penalty_and_its_friction(folder):
+    pytest.importorskip("ipctk")
+    arguments = ["sheet.obj", "--self-contact", "--friction", "0.3", "--contact-margin", "0.003"]
+    assert main([*arguments, "--obstacle", "ball", "--quiet", "-o", "a.vtkhdf"]) == 0
+    terms = Trajectory.load("a.vtkhdf").provenance["terms"]
+    assert (terms["barrier"]["self_contact"], terms["barrier"]["obstacle"]) == (True, False)
+    assert terms["collision"] and terms["friction"]["coefficient"] == 0.3
+
+
 def test_a_missing_package_is_said_with_its_remedy(folder, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "ipctk", None)
     assert main(["sheet.obj", "--self-contact", "-o", "a.vtkhdf"]) == 2

@@ -1,0 +1,104 @@
+"""Self-contact of scenes: as a method beside the reference, and as the ground truth of a run."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import make_parser, request_of_run
+from benchmarks.plan.plan import PlanError
+from benchmarks.scenes import of_garment
+from benchmarks.scenes.self_contact import with_self_contact
+from reference_sim import Cloth, Material
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.reference_sim.meshes import grid
+
+pytest.importorskip("ipctk", reason="ipctk is not installed: no self-contact")
+
+METHOD = "simulation-self-contact"
+
+
+def two_sheets(height: float):
+    """A scene of two free sheets; the upper one starts at `height` [m] and stands on edge below 0.02."""
+    scene = small_scene("hanging_sheet", cells=4, frames=4)
+    x, faces = grid(3, 3, width=0.06, depth=0.06)
+    cloth = Cloth(np.concatenate([x, x + [0, 0.1, 0]]), np.concatenate([faces, faces + len(x)]), Material())
+    upright = np.stack([x[:, 0] + 0.003, x[:, 2] - 0.03 + height, 0.031 + 0 * x[:, 2]], axis=1)
+    start = np.concatenate([x, upright])
+    energies = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
+    return dataclasses.replace(
+        scene, cloth=cloth, energies=energies, settle=lambda: start, pin_positions=None, exact=None
+    )
+
+
+def made(scene):
+    method = find_method(METHOD).make(models=None, seed=0)
+    method.prepare(scene)
+    return method
+
+
+def test_where_nothing_meets_it_is_the_simulation_and_is_measured_without_its_barrier():
+    scene = small_scene("hanging_sheet", cells=4, frames=5)
+    reference = Simulation(options={})
+    reference.prepare(scene)
+    expected, method = reference.run(), made(scene)
+    trajectory = method.run()
+    assert np.array_equal(trajectory.positions, expected.positions)
+    assert "energy/barrier" in trajectory.frame_fields
+    assert "energy/barrier" not in expected.frame_fields
+    assert [term.name for term in method.scene.energies] == ["strain", "bending", "gravity"]
+    entry = find_method(METHOD)
+    assert (entry.role, entry.reporting.base, entry.package) == ("ablation", "simulation", "ipctk")
+
+
+def test_solvers_that_stop_early_know_no_self_contact():
+    scene = dataclasses.replace(two_sheets(0.05), self_contact=True)
+    stopped = Simulation(options={"max_iterations": 2, "method": "newton"})
+    stopped.prepare(scene)
+    assert "energy/barrier" not in stopped.run().frame_fields
+    whole = Simulation(options={})
+    whole.prepare(scene)
+    assert "energy/barrier" in whole.run().frame_fields
+
+
+def test_a_start_that_crosses_itself_is_settled_anew_or_refused():
+    crossed, free = two_sheets(0.0), two_sheets(0.05)
+    message = r"edge \(\d+, \d+\) of the cloth cuts face \d+ of the cloth where it starts.*mend the mesh"
+    with pytest.raises(ValueError, match=message):
+        made(crossed)
+    again = made(dataclasses.replace(crossed, settle_uncrossed=lambda: free.start))
+    assert np.array_equal(again.scene.start, free.start)
+    kept = made(dataclasses.replace(free, settle_uncrossed=lambda: crossed.start))
+    assert np.array_equal(kept.scene.start, free.start)
+
+
+def test_a_triangle_lower_than_the_barrier_reaches_is_named():
+    scene = small_scene("hanging_sheet", cells=4, frames=3)
+    tiny = Cloth(1e-3 * scene.cloth.rest_positions, scene.cloth.faces, Material())
+    with pytest.raises(ValueError, match=r"face \d+ is only .* high at rest; choose a distance below"):
+        with_self_contact((StretchStVK(tiny),))
+
+
+def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
+    command = ["--scenes", "tshirt/kick,flag", "--methods", "simulation,snug", "--split", "validation"]
+    request = request_of_run(make_parser().parse_args([*command, "--self-contact"]), command)
+    plan = make_plan(request)
+    assert {scene.name: scene.self_contact for scene in plan.scenes} == {"tshirt/kick": True, "flag": False}
+    assert of_garment("tshirt", plan.motions.worn).scene("walk").self_contact  # of what networks learn from
+    without = make_plan(dataclasses.replace(request, self_contact=False))
+    assert not any(scene.self_contact for scene in without.scenes)
+    monkeypatch.setitem(make_plan.__globals__, "installed", lambda package: False)
+    with pytest.raises(PlanError, match="--self-contact needs the package ipctk: pip install ipctk"):
+        make_plan(request)
+
+
+def test_garments_have_it_as_a_row_beside_the_simulation_where_it_is_named():
+    command = ["--scenes", "tunic/*", "--methods", f"simulation,{METHOD}"]
+    plan = make_plan(request_of_run(make_parser().parse_args(command), command))
+    assert {cell.method for cell in plan.cells} == {"simulation", METHOD}
