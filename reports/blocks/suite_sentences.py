@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.metric import COMPARED_WITH
 from reports.run.finished_run import Run
 from reports.tables.fabric.engines import engine_audit
 from reports.tables.fabric.textile_tests import fabric_order
@@ -19,7 +18,7 @@ def textile_tests(run: Run) -> str:
 
     Empty for a run without textile tests of solvers stopped early.
     """
-    rows = [row for row in _rows(fabric_order(run)) if run.methods[row["method"]].role not in COMPARED_WITH]
+    rows = [row for row in _rows(fabric_order(run)) if run.methods[row["method"]].role == "solver"]
     errors = ("cantilever_error", "drape_error")
     judged = [row for row in rows if all(row[name] is not None for name in (*errors, "time"))]
     if not judged:

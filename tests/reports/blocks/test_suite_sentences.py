@@ -32,7 +32,8 @@ def test_engines_say_what_is_right_and_what_is_farthest():
     ]
     assert engines(run_of(rows)).replace("\u00a0", " ") == (
         "Of 2 default settings of other engines 1 violates no law and is at its own limit: good. "
-        "Farthest from its own limit is bad, by 30 % of what the sheet moves. 16 times its budget is within 1 % of it."
+        "Farthest from its own limit is bad, by 30 % of what the sheet moves. "
+        "16 times its budget is within 1 % of it."
     )
     assert [topic for topic, _ in headline(run_of(rows))] == ["Engines"]
 
