@@ -156,7 +156,7 @@ class BuiltScene:
         kept: frames of the motion that a trajectory holds, or None for all.
         repeated: two sets of frames of the trajectory that show the same motion.
         specimen: of a textile test, which measures itself, or None.
-        self_contact: whether the cloth of simulations does not cross itself; nothing is measured by that term.
+        self_contact: whether the cloth of simulations does not cross itself; no metric knows that term.
         settle_uncrossed: like `settle`, with self-contact; None where a start is not simulated.
 
     Raises:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 GUESSES = ("previous", "extrapolated", "body_transported")
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
 LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
-# What a step goes on with where terms join late, as L-BFGS does behind its first phase; and what it takes over.
+# Minimiser of a step whose terms join late, as L-BFGS ends by it too, and options that it shares.
 ENDING = {"method": "newton", "reuse": True, "start_projected": True}
 LIMITS = ("tolerance", "max_iterations", "timeout")
 APPROACH_SHARE = 0.8  # of the way to the next touch: closer, a barrier grows stiff

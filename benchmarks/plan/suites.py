@@ -171,7 +171,8 @@ SUITES = (
             "lbfgs-5", "lbfgs-10", "snug+fast-lbfgs-2", "snug+fast-lbfgs-4",
         ),
         named_methods=(
-            *OTHER_SPRINGS, "simulation-self-contact", *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
+            *OTHER_SPRINGS, "simulation-self-contact",
+            *(entry.name for entry in (*RECIPE_DEVIATIONS, *EQUAL_DATA)),
         ),
     ),
     Suite(

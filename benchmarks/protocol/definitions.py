@@ -27,7 +27,8 @@ DIGITS = 9  # of probed energies
 PROBED = ("hanging_sheet", "sheet_on_sphere")
 FALL = 0.12  # [m] of the probe: onto the sphere
 PATH = (0.0, 0.3, 1.0, 1.6)  # share of the fall in each frame of the probe: it accelerates
-OF_NAMES = ("name", "description", "module", "declared_in", "files")  # of a scene: prose and places of code
+# Of a scene: prose, places of code, and an option that no declared scene takes; rows with it are of no protocol.
+OUTSIDE = ("name", "description", "module", "declared_in", "files", "self_contact")
 
 
 def definitions() -> dict[str, Any]:
@@ -71,7 +72,7 @@ def _defaults(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def _declared(scene: Scene) -> dict[str, Any]:
-    return {name: value for name, value in vars(scene).items() if name not in OF_NAMES}
+    return {name: value for name, value in vars(scene).items() if name not in OUTSIDE}
 
 
 def _rounded(array: np.ndarray) -> np.ndarray:

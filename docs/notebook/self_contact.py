@@ -48,9 +48,10 @@ def measure(scene, label):
     cut = [faces_cut(x, faces) for x in trajectory.positions]
     inside = [np.mean(scene.obstacle.signed_distance(x, t) < 0) for t, x in enumerate(trajectory.positions)]
     print(
-        f"{label}: settled in {settling:.0f} s; {trajectory.frames} frames, {milliseconds:.0f} ms a frame; faces "
-        f"cut: {np.mean(cut):.2f} in the mean, {max(cut)} at most, of {len(faces)}; {np.mean(inside):.2%} of "
-        f"vertices inside; converged in {np.mean(trajectory.frame_fields['converged']):.1%} of frames; "
+        f"{label}: settled in {settling:.0f} s; {trajectory.frames} frames, {milliseconds:.0f} ms a frame; "
+        f"faces cut: {np.mean(cut):.2f} in the mean, {max(cut)} at most, of {len(faces)}; "
+        f"{np.mean(inside):.2%} of vertices inside; "
+        f"converged in {np.mean(trajectory.frame_fields['converged']):.1%} of frames; "
         f"{trajectory.status} {trajectory.reason}",
         flush=True,
     )

@@ -1,4 +1,4 @@
-"""Reference simulation whose cloth does not cross itself, evaluated by the energies that the scene declares."""
+"""Reference simulation whose cloth does not cross itself, evaluated by the scene's declared energies."""
 
 from __future__ import annotations
 

@@ -12,6 +12,8 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
+from benchmarks.protocol.row_protocol import protocol_of
+from benchmarks.results.protocol import OWN
 from benchmarks.scenes import of_garment
 from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim import Cloth, Material
@@ -28,7 +30,9 @@ def two_sheets(height: float):
     """A scene of two free sheets; the upper one starts at `height` [m] and stands on edge below 0.02."""
     scene = small_scene("hanging_sheet", cells=4, frames=4)
     x, faces = grid(3, 3, width=0.06, depth=0.06)
-    cloth = Cloth(np.concatenate([x, x + [0, 0.1, 0]]), np.concatenate([faces, faces + len(x)]), Material())
+    cloth = Cloth(
+        np.concatenate([x, x + np.array([0, 0.1, 0])]), np.concatenate([faces, faces + len(x)]), Material()
+    )
     upright = np.stack([x[:, 0] + 0.003, x[:, 2] - 0.03 + height, 0.031 + 0 * x[:, 2]], axis=1)
     start = np.concatenate([x, upright])
     energies = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
@@ -91,6 +95,8 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     plan = make_plan(request)
     assert {scene.name: scene.self_contact for scene in plan.scenes} == {"tshirt/kick": True, "flag": False}
     assert of_garment("tshirt", plan.motions.worn).scene("walk").self_contact  # of what networks learn from
+    of_kick, *_ = (cell for cell in plan.cells if cell.scene.dressed and cell.method == "simulation")
+    assert protocol_of(of_kick, plan) == OWN  # another reference than that of the protocol
     without = make_plan(dataclasses.replace(request, self_contact=False))
     assert not any(scene.self_contact for scene in without.scenes)
     monkeypatch.setitem(make_plan.__globals__, "installed", lambda package: False)
