@@ -34,7 +34,9 @@ from tests.benchmarks.runner.misbehaving import HANGING_CHILD
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = {scene.name: scene for scene in DECLARED}
-TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1)
+TINY = dataclasses.replace(
+    find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1, least_seconds=0.01
+)
 
 
 def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
