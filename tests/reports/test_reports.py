@@ -34,7 +34,6 @@ from tests.reports.report_folder import (
     write_model,
 )
 
-
 OLD = ("hem_tunic-stop.svg", "error_against_time_flag.png", "training_tunic.svg")
 KEPT = ("mine.png", "gap-relative_against_cost-frame.svg")
 

@@ -120,7 +120,7 @@ def trajectory_of(scene, positions, status="ok", reason=""):
 
 @pytest.fixture(scope="module")
 def positions(assets, models):
-    """Name of a scene -> the scene, and by method the positions (T,V,3) of skinning and an untrained network."""
+    """Name of a scene -> the scene, and positions (T,V,3) of skinning and of an untrained network."""
 
     @cache
     def run(name):

@@ -61,7 +61,7 @@ CALL = (
 )
 
 
-# Numba takes longer to load than to compile one of these kernels: a process that has loaded it forks the others.
+# Loading numba takes longer than compiling one of these kernels: a process that has it forks the others.
 FORKING = """
 import json, os, sys, traceback
 import numba
