@@ -192,6 +192,7 @@ def test_a_cell_that_was_blocked_is_run_once_nothing_blocks_it(tmp_path):
 
 
 def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(execution, "make_report", lambda log: "")
     monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", dies=True)])
     assert execution.execute(plan_of(tmp_path)) == 1
     assert "network lame: out-of-memory: the process was killed" in capsys.readouterr().err
