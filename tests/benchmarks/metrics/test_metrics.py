@@ -1,4 +1,4 @@
-"""Metrics whose answers are known: energies by hand, distances, penetration, intersections, errors in time."""
+"""Metrics with known answers: energies by hand, distances, penetration, intersections, errors in time."""
 
 from __future__ import annotations
 
