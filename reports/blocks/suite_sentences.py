@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from reports.run.finished_run import Run
-from reports.tables.fabric.engines import engine_audit
+from reports.tables.engines.audit import engine_audit
 from reports.tables.fabric.textile_tests import fabric_order
 from reports.tables.number_texts import number
 from reports.tables.table import Table

@@ -12,8 +12,8 @@ from reports.run.finished_run import Run
 from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
 from reports.tables.dictionary import dictionary
+from reports.tables.engines.audit import engine_audit, engine_laws
 from reports.tables.equal_data import EQUAL_DATA
-from reports.tables.fabric.engines import engine_audit, engine_laws
 from reports.tables.fabric.textile_tests import (
     fabric_bands,
     fabric_drape,

@@ -59,13 +59,21 @@ def _ratio(rows: int, where: str, slender: float) -> float:
         tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
         share = 1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2  # shear of a beam: least at the free edges
         forces[tip, 1] = -exact * share / share.sum()
+    return buckling_factor(cloth, forces)
+
+
+def buckling_factor(cloth: Cloth, forces: np.ndarray) -> float:
+    """Return the factor on dead loads (V, 3) [N] at which a flat sheet in the plane z = 0 gives way sideways.
+
+    Raises RuntimeError where the sheet in its plane does not converge.
+    """
     strain, stiff = StretchStVK(cloth), BendHinge(cloth)
     stiff.stiffness = 1e5 * stiff.stiffness  # keeps the loaded strip in its plane, where hinges do no work
     in_plane = Potential([strain, stiff, DeadLoad(cloth, forces)])
     flat = demand_converged(
         minimise(in_plane, cloth.rest_positions, tolerance=1e-9), "the strip in its plane"
     )
-    free = np.setdiff1d(np.arange(len(points)), cloth.pins)
+    free = np.flatnonzero(cloth.free)
 
     def out_of_plane(potential: Potential, x: np.ndarray) -> sp.csc_matrix:
         return sp.csc_matrix(potential.hessian(x)[2::3][:, 2::3][free][:, free])

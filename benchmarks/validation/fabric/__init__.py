@@ -1,1 +1,1 @@
-"""Textile tests by the reference: the master curve, bending lengths, drape. `cases.py` declares them."""
+"""Textile tests by the reference, from the master curve to stick-slip. `cases.py` declares them."""

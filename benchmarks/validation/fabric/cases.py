@@ -51,6 +51,59 @@ CANTILEVER = (
         expected=1.0, tolerance=0.03, reason="the clamp holds back warping over a width, 2 % of the length"),
 )  # fmt: skip
 
+# kappa L -> Gamma at which an arc on edge gives way, C / B = 3: Kirchhoff's rod, bend_twist.critical_gamma.
+ARCS = {1.0: 146.4, 2.0: 50.5, 3.0: 30.9, 4.0: 24.6, 5.0: 23.6, 6.0: 26.1}
+CURLS = ((1.0, 1.0), (3.0, 1.0), (3.0, 10.0), (5.0, 1.0), (5.0, 100.0))  # kappa L, Gamma
+
+BEND_TWIST = (
+    *(
+        _case(f"bend_twist_arc_{curvature:g}",
+            f"weight at which a hanging arc on edge, kappa L = {curvature:g}, gives way, over Kirchhoff's "
+            f"rod: Gamma = {gamma:g}",
+            "fabric.bend_twist", "hanging_arc", options={"curvature": curvature}, expected=1.0,
+            tolerance=0.01, reason="two meshes extrapolated; width 2 % of the length, stiff on edge")
+        for curvature, gamma in ARCS.items()
+    ),
+    *(
+        _case(f"bend_twist_leaves_plane_{curvature:g}",
+            f"weight from which on the minimiser takes that arc out of its plane, kappa L = {curvature:g}, "
+            "over that of its tangent stiffness",
+            "fabric.bend_twist", "leaves_plane", options={"curvature": curvature}, expected=1.0,
+            tolerance=0.015, reason="planar at 0.985, out of its plane at 1.01", smoke=curvature == 3.0)
+        for curvature in (1.0, 3.0, 5.0)
+    ),
+    *(
+        _case(f"bend_twist_curl_{curvature:g}_{gamma:g}",
+            f"tip of a hanging strip of rest curvature, kappa L = {curvature:g}, Gamma = {gamma:g}, pushed "
+            "aside at the start: distance to the planar elastica's, over the length",
+            "fabric.curled_strip", "tip_distance", options={"curvature": curvature, "gamma": gamma},
+            expected=0.0, tolerance=0.002, reason="two meshes extrapolated", smoke=curvature == 3.0)
+        for curvature, gamma in CURLS
+    ),
+)  # fmt: skip
+
+# Strain -> friction below which the tip slips: elastica, stick_slip.critical_friction.
+STRAINS = {0.05: 0.1035, 0.1: 0.1528, 0.15: 0.1959, 0.2: 0.2378, 0.25: 0.2807}
+
+STICK_SLIP = (
+    *(
+        _case(f"stick_slip_ratio_{strain:g}",
+            f"friction over pressure at the tip of a strip pressed on end by {strain:g} of its length, over "
+            f"the elastica's {friction:g}",
+            "fabric.stick_slip", "force_ratio", options={"strain": strain}, expected=1.0, tolerance=0.005,
+            reason="60 cells: at most 0.0012", smoke=strain == 0.1)
+        for strain, friction in STRAINS.items()
+    ),
+    *(
+        _case(f"stick_slip_breaks_loose_{strain:g}",
+            f"strain at which that strip breaks loose as its clamp is lowered, mu = {friction:g}, over the "
+            f"elastica's {strain:g}",
+            "fabric.stick_slip", "breaking_loose", options={"mu": friction}, expected=1.0, tolerance=0.005,
+            reason="steps of 0.0002 of the strain", smoke=strain == 0.1)
+        for strain, friction in STRAINS.items()
+    ),
+)  # fmt: skip
+
 # Drape coefficients [%] of classes of fabrics: where published, see docs/fabric.md for the sources.
 BANDS = {
     "silk": (20.0, 40.0), "cotton": (60.0, 76.0), "wool": (40.0, 70.0), "leather": (47.0, 70.0),
@@ -89,7 +142,7 @@ DRAPE = (
     ),
 )  # fmt: skip
 
-TEXTILE_TESTS: tuple[Case, ...] = (*MASTER_CURVE, *CANTILEVER, *DRAPE)
+TEXTILE_TESTS: tuple[Case, ...] = (*MASTER_CURVE, *CANTILEVER, *BEND_TWIST, *STICK_SLIP, *DRAPE)
 
 
 def percentiles(fabrics: Sequence[Fabric]) -> tuple[Case, ...]:

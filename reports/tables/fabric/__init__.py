@@ -1,1 +1,1 @@
-"""Tables of textile tests (drape on meshes and steps, published bands, solvers) and of engines."""
+"""Tables of textile tests: drape on meshes and steps, published bands, order of fabrics by solvers."""

@@ -11,7 +11,10 @@ from snug.garments.options import add_garment_options
 from snug.motion.options import add_motion_options
 from snug.recipes.named import RECIPES
 
-MODELS = ("snug", "pbns", "supervised", "santesteban2019", "tailornet")
+MODELS = (
+    "snug", "pbns", "supervised", "santesteban2019", "tailornet", "ncs", "ncs-static", "handles-20",
+    "handles-40", "handles-80",
+)  # fmt: skip
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment tshirt --garment tunic  one network for each garment

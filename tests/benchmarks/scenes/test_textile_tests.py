@@ -16,7 +16,8 @@ from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
 from benchmarks.presets import find_preset
 from benchmarks.scenes.textile_tests import TEXTILE_TESTS
-from benchmarks.validation.fabric.cases import CANTILEVER, DRAPE, MASTER_CURVE
+from benchmarks.validation.fabric.cases import DRAPE
+from benchmarks.validation.fabric.cases import TEXTILE_TESTS as CASES
 from reference_sim import simulate
 from reference_sim.trajectory.trajectory import Trajectory
 from tests.benchmarks.fabrics.gauge_folder import make_folder
@@ -108,12 +109,11 @@ def test_a_drape_is_compared_with_the_references():
 
 
 QUICK = ("master_curve_1_80", "master_curve_100_80", "master_curve_1000_160", "astm_d1388_angle",
-         "bending_length_14_cells_30_steps")  # fmt: skip
+         "bending_length_14_cells_30_steps", "bend_twist_arc_3", "bend_twist_leaves_plane_3",
+         "bend_twist_curl_3_10", "stick_slip_ratio_0.1", "stick_slip_breaks_loose_0.1")  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "case", [c for c in (*MASTER_CURVE, *CANTILEVER) if c.name in QUICK], ids=lambda c: c.name
-)
+@pytest.mark.parametrize("case", [case for case in CASES if case.name in QUICK], ids=lambda case: case.name)
 def test_a_case_is_found(case):
     row = case.run()
     assert row.status == "ok" and row.suite == "fabric", row.reason
@@ -126,7 +126,7 @@ def test_a_coarse_disc_drapes_more_the_limper_it_is():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", (*MASTER_CURVE, *CANTILEVER, *DRAPE), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_case_is_found(case):
     row = case.run()
     assert row.status == "ok", row.reason

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from reports.tables.fabric.engines import engine_audit, engine_laws
+from reports.tables.engines.audit import engine_audit, engine_laws
 from tests.reports.report_folder import row, run_of
 
 

@@ -1,0 +1,62 @@
+"""How near each network's frame is to what the core's memory allows: an experiment.
+
+    python docs/notebook/roofline.py [VERTICES]
+
+A frame reads every weight once and does one multiplication and one addition with it, so it takes at least as
+long as reading them. The bound is the least time of a dot product of as many numbers, warm, on the same core;
+that of arithmetic, by a large matrix product, is far lower. Prints, for each network with random weights:
+megabytes of weights, the bound by reading, the bound by arithmetic, the median frame, and frame over bound.
+"""
+
+import sys
+import time
+
+import numpy as np
+
+from benchmarks.performance.inference import _frame_seconds
+from benchmarks.performance.learning import dressed_body, training_motions
+from benchmarks.process.timing import one_thread
+from snug.recipes.named import RECIPE_OF_KIND
+from snug.training.train_network import untrained_model
+
+KINDS = ("snug", "pbns", "handles-20", "handles-40", "handles-80", "ncs", "ncs-static", "tailornet")
+REPEATS = 200
+
+
+def least(run):
+    """Return the least of REPEATS times of run() [s]."""
+    times = []
+    for _ in range(REPEATS):
+        begun = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begun)
+    return min(times)
+
+
+def main():
+    """Print the table."""
+    one_thread()
+    vertices = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    dressed, motions = dressed_body(vertices), training_motions()
+    square = np.ones((1024, 1024), np.float32)
+    operations = 2 * 1024**3 / least(lambda: square @ square)  # a second
+    print(f"{dressed.vertices} vertices; {operations / 1e9:.0f} GFLOP/s")
+    print("network      weights  reading  arithmetic    frame  frame over reading")
+    for kind in KINDS:
+        model = untrained_model(kind, dressed, motions, seed=0, recipe=RECIPE_OF_KIND[kind])
+        count = sum(p.numel() for p in model.network.parameters())
+        weights, inputs = np.ones(count // 2, np.float32), np.ones(count - count // 2, np.float32)
+        size = min(len(weights), len(inputs))
+        reading = least(lambda: weights[:size] @ inputs[:size])
+        for _ in range(2):  # the first one compiles
+            frames = _frame_seconds(model, dressed, motions[0])
+        frame = float(np.median(frames))
+        print(
+            f"{kind:12} {4e-6 * count:5.2f} MB {1e3 * reading:5.3f} ms {2e3 * count / operations:8.4f} ms "
+            f"{1e3 * frame:5.3f} ms {frame / reading:8.1f}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
