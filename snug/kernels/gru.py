@@ -7,8 +7,8 @@ For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU
 
 Three things make it faster than torch.nn.GRU under autograd: products of one sort are taken for all frames
 together, weight gradients above all; what stands between them is one kernel; and forward products go to
-oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The weights
-stay those of the modules.
+oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The
+weights stay those of the modules.
 tests/snug/networks/test_regressor.py holds values and gradients to the modules' own.
 """
 
