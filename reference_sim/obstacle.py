@@ -9,7 +9,6 @@ import copy
 from dataclasses import dataclass
 from functools import cached_property
 
-import igl
 import numpy as np
 
 from reference_sim.cloth import MeshError
@@ -17,6 +16,7 @@ from reference_sim.contact.closest_point import Closest, FaceSearch, Listed
 from reference_sim.fingerprint import fingerprint
 from reference_sim.geometry.closed_mesh import check_closed
 from reference_sim.geometry.surface import carry, faces_around, plane_normals
+from reference_sim.geometry.winding_number import winding_numbers
 
 DEFAULT_REGION = 0.20  # [m]
 
@@ -207,12 +207,7 @@ class Obstacle:
         return carried
 
     def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
-        """Return the distance of points (N, 3) to the surface [m], negative inside (fast winding number)."""
+        """Return the distance of points (N, 3) to the surface [m], negative where it winds around a point."""
         distance = np.linalg.norm(points - self._nearest(points, frame).points, axis=1)
-        vertices = np.asfortranarray(self.at(frame))
-        # Only what lies in the bounding box can be inside.
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        boxed = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
-        winding = igl.fast_winding_number(vertices, self.faces, np.asfortranarray(points[boxed]))
-        distance[boxed] *= np.where(np.asarray(winding).ravel() > 0.5, -1.0, 1.0)
+        distance[winding_numbers(self.at(frame), self.faces, points) > 0] *= -1.0
         return distance

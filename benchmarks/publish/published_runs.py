@@ -71,6 +71,14 @@ RUNS = {
                     "snug-detached-past,snug-two-transitions,pbns,pbns-springs,santesteban2019,tailornet"),
         ("frames_tshirt-sudden_stop",),
     ),
+    "handles": PublishedRun(
+        "networks of few handles and the floors of their spaces; two branches; learners without training steps",
+        {
+            "": f"--suite garments {THREE} --scenes 'tshirt/*' --methods {REFERENCES},snug,snug-floor,pbns,"
+            "handles-20,handles-40,handles-80,handles-20-floor,handles-40-floor,handles-80-floor,"
+            "nearest-poses,pose-regression,ncs,ncs-static"
+        },
+    ),
     "equal_data": PublishedRun(
         "networks with the same frames and numbers of steps",
         _validation("snug-data-[01]*,pbns-data-[01]*,supervised-data-[01]*,tailornet-data-[01]*,*-data-3,"

@@ -122,7 +122,7 @@ class Runner:
     def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do timed tasks one by one; the next few begin together, each in its process."""
         begun: set[str] = set()  # processes
-        with _bar(tasks, len(tasks)) as bar:
+        with _bar(tasks, sum(task.expected_seconds for task in tasks)) as bar:
             for place, task in enumerate(tasks):
                 if self.decide(task):
                     if task.process not in begun:
@@ -133,7 +133,7 @@ class Runner:
                     self._keep(task, executor.alone(task, self._needed(task)))
                 if not any(self._comes(other, task.process) for other in tasks[place + 1 :]):
                     executor.release(task.process)
-                bar.update()
+                bar.update(task.expected_seconds)
 
     def _soon(self, tasks: Sequence[Task], begun: Set[str]) -> list[Task]:
         """Return the next tasks to run whose needs have outcomes, each in another new process."""

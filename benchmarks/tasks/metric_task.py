@@ -39,7 +39,7 @@ class MeasureCell(Task):
 
     kind = "metrics"
     stage = "metrics"
-    unit_seconds = 2.5
+    unit_seconds = 0.012
     cell: Cell
     cells: tuple[Cell, ...]
     gap_samples: int
@@ -47,6 +47,14 @@ class MeasureCell(Task):
     counterpart: Cell | None = None
     training: TrainNetwork | None = None
     outside: tuple[str, ...] = ()
+
+    @staticmethod
+    def shares(begun: int) -> int:
+        """Return the units of a frame, for a cell that begins a batch of so many cells, or 0.
+
+        The first of a batch measures the body, the reference, and how all of them touch the body.
+        """
+        return 7 + 2 * begun // 5 if begun else 1
 
     def clear(self, folder: RunFolder) -> None:
         """Remove the curves of an earlier measurement."""

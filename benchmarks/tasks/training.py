@@ -43,7 +43,7 @@ class TrainNetwork(Task):
     kind = "network"
     silent = True
     stage = "training"
-    unit_seconds = 0.04
+    unit_seconds = 0.03
     training: str
     chosen: Training | None
     home: str = ""

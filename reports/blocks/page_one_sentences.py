@@ -1,4 +1,4 @@
-"""Headline sentences of page one: how near, how it moves, at what cost, how certain, on other bodies."""
+"""Headline sentences of page one: how near, how it moves, at what cost, how certain, and of other suites."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from reports.blocks.suite_sentences import engines, textile_tests
 from reports.run.finished_run import Run
 from reports.statistics import paper_claims
 from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
@@ -42,6 +43,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
         "How near": _near(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
         "At what cost": _cost(run, timed, compared), "How certain": _trust(run, timed),
         "On other bodies": _on_other_bodies(run),
+        "Textile tests": textile_tests(run), "Engines": engines(run),
     }  # fmt: skip
     return [(topic, unbroken(sentence)) for topic, sentence in sentences.items() if sentence]
 

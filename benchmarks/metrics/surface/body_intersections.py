@@ -15,7 +15,7 @@ from benchmarks.metric import Metric
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
 
-SAMPLED_FRAMES = 24  # frames that are looked at, evenly spaced: 50 ms each
+SAMPLED_FRAMES = 24  # frames that are looked at, evenly spaced
 OFFSET = 1e-3  # [m] off the skin, where a point is inside the body only if another part of it is there
 
 METRICS = (
@@ -52,9 +52,7 @@ def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[n
 
     There the winding number of the surface around a point a little off the vertex, along its normal, is one.
     """
-    import igl
-
     from reference_sim.geometry.surface import vertex_normals  # loads numba
+    from reference_sim.geometry.winding_number import winding_numbers
 
-    points = np.asfortranarray(x + OFFSET * vertex_normals(x, faces))
-    return np.asarray(igl.fast_winding_number(np.asfortranarray(x), faces, points)).ravel() > 0.5
+    return winding_numbers(x, faces, x + OFFSET * vertex_normals(x, faces)) > 0
