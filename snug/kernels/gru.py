@@ -6,9 +6,9 @@ For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU
     n = tanh(W_in x + b_in + r q)            h' = (1 - z) n + z h
 
 Three things make it faster than torch.nn.GRU under autograd: products of one sort are taken for all frames
-together, weight gradients above all; what stands between them is one kernel; and matrix products go to oneDNN
-where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The weights stay
-those of the modules.
+together, weight gradients above all; what stands between them is one kernel; and forward products go to
+oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The
+weights stay those of the modules.
 tests/snug/networks/test_regressor.py holds values and gradients to the modules' own.
 """
 
@@ -42,8 +42,11 @@ _LINEAR = (
 
 
 def product(a: Tensor, b: Tensor, bias: Tensor | None = None) -> Tensor:
-    """Return a (n, k) times the transpose of b (m, k), plus bias (m,), (n, m) in float32 on a CPU."""
-    if _LINEAR is not None:
+    """Return a (n, k) times the transpose of b (m, k), plus bias (m,), (n, m) in float32 on a CPU.
+
+    oneDNN first lays out anew a b that is itself a transpose, as in every backward product: those go to MKL.
+    """
+    if _LINEAR is not None and b.is_contiguous():
         return _LINEAR(a, b, bias, "none", [], "")
     return nn.functional.linear(a, b, bias)
 
