@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
 LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as the page
 GRID = "#E3E3E3"
+DOTS = 200  # of a picture in an inch
 _LOOK: dict[Any, Any] = {
     # Each has what those before it lack; the last draws a box that names the script.
     "font.family": ["STIXGeneral", "DejaVu Sans", "Last Resort High-Efficiency"],
@@ -141,7 +142,7 @@ def save(figure: Figure, folder: Path, name: str, *, vector: bool = True) -> Pat
     """Write <name>.png and, if `vector`, <name>.svg; return the path of the latter, or else of the former."""
     path = folder / f"{name}.png"
     with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=200, metadata={"Software": None})
+        figure.savefig(temporary, dpi=DOTS, metadata={"Software": None})
     if vector:
         figure.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
         path = folder / f"{name}.svg"

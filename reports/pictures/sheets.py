@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports.figures.chosen_roll_outs import SceneRollOuts
-from reports.figures.plotting import new_figure, wrapped
+from reports.figures.plotting import DOTS, new_figure, wrapped
 from reports.pictures.colour_scales import Scale, colour_map
 from reports.pictures.render import BODY_COLOUR, CLOTH_COLOUR, LIFT, Surface, camera_for, views
 from reports.run.finished_run import Run
@@ -16,7 +16,6 @@ from reports.run.finished_run import Run
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DOTS = 200  # of a picture in an inch
 FRONT, BACK = -25.0, 155.0  # turns of the camera [degrees]
 BAR, NAME, SIDE = 0.62, 0.24, 0.2  # inches for a scale, a line of text and one at the side
 

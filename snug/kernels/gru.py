@@ -6,9 +6,9 @@ For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU
     n = tanh(W_in x + b_in + r q)            h' = (1 - z) n + z h
 
 Three things make it faster than torch.nn.GRU under autograd: products of one sort are taken for all frames
-together, weight gradients above all; what stands between them is one kernel; and matrix products go to oneDNN
-where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The weights stay
-those of the modules.
+together, weight gradients above all; what stands between them is one kernel; and forward products go to
+oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The
+weights stay those of the modules.
 tests/snug/networks/test_regressor.py holds values and gradients to the modules' own.
 """
 
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from llvmlite.binding import get_host_cpu_name
 from torch import Tensor, nn
 
 from reference_sim.kernels.kernel_cache import njit
@@ -39,11 +40,16 @@ _Q1, _Q2, _Q3, _Q4 = (
 _LINEAR = (
     getattr(torch.ops.mkldnn, "_linear_pointwise", None) if torch.backends.mkldnn.is_available() else None
 )
+_MKL_IS_SLOW = get_host_cpu_name().startswith("znver")  # AMD's, where it makes no use of AVX-512
 
 
 def product(a: Tensor, b: Tensor, bias: Tensor | None = None) -> Tensor:
-    """Return a (n, k) times the transpose of b (m, k), plus bias (m,), (n, m) in float32 on a CPU."""
-    if _LINEAR is not None:
+    """Return a (n, k) times the transpose of b (m, k), plus bias (m,), (n, m) in float32 on a CPU.
+
+    oneDNN first lays out anew a b that is itself a transpose, as in every backward product: where MKL is as
+    fast, those are its.
+    """
+    if _LINEAR is not None and (_MKL_IS_SLOW or b.is_contiguous()):
         return _LINEAR(a, b, bias, "none", [], "")
     return nn.functional.linear(a, b, bias)
 

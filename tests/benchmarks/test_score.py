@@ -56,12 +56,19 @@ def no_processes():
         yield
 
 
+def without_report(patch: pytest.MonkeyPatch) -> None:
+    """Let runs end with their rows: figures, page and PDF are three seconds."""
+    patch.setattr("benchmarks.runner.execute_plan.make_report", lambda log: "")
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A run of the simulation and of Newton cut after one iteration."""
     out = tmp_path_factory.mktemp("made") / "run"
     words = ["--preset", "smoke", "--scenes", "hanging_sheet", "-o", str(out)]
-    assert run.main([*words, "--methods", "simulation,newton-1"]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        without_report(patch)
+        assert run.main([*words, "--methods", "simulation,newton-1"]) == 0
     return RunFolder(out)
 
 
@@ -113,7 +120,8 @@ def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, cap
     assert not (tmp_path / "none").exists()
 
 
-def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_path, capsys):
+def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_path, monkeypatch, capsys):
+    without_report(monkeypatch)
     simulated = str(made.trajectory_path("hanging_sheet", "simulation"))
     cloth = Trajectory.load(simulated)
     positions, faces = thirds(cloth.positions, cloth.faces)
@@ -138,7 +146,8 @@ def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_pat
     assert "energy/total" in numbers(RunFolder(tmp_path / "out"), "reference")
 
 
-def test_without_a_reference_the_reason_is_said(made, tmp_path):
+def test_without_a_reference_the_reason_is_said(made, tmp_path, monkeypatch):
+    without_report(monkeypatch)
     file = str(made.trajectory_path("hanging_sheet", "newton-1"))
     words = ["--scene", "hanging_sheet", "--preset", "smoke", "--no-reference", "-o", str(tmp_path / "out")]
     assert score.main([file, *words, "--name", "mine"]) == 0
@@ -171,7 +180,8 @@ def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_chang
         planned()
 
 
-def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
+def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, monkeypatch, capsys):
+    without_report(monkeypatch)
     scene = small_scene("sheet_on_sphere")
     obstacle = np.repeat(scene.obstacle.positions, scene.frames, axis=0)
     made = find_method("newton-4").make(models=Path(), seed=0)

@@ -48,9 +48,11 @@ METRIC_FAULTS = {
               "pass"),
         Fault("the step before not prepared", STEP, "if frame > 1 and", "if frame < 0 and"),
     ),
-    "benchmarks/metrics/test_metrics": (
+    "benchmarks/metrics/test_curvature": (
         Fault("curvature areas of the wrong surface", CURVATURE, "reference.curvature), reference.area",
               "reference.curvature), series.area"),
+    ),
+    "benchmarks/metrics/test_metrics": (
         Fault("gravity at a fixed height", ENERGY, "scene.origin_heights[frame] - term.origin_height",
               "scene.origin_heights[0] - term.origin_height"),
         Fault("inertia of half the velocity", ENERGY, "velocity=(previous - before) / scene.dt",

@@ -17,8 +17,13 @@ from reports.run.selected_roll_outs import SelectedRollOuts
 from tests.reports.report_folder import declaration, row, run_of, sheet, write_mesh
 
 SCENE = "tshirt/walk"
-DRAWS = subprocess.run([sys.executable, "-c", film.SWATCH], capture_output=True).returncode == 0
-needs_opengl = pytest.mark.skipif(not DRAWS, reason="no OpenGL without a screen on this machine")
+needs_opengl = pytest.mark.usefixtures("opengl")
+
+
+@pytest.fixture(scope="module")
+def opengl():
+    if subprocess.run([sys.executable, "-c", film.SWATCH], capture_output=True).returncode:
+        pytest.skip("no OpenGL without a screen on this machine")
 
 
 @pytest.fixture(scope="module")

@@ -34,10 +34,13 @@ from tests.reports.report_folder import (
     write_model,
 )
 
+OLD = ("hem_tunic-stop.svg", "error_against_time_flag.png", "training_tunic.svg")
+KEPT = ("mine.png", "gap-relative_against_cost-frame.svg")
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> RunFolder:
-    """A whole run folder with its report, drawn without OpenGL."""
+    """A whole run folder with its report, drawn without OpenGL, where figures of an earlier report lay."""
     run = RunFolder(tmp_path_factory.mktemp("run"))
     run.write_rows(all_rows())
     said = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
@@ -51,6 +54,9 @@ def made(tmp_path_factory) -> RunFolder:
             write_mesh(run.trajectory_path(scene, method), cloth, faces, fields)
     write_model(run.models / "snug-seed0.safetensors", "snug", strain=0.1)
     write_model(run.models / "supervised-seed0.safetensors", "supervised", vertices=2.0)
+    run.figures.mkdir()
+    for name in (*OLD, *KEPT):
+        (run.figures / name).write_bytes(b"")
     assert build.main([str(run.path)]) == 0
     return run
 
@@ -103,18 +109,9 @@ def test_made_twice_it_is_the_same_to_the_byte(made):
     assert contents() == before
 
 
-def test_figures_of_an_earlier_report_are_removed_and_others_stay(tmp_path):
-    run = RunFolder(tmp_path)
-    run.write_config(declaration(all_rows()))
-    run.write_rows(all_rows())
-    run.figures.mkdir()
-    old = ("hem_tunic-stop.svg", "error_against_time_flag.png", "training_tunic.svg")
-    kept = ("mine.png", "gap-relative_against_cost-frame.svg")
-    for name in (*old, *kept):
-        (run.figures / name).write_bytes(b"")
-    assert build.main([str(tmp_path)]) == 0
-    left = {path.name for path in run.figures.iterdir()}
-    assert left.isdisjoint(old) and left.issuperset(kept)
+def test_figures_of_an_earlier_report_are_removed_and_others_stay(made):
+    left = {path.name for path in made.figures.iterdir()}
+    assert left.isdisjoint(OLD) and left.issuperset(KEPT)
 
 
 def test_failed_cells_are_listed_once_with_their_reason(made):

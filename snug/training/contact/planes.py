@@ -18,6 +18,7 @@ from torch import Tensor
 
 from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
+from snug.kernels.skinning import FastSkin
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.cache_torch import TensorContactCache
 from snug.training.losses.physics_loss import FrameData, Planes
@@ -26,7 +27,7 @@ from snug.training.training_set import Batch, TrainingSet
 
 # rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
 Posed = tuple[np.ndarray, Any, Any]  # arrays or tensors, as the cache has them
-POSED_TOGETHER = 64  # frames whose bodies are posed by one matrix product
+POSED_TOGETHER = 64  # frames whose bodies are posed by one call
 # Frames before and after a searched one that may take over its anchors; at the start.
 REACH, FIRST_REACH = 3, 7
 # m: how far a mark of the body may have moved from a frame to one that takes over its anchors. At the start a
@@ -83,33 +84,30 @@ class TrainingContact:
         self._before: tuple[FrameData, ...] | None = None
         self._credit = 0.0
 
-    def _skinned(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
-        """Skin patch positions (..., P, 3), or every so many of them, with pose correctives."""
+    def _corrected(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
+        """Return patch positions (..., P, 3), or every so many of them, with pose correctives."""
         rest = rest[..., ::every, :]
-        if self.correctives is not None:
-            parents = self.data.dressed.parents
-            directions = self.correctives[::every].to(rest.device)
-            rest = add_pose_correctives(rest, directions, transforms, parents)
-        return skin(rest, self.weights[::every].to(rest.device), transforms)
+        if self.correctives is None:
+            return rest
+        parents, directions = self.data.dressed.parents, self.correctives[::every].to(rest.device)
+        return add_pose_correctives(rest, directions, transforms, parents)
+
+    def _posed_fast(self, rest: Tensor, transforms: Tensor) -> tuple[np.ndarray, np.ndarray]:
+        """Pose rest (N, 1, P, 3) by transforms (N, T, J, 3, 4); return positions, normals (T N, P, 3)."""
+        points = self._corrected(rest, transforms).expand(*transforms.shape[:2], -1, -1)
+        posed = FastSkin.apply(points, self.weights, transforms)
+        positions = posed.transpose(0, 1).flatten(0, 1).contiguous().numpy()
+        return positions, self.patch.normals(positions)
 
     def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
         """Compute patch positions and normals (F, P, 3) of every frame."""
-        positions = np.empty((self.data.frames, *self.template.shape), np.float32)
+        shape = self.data.frames, *self.template.shape
+        positions, normals = np.empty(shape, np.float32), np.empty(shape, np.int8)
         for rest, frames in self._worn():
-            corners = torch.cat([rest, torch.ones(len(rest), 1)], 1)  # (P, 4)
-            # sum_j w_pj T_j (p, 1) as a matrix product over (j, 4), of many frames at once: several times
-            # faster than blending first, and ten times faster than frame by frame.
-            spread = (self.weights[:, :, None] * corners[:, None]).flatten(1)  # (P, 96)
             for start in range(frames.start, frames.stop, POSED_TOGETHER):
                 some = slice(start, min(start + POSED_TOGETHER, frames.stop))
-                transforms = self.data.transforms[some]  # (C, 24, 3, 4)
-                if self.correctives is not None:
-                    positions[some] = self._skinned(rest, transforms).numpy()
-                    continue
-                columns = transforms.permute(1, 3, 0, 2).reshape(spread.shape[1], -1)  # (96, 3 C)
-                posed = (spread @ columns).view(len(spread), len(transforms), 3)
-                positions[some] = posed.transpose(0, 1).numpy()
-        return positions, self.patch.normals(positions)
+                positions[some], normals[some] = self._posed_fast(rest, self.data.transforms[None, some])
+        return positions, normals
 
     def _worn(self) -> Iterator[tuple[Tensor, slice]]:
         """Yield unposed patches (P, 3) and the frames of each: motion by motion, or one for all frames."""
@@ -125,10 +123,11 @@ class TrainingContact:
     def _marks(self) -> np.ndarray:
         """Some vertices of the patch in every frame, (F, M, 3) [m], by which poses are compared."""
         # On the CPU whatever the device, so that processes that share a run propagate alike.
+        weights = self.weights[::MARKED].cpu()
         return np.concatenate([
-            self._skinned(rest.cpu(), part.cpu(), MARKED).numpy()
+            skin(self._corrected(rest.cpu(), part, MARKED), weights, part).numpy()
             for rest, frames in self._worn()
-            for part in self.data.transforms[frames].split(POSED_TOGETHER)
+            for part in self.data.transforms[frames].cpu().split(POSED_TOGETHER)
         ])  # fmt: skip
 
     def posed(self, batch: Batch) -> Posed:
@@ -137,12 +136,17 @@ class TrainingContact:
             return batch.frames.ravel(), *self._kept
         rest = self.template
         if batch.betas is not None:
-            rest = (rest + torch.einsum("vis,ns->nvi", self.directions, batch.betas))[:, None]
-        positions = self._skinned(rest, batch.transforms).flatten(0, 1)
-        rows = np.arange(len(positions))
-        if isinstance(self.cache, TensorContactCache):
-            return rows, positions, self.cache.normals(positions)
-        return rows, positions.numpy(), self.patch.normals(positions.numpy())
+            moved = torch.tensordot(
+                self.directions, batch.betas, ([2], [1])
+            )  # (P, 3, N), as FastSkin reads it
+            rest = (rest[..., None] + moved).permute(2, 0, 1)[:, None]
+        rows = np.arange(batch.frames.size)
+        if isinstance(self.cache, ContactCache):  # the first frames of all windows, then the second ones
+            by_time = rows.reshape(batch.frames.shape[::-1]).T.ravel()
+            return by_time, *self._posed_fast(rest, batch.transforms)
+        rest = self._corrected(rest, batch.transforms)
+        positions = skin(rest, self.weights, batch.transforms).flatten(0, 1)
+        return rows, positions, self.cache.normals(positions)
 
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
         """Return points and normals (N, T, S, 3) at the cached anchors, or, with kernels, the energy itself.

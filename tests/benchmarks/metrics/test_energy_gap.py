@@ -100,7 +100,7 @@ class DenseStep:
 
         found = minimize(
             value, start[self.free].ravel(), jac=True, method="trust-exact", options={"gtol": 1e-11},
-            hess=lambda y: torch.autograd.functional.hessian(of, torch.tensor(y)).numpy(),
+            hess=lambda y: torch.autograd.functional.hessian(of, torch.tensor(y), vectorize=True).numpy(),
         )  # fmt: skip
         return float(found.fun), spread_out(torch.tensor(found.x)).numpy()
 

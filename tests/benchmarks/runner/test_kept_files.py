@@ -19,7 +19,7 @@ from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Context, Outcome, RunStopped
 from tests.benchmarks.runner.tasks_by_hand import InProcess
-from tests.benchmarks.runner.test_runner import task
+from tests.benchmarks.runner.test_failed_tasks import task
 from tests.benchmarks.tasks.test_cell_tasks import TINY, NoLog, plan_of
 
 QUICK = dataclasses.replace(TINY, least_seconds=0.0)

@@ -10,7 +10,6 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from benchmarks import run
@@ -20,16 +19,14 @@ from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import of_garment
-from benchmarks.tasks.task import Outcome, Task
+from benchmarks.tasks.task import Outcome
 from tests.benchmarks.runner.misbehaving import interrupt_at
-from tests.benchmarks.runner.tasks_by_hand import InProcess
-from tests.benchmarks.tasks.test_cell_tasks import TINY, NoLog, found_of, of_session, outcome_of, plan_of
+from tests.benchmarks.tasks.test_cell_tasks import TINY, found_of, of_session, plan_of
 
 ROOT = Path(__file__).resolve().parents[3]
 WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall"]
@@ -113,234 +110,6 @@ def test_a_fresh_run_goes_on_from_no_training_that_was_stopped(tmp_path):
     assert stopped.is_file()
     RunLog(dataclasses.replace(plan, fresh=True))
     assert not stopped.exists()
-
-
-# --- tasks that fail -------------------------------------------------------------------------------------
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Written(Task):
-    """Writes a file, or dies."""
-
-    kind = "network"
-    stage = "writing"
-    silent = True
-    dies: bool = False
-
-    def run(self, context, needed):
-        if self.dies:
-            os.kill(os.getpid(), signal.SIGKILL)
-        path = context.folder.path / f"{self.name}.txt"
-        path.write_text("".join(outcome.result["word"] for outcome in needed.values()) or "first")
-        context.tell(self.units)
-        return Outcome(result={"word": self.name}, files=(path.name,))
-
-
-def task(name: str, *, dies: bool = False, value: int = 0, **ties) -> Written:
-    return Written(
-        name=name,
-        label=name,
-        inputs={"value": value},
-        modules=("benchmarks.results.run_folder",),
-        dies=dies,
-        **ties,
-    )
-
-
-def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
-    runner = Runner(tasks, Cache(RunFolder(folder), only=only))
-    runner.run(LocalExecutor(RunFolder(folder), None, 1), NoLog())
-    return runner
-
-
-class TwoAtOnce(InProcess):
-    """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
-
-    workers = 2
-
-    def __init__(self, folder: RunFolder) -> None:
-        super().__init__(folder)
-        self.at_work: list[list[str]] = []
-
-    def together(self, ready, bar):
-        begun = []
-        while True:
-            while len(begun) < 2 and (batch := ready()):
-                begun.append(batch)
-            if not begun:
-                return
-            self.at_work.append([task.name for tasks, _ in begun for task in tasks])
-            tasks, needed = begun.pop(0)
-            for task in tasks:
-                yield task, task.run(self.context(), needed)
-
-    def alone(self, task, needed):
-        self.at_work.append([task.name])
-        return super().alone(task, needed)
-
-
-def test_workers_that_would_wait_begin_what_comes_later_and_nothing_is_beside_a_timed_task(tmp_path):
-    def ids(*names: str) -> tuple[tuple[str, str], ...]:
-        return tuple(("network", name) for name in names)
-
-    tasks = (
-        task("short"), task("long", units=5), task("next", needs=ids("short", "long")),
-        task("timed", needs=ids("next"), process="own"),
-        task("after", needs=ids("timed")), task("one", needs=ids("short"), batch="both"),
-        task("two", needs=ids("long"), batch="both"), task("three", needs=ids("next")),
-    )  # fmt: skip
-    folder = RunFolder(tmp_path)
-    runner, executor = Runner(tasks, Cache(folder)), TwoAtOnce(folder)
-    runner.run(executor, NoLog())
-    assert executor.at_work == [
-        ["long", "short"], ["short"], ["next", "one", "two"], ["one", "two"], ["timed"],
-        ["after", "three"], ["three"],
-    ]  # fmt: skip
-    assert all(outcome.status == "ok" for outcome in runner.outcomes.values())
-
-
-def test_the_last_batch_is_shared_by_workers_that_would_wait(tmp_path):
-    tasks = tuple(task(name, batch="all") for name in ("one", "two", "three"))
-    at_work = {}
-    for workers in (1, 2):
-        (tmp_path / str(workers)).mkdir()
-        executor = TwoAtOnce(folder := RunFolder(tmp_path / str(workers)))
-        executor.workers = workers
-        Runner(tasks, Cache(folder)).run(executor, NoLog())
-        at_work[workers] = executor.at_work
-    assert at_work == {1: [["one", "two", "three"]], 2: [["one", "two", "three"], ["three"]]}
-
-
-def test_a_task_whose_process_is_killed_is_kept_as_failed_and_done_again_when_asked(tmp_path):
-    def ended(*dies: bool, **only) -> tuple[list[Outcome], Runner]:
-        tasks = [task(name, dies=d) for name, d in zip(("one", "two", "three"), dies)]
-        runner = run_tasks(tmp_path, *tasks, **only)
-        return list(runner.outcomes.values()), runner
-
-    first, runner = ended(False, True, False)
-    assert [outcome.failed for outcome in first] == [False, True, False]
-    assert first[1].status == "out-of-memory" and "SIGKILL" in first[1].reason
-    found = runner.cache.find(task("two"), {})
-    assert found.state == "failed" and found.why.startswith("out-of-memory") and "SIGKILL" in found.why
-    assert dict(runner.broken()) == {"network two": found.why}
-    again, runner = ended(True, False, True)
-    assert again[1].reason == first[1].reason and dict(runner.broken()) == {"network two": found.why}
-    again, runner = ended(True, False, True, only=("failed",))
-    assert not again[1].failed and dict(runner.broken()) == {}
-
-
-def test_what_needs_a_failed_task_is_blocked_and_done_once_nothing_blocks_it(tmp_path):
-    def both(dies: bool, **only) -> Outcome:
-        needs = task("second", needs=(("network", "first"),))
-        return run_tasks(tmp_path, task("first", dies=dies), needs, **only).outcomes["network", "second"]
-
-    blocked = both(dies=True)
-    assert blocked.failed and blocked.reason.startswith("cannot be run: network first: out-of-memory")
-    assert both(dies=True).reason == blocked.reason
-    assert both(dies=True, only=("failed",)).failed
-    assert both(dies=False, only=("failed",)).status == "ok"
-    assert (tmp_path / "second.txt").read_text() == "first"
-
-
-def test_what_reads_a_failed_task_goes_on_without_it_and_is_another(tmp_path):
-    def both(dies: bool) -> Runner:
-        reads = task("second", reads=(("network", "first"),))
-        return run_tasks(tmp_path, task("first", dies=dies), reads, only=("failed", "stale", "missing"))
-
-    assert not both(dies=True).outcomes["network", "second"].failed
-    assert (tmp_path / "second.txt").read_text() == "first" and both(dies=True).reused == ["network second"]
-    assert both(dies=False).reused == []
-
-
-def test_a_damaged_file_is_made_anew_with_all_that_was_made_from_it(tmp_path):
-    tasks = task("first"), task("second", needs=(("network", "first"),)), task("third")
-    run_tasks(tmp_path, *tasks)
-    assert len(run_tasks(tmp_path, *tasks).reused) == 3
-    (tmp_path / "first.txt").write_text("damaged")
-    cache = Cache(RunFolder(tmp_path))
-    assert cache.find(tasks[0], {}).state == "missing"
-    assert cache.find(tasks[0], {}).why == "first.txt is damaged"
-    runner = run_tasks(tmp_path, *tasks)
-    assert (tmp_path / "first.txt").read_text() == "first" and "network third" in runner.reused
-    (tmp_path / "second.txt").unlink()
-    assert Cache(RunFolder(tmp_path)).find(tasks[1], runner.cached).why == "second.txt is gone"
-    cache.path(tasks[2]).write_text("{")
-    assert cache.find(tasks[2], {}).state == "missing"
-
-
-def test_a_network_that_learned_without_a_failed_simulation_is_another(tmp_path):
-    plan = plan_of(tmp_path, motions=Motions(train=("walk", "run")))
-    schedule = Schedule(plan)
-    lost = schedule.data("run", "tshirt", find_method("simulation")).id
-    assert lost in schedule.network(Network("supervised", 0, "tshirt")).reads
-    assert schedule.network(Network("snug", 0, "tshirt")).reads == ()
-
-
-def test_a_cell_that_was_blocked_is_run_once_nothing_blocks_it(tmp_path):
-    plan = plan_of(tmp_path, "simulation")
-    (cell,) = (t for t in tasks_of(plan) if t.kind == "cell")
-    lame = dataclasses.replace(cell, needs=(("network", "lame"),))
-    runner = run_tasks(tmp_path, task("lame", dies=True), lame)
-    blocked = runner.outcomes["cell", cell.name]
-    assert blocked.status == "failed" and "network lame" in blocked.reason
-    assert outcome_of(dataclasses.replace(plan, only=frozenset({"failed"}))).status == "ok"
-
-
-def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", dies=True)])
-    assert execution.execute(plan_of(tmp_path)) == 1
-    assert "network lame: out-of-memory: the process was killed" in capsys.readouterr().err
-
-
-def test_a_dry_run_decides_as_the_run_does(tmp_path):
-    """A dry run foresees every decision of the run except those that follow from a failure."""
-
-    def planned_and_done(dies: bool, *only: str) -> tuple[set[str], set[str]]:
-        tasks = (
-            task("first", dies=dies), task("second", needs=(("network", "first"),)),
-            task("third", reads=(("network", "first"),)), task("fourth"),
-        )  # fmt: skip
-        preview = Runner(tasks, Cache(RunFolder(tmp_path), only=only)).preview()
-        planned = {task.name for task, _, outcome in preview if outcome is None}
-        runner = run_tasks(tmp_path, *tasks, only=only)
-        blocked = "failed: cannot be run"
-        ran = {name for (_, name), found in runner.cached.items() if not found.why.startswith(blocked)}
-        return planned, ran - {title.removeprefix("network ") for title in runner.reused}
-
-    planned, done = planned_and_done(True, "stale", "missing")
-    assert planned - done == {"second"} and done == {"first", "third", "fourth"}
-    assert planned_and_done(True, "stale", "missing") == (set(), set())
-    (tmp_path / "cache" / "network" / "second.json").unlink()
-    assert planned_and_done(True, "missing") == (set(), set())
-    (tmp_path / "fourth.txt").unlink()
-    assert planned_and_done(False, "failed") == ({"first", "second"}, {"first", "second"})
-    assert planned_and_done(False, "stale", "missing") == ({"third", "fourth"}, {"third", "fourth"})
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Unkept(Task):
-    """Its outcome cannot be written down."""
-
-    kind = "unkept"
-    stage = "writing"
-    outcome: Outcome
-
-    def run(self, context, needed):
-        return self.outcome
-
-
-@pytest.mark.parametrize(
-    ("outcome", "word"),
-    [(Outcome(result={"x": np.float32(1)}), "float32"), (Outcome(files=("nowhere.npy",)), "nowhere.npy")],
-)
-def test_what_cannot_be_kept_has_failed_and_the_others_go_on(outcome, word, tmp_path):
-    bad = Unkept(
-        name="bad", label="bad", inputs={}, modules=("benchmarks.results.run_folder",), outcome=outcome
-    )
-    runner = run_tasks(tmp_path, bad, task("good"))
-    assert runner.outcomes["unkept", "bad"].failed and word in runner.outcomes["unkept", "bad"].reason
-    assert runner.outcomes["network", "good"].status == "ok"
-    assert run_tasks(tmp_path, bad, task("good")).reused == ["unkept bad", "network good"]
 
 
 # --- out of date -----------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -117,26 +118,35 @@ def trajectory_of(scene, positions, status="ok", reason=""):
     )  # fmt: skip
 
 
-def roll_outs(assets, models, name):
+@pytest.fixture(scope="module")
+def positions(assets, models):
+    """Name of a scene -> the scene, and positions (T,V,3) of skinning and of an untrained network."""
+
+    @cache
+    def run(name):
+        scene, found = built(assets, name), {}
+        for method in ("skinning", "snug"):
+            made = find_method(method).make(models=models, seed=0)
+            made.prepare(scene)
+            found[method] = made.run().positions
+        return scene, found
+
+    return run
+
+
+def roll_outs(positions, name):
     """Skinning and an untrained network in the scene, and in the ordinary walk."""
-    scene, plain = built(assets, name), built(assets, ORDINARY)
-
-    def positions(method, where):
-        made = find_method(method).make(models=models, seed=0)
-        made.prepare(where)
-        return made.run().positions
-
+    (scene, here), (_, there) = positions(name), positions(ORDINARY)
     group = SceneRollOuts(scene)
-    for method in ("skinning", "snug"):
-        x, there = positions(method, scene), positions(method, plain)
+    for method, x in here.items():
         entry = find_method(method)
         group.roll_outs.append(RollOut(group, entry, trajectory_of(scene, x), suites=("extremes",)))
-        group.roll_outs[-1].counterpart = there
+        group.roll_outs[-1].counterpart = there[method]
     return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
 
 
-def test_a_glitch_is_forgotten_or_not(assets, models):
-    found = roll_outs(assets, models, "out_of_distribution/root_glitch")
+def test_a_glitch_is_forgotten_or_not(positions):
+    found = roll_outs(positions, "out_of_distribution/root_glitch")
     free, net = (extrapolation.measure(found[name]) for name in ("skinning", "snug"))
     assert set(free) == set(net) <= {metric.name for metric in extrapolation.METRICS}
     assert [free[f"motion/recovery_{after}"] for after in (1, 10, 30)] == [0.0] * 3  # it has no memory
@@ -145,8 +155,8 @@ def test_a_glitch_is_forgotten_or_not(assets, models):
     assert free["motion/strain_ratio"] == pytest.approx(1.0)
 
 
-def test_distance_is_that_from_skinning(assets, models):
-    free = roll_outs(assets, models, "out_of_distribution/walk_x4")["skinning"]
+def test_distance_is_that_from_skinning(positions):
+    free = roll_outs(positions, "out_of_distribution/walk_x4")["skinning"]
     moved = trajectory_of(free.scene, free.positions + np.array([0.001, 0.0, 0.0]))
     other = RollOut(free.group, find_method("simulation"), moved)
     free.group.roll_outs.append(other)
@@ -154,8 +164,8 @@ def test_distance_is_that_from_skinning(assets, models):
     assert found["motion/offset"] == pytest.approx(1.0, abs=1e-3) and "motion/strain_ratio" not in found
 
 
-def test_another_material_judges_the_same_roll_out(assets, models):
-    found = roll_outs(assets, models, "out_of_distribution/membrane_x10")
+def test_another_material_judges_the_same_roll_out(positions):
+    found = roll_outs(positions, "out_of_distribution/membrane_x10")
     free = extrapolation.measure(found["skinning"])
     assert free["motion/strain_ratio"] == pytest.approx(10.0)
     assert free["motion/total"] > free["motion/strain"] / 10
@@ -193,9 +203,9 @@ def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
 @pytest.mark.parametrize("method, far, expected", [
     ("snug", 0.08, "ok"), ("snug", 0.7, "diverged"), ("simulation", 0.7, "ok"), ("snug", np.nan, "diverged"),
 ])  # fmt: skip
-def test_a_network_whose_shirt_is_on_no_body_has_diverged(assets, models, tmp_path, method, far, expected):
+def test_a_network_whose_shirt_is_on_no_body_has_diverged(positions, tmp_path, method, far, expected):
     """A simulated shirt may be where it likes: of a body that jumps by a metre it has to be left behind."""
-    free = roll_outs(assets, models, "out_of_distribution/walk_x4")["skinning"]
+    free = roll_outs(positions, "out_of_distribution/walk_x4")["skinning"]
     x = free.positions.copy()
     x[3, 7, 0] += far
     whole = bool(np.isfinite(far))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import shutil
 import subprocess
@@ -60,20 +61,74 @@ CALL = (
 )
 
 
-def run(code: str, path: Path, **environment: str) -> list[str]:
-    """The lines that a new process prints; no compiled Python is kept, which looks at whole seconds only."""
-    variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | environment
-    variables |= {"PYTHONPATH": os.pathsep.join([str(path), str(ROOT)])}
+# Loading numba takes longer than compiling one of these kernels: a process that has it forks the others.
+FORKING = """
+import json, os, sys, traceback
+import numba
+import reference_sim.kernels.kernel_argument
+for line in sys.stdin:
+    code, path, environment = json.loads(line)
+    read, write = os.pipe()
+    if os.fork() == 0:
+        os.dup2(write, 1)
+        os.dup2(write, 2)
+        os.chdir(path)
+        os.environ.update(environment)
+        sys.path.insert(0, path)
+        numba.config.reload_config()
+        try:
+            exec(code, {})
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)
+        sys.stdout.flush()
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as stream:
+        said = stream.read()
+    print(json.dumps([os.waitstatus_to_exitcode(os.wait()[1]), said]), flush=True)
+"""
+
+
+def start(code: str, path: Path) -> subprocess.Popen[str]:
+    """Start a process in a folder; no compiled Python is kept, which looks at whole seconds only."""
+    variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+    variables |= {"PYTHONPATH": os.pathsep.join(map(str, (path, ROOT)))}
     command = [sys.executable, "-B", "-c", code]
-    done = subprocess.run(command, cwd=path, env=variables, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split("\n")[:-1]
+    return subprocess.Popen(
+        command, env=variables, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=path
+    )
 
 
-def call(path: Path, **environment: str) -> tuple[int, bool, Path]:
+@pytest.fixture(scope="module")
+def forking():
+    with start(FORKING, ROOT) as process:
+        yield process
+        process.stdin.close()
+
+
+@pytest.fixture
+def run(forking):
+    """The lines that a new process prints, of code that begins in a folder."""
+
+    def lines(code: str, path: Path, **environment: str) -> list[str]:
+        print(json.dumps([code, str(path), environment]), file=forking.stdin, flush=True)
+        status, said = json.loads(forking.stdout.readline())
+        assert status == 0, said
+        return said.split("\n")[:-1]
+
+    return lines
+
+
+@pytest.fixture
+def call(run):
     """10 (2 (3 + 1))^2 at first; whether it came from the disk; where it lies there."""
-    value, hits, place = run(CALL, path, **environment)
-    return int(value), hits == "1", Path(place)
+
+    def found(path: Path, **environment: str) -> tuple[int, bool, Path]:
+        value, hits, place = run(CALL, path, **environment)
+        return int(value), hits == "1", Path(place)
+
+    return found
 
 
 @pytest.fixture
@@ -90,21 +145,26 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(source.replace(old, new))
 
 
+def nearest(path: Path) -> str:
+    with start(NEAREST, path) as process:
+        return process.communicate()[0]
+
+
 @pytest.mark.slow
 def test_an_edit_two_files_away_from_the_searching_kernel_is_seen(tmp_path):
     shutil.copytree(
         ROOT / "reference_sim", tmp_path / "reference_sim", ignore=shutil.ignore_patterns("__pycache__")
     )
-    assert run(NEAREST, tmp_path) == ["0.25 0.25 0.0"]
+    assert nearest(tmp_path) == "0.25 0.25 0.0\n"
     edit(
         tmp_path / "reference_sim/geometry/triangle.py",
         "return best_v, best_w, best",
         "return 0.0, 1.0, best",
     )
-    assert run(NEAREST, tmp_path) == ["0.0 1.0 0.0"]
+    assert nearest(tmp_path) == "0.0 1.0 0.0\n"
 
 
-def test_every_edit_that_changes_the_result_is_seen_and_the_kernel_before_it_stays(project):
+def test_every_edit_that_changes_the_result_is_seen_and_the_kernel_before_it_stays(project, call):
     assert call(project)[:2] == (640, False)
     assert call(project)[:2] == (640, True)
     for name, old, new, value in (
@@ -120,34 +180,34 @@ def test_every_edit_that_changes_the_result_is_seen_and_the_kernel_before_it_sta
     assert call(project)[:2] == (67500, True)
 
 
-def test_an_edit_of_a_file_that_the_kernel_does_not_import_costs_nothing(project):
+def test_an_edit_of_a_file_that_the_kernel_does_not_import_costs_nothing(project, call):
     before = call(project)
     edit(project / "bystander.py", "return x", "return 2 * x")
     assert call(project) == (640, True, before[2])
 
 
-def test_an_edit_of_a_kernel_that_is_an_argument_is_seen(project):
+def test_an_edit_of_a_kernel_that_is_an_argument_is_seen(project, run):
     assert run(CALL_GIVEN, project) == ["50.0 0.0", "0"]
     assert run(CALL_GIVEN, project) == ["50.0 0.0", "2"]
     edit(project / "term.py", "data[0] * x", "data[0] + x")
     assert run(CALL_GIVEN, project) == ["25.0 0.0", "1"]
 
 
-def test_a_copy_takes_its_compiled_kernels_along(project):
+def test_a_copy_takes_its_compiled_kernels_along(project, call):
     call(project)
     copy = project / "elsewhere" / "copy"
     shutil.copytree(project, copy)
     assert call(copy) == (640, True, copy / "__pycache__" / call(project)[2].name)
 
 
-def test_the_users_own_cache_folder_is_respected(project):
+def test_the_users_own_cache_folder_is_respected(project, call):
     _, _, place = call(project, NUMBA_CACHE_DIR=str(project / "mine"))
     assert place.is_relative_to(project / "mine") and not (project / "__pycache__").exists()
     edit(project / "deep.py", "x + 1", "x + 2")
     assert call(project, NUMBA_CACHE_DIR=str(project / "mine"))[:2] == (1000, False)
 
 
-def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(project):
+def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(project, call):
     (project / "__pycache__").write_text("a file, so that no folder can be made")
     user = project / "user"
     _, _, place = call(project, XDG_CACHE_HOME=str(user), HOME=str(user), LOCALAPPDATA=str(user))
@@ -155,13 +215,13 @@ def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(projec
     assert call(project, XDG_CACHE_HOME=str(user), HOME=str(user), LOCALAPPDATA=str(user))[1]
 
 
-def test_without_any_folder_kernels_are_compiled_in_the_process(project):
+def test_without_any_folder_kernels_are_compiled_in_the_process(project, run):
     (project / "no").write_text("a file")
     code = "import caller\nprint(caller.outer(3), caller.outer.stats.cache_path)"
     assert run(code, project, NUMBA_CACHE_DIR=str(project / "no")) == ["640 None"]
 
 
-def test_old_folders_go_and_those_of_other_modules_stay(project):
+def test_old_folders_go_and_those_of_other_modules_stay(project, call):
     for k in range(KEPT + 1):
         (project / "constants.py").write_text(f"FACTOR = {k}\n")
         call(project)
@@ -170,7 +230,7 @@ def test_old_folders_go_and_those_of_other_modules_stay(project):
     assert call(project)[1]
 
 
-def test_the_setting_of_numba_is_left_as_it_was(project):
+def test_the_setting_of_numba_is_left_as_it_was(project, run):
     code = "import caller\nfrom numba import config\nprint([config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES])"
     assert run(code, project) == ["['', '']"]
 

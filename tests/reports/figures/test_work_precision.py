@@ -14,7 +14,7 @@ from reports.blocks import page_one_sentences
 from reports.blocks.page_one_sentences import headline
 from reports.figures.break_even import BreakEven
 from reports.figures.error_against_time import ErrorOfPageOne, ErrorsOfScene, ErrorsOfScenes
-from reports.figures.figure import save_drawing
+from reports.figures.figure import Drawing, save_drawing
 from reports.figures.plotting import _columns
 from reports.statistics.break_even import Cost, compared_scenes, cost_of, crossing, rivals
 from reports.statistics.pareto import (
@@ -337,9 +337,14 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
     assert page_one_sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
 
 
-def test_every_figure_of_the_suite_is_drawn(tmp_path):
+@pytest.fixture(scope="module")
+def drawings() -> list[Drawing]:
     run = run_of(all_rows())
-    drawings = [drawing for figure in FIGURES for drawing in figure.drawings(run)]
+    return [drawing for figure in FIGURES for drawing in figure.drawings(run)]
+
+
+def test_every_figure_of_the_suite_is_drawn(drawings, tmp_path):
+    run = run_of(all_rows())
     names = [
         "error_against_time",
         "error_against_time_tshirt-walk",
@@ -354,9 +359,8 @@ def test_every_figure_of_the_suite_is_drawn(tmp_path):
     assert indistinct(run, walk, "gap/energy") == 0.015 and indistinct(run, walk, "curvature/error") == 0.0
 
 
-def test_no_axis_is_labelled_in_markup():
+def test_no_axis_is_labelled_in_markup(drawings):
     """Names may hold dollars, so that no text is taken for a formula: neither are an axis's numbers."""
-    drawings = [drawing for figure in FIGURES for drawing in figure.drawings(run_of(all_rows()))]
     assert len(drawings) == 4
     for canvas in (drawing.canvas for drawing in drawings):
         FigureCanvasAgg(canvas).draw()

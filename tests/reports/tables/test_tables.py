@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
-from reports.blocks import BLOCKS
-from reports.blocks.block import FigureBlock, Report
-from reports.blocks.page_one_sentences import headline
-from reports.blocks.printed_tables import shortened
-from reports.blocks.what_went_wrong import endings, failures
-from reports.document.content import content
-from reports.document.layout import lay_out, lay_out_table
-from reports.figures import FIGURES
-from reports.figures.figure import Picture
-from reports.pictures import PICTURES
+from reports.blocks.what_went_wrong import endings
+from reports.document.layout import lay_out_table
 from reports.run.finished_run import make_run
-from reports.statistics import paper_claims
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.statistics.outcomes import map_points
-from reports.statistics.page_one_methods import leads
 from reports.tables import make_tables, number_texts
 from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.outcomes import merged
-from reports.tables.page_one_table import ROWS
-from reports.tables.table import Column, Table
 from tests.benchmarks.tasks.test_cell_tasks import plan_of
-from tests.reports.report_folder import SCENES, all_rows, report_of, row, run_of, skipped
+from tests.reports.report_folder import SCENES, all_rows, row, run_of, skipped
 
 
 def seeds_of(method, metric, values, **more):
@@ -267,245 +253,3 @@ def test_decimal_points_stand_in_a_column():
     padded = number_texts.aligned(["0.123", "18.2", "400", "–"])
     assert len({len(text) - text.index(".") for text in padded[:2]}) == 1
     assert len(padded[2]) - 3 == len(padded[0]) - 1 and padded[3] == "–"
-
-
-# --- the page -----------------------------------------------------------------------------------------------
-
-
-def near(rows) -> str:
-    return dict(headline(run_of(rows)))["How near"].replace("\u00a0", " ")
-
-
-# Skinning has 10 J more than the simulation in either scene.
-BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.5, 17.0)]
-
-
-def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_network_has():
-    rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE  # 5 and 20 %
-    typical = np.sinh(np.arcsinh([5.0, 20.0]).mean())
-    said = near(rows)
-    assert said.startswith(
-        f"On 2 unseen motions SNUG has a relative excess of {number_texts.number(typical, 2)} % ("
-    )
-    assert (
-        "where the energy of the reference simulation is 0 % and that of skinning alone 100 %. Whether"
-        in said
-    )
-    assert said.endswith("the arithmetic mean of SNUG is 12 %, and its worst motion, jump, has 20 %.")
-    rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
-    assert "PBNS has 15 %. Which of SNUG and PBNS has less is inconclusive. These" in near(rows)
-    # A member of the reference's ensemble is no rival, however near it is.
-    assert near(rows + on_two_scenes("simulation-perturbed-1e-4", 0.5, 7.0)) == near(rows)
-
-
-def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
-    rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
-    assert "What does not hold" not in dict(headline(run_of(rows))).get("How certain", "")
-    monkeypatch.setattr(paper_claims, "verdict", lambda claim, far, p: paper_claims.FAILS)
-    said = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
-    assert "Of the paper's 1 primary claim 1 does not hold. What does not hold: Figure 7: close to" in said
-    assert said.endswith("(relative excess: SNUG ≤ Simulation).")
-
-
-def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
-    rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
-    more = [row("skirt/walk", name, "energy/total", 3.0) for name in ("snug", "simulation")]
-    assert near(rows + more) == near(rows)
-
-    def said(*trained):
-        scenes = {name: {"role": "training" if name in trained else "test"} for name in SCENES}
-        return dict(headline(run_of(rows, scenes=scenes)))["How near"].replace("\u00a0", " ")
-
-    assert said(SCENES[1]).startswith("On 1 unseen motion SNUG has a relative excess of 5.0 %,")
-    assert said(*SCENES).startswith("On 2 motions SNUG has")
-    checked = dict(headline(run_of(rows, split="validation")))["How near"].replace("\u00a0", " ")
-    assert checked.startswith("On 2 validation motions SNUG has")
-
-
-def test_run_times_are_of_the_scenes_that_both_have():
-    times = [(SCENES[0], "snug", 9.0), (SCENES[1], "snug", 0.25), (SCENES[1], "simulation", 100.0)]
-    run = run_of([row(s, m, "cost/frame", t, unit="ms") for s, m, t in times])
-    assert (
-        dict(headline(run))["At what cost"]
-        .replace("\u00a0", " ")
-        .startswith("SNUG takes 0.250 ms a frame on one core, the simulation 400 times as long")
-    )
-
-
-def test_page_one_counts_every_kind_of_ending():
-    rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
-    rows.append(
-        row("tshirt/jump", "pbns", "energy/strain", None, status="timeout", reason="over 600 s", seed=1)
-    )
-    said = endings(run_of(rows))
-    assert (
-        "cells 2 failed, 1 timeout, 1 stalled, 1 skipped; of 3 checks 1 failed; of 2 stress tests 1 timeout"
-        in said
-    )
-    assert endings(run_of(rows[:3])) == "Of 1 cells all ended well."
-    table = make_tables(run_of(rows))["endings"]
-    lines = {line[0]: dict(zip([c.name for c in table.columns], line)) for line in table.rows}
-    assert lines["checks"]["failed"] == 1 and lines["checks"]["all"] == 3 and lines["cells"]["timeout"] == 1
-    # A metric that is not finite, or off its tolerance, fails no cell that has others.
-    rows[:3] = [
-        *rows[:3],
-        row("tshirt/walk", "pbns", "gap/energy", None, status="failed", reason="no number"),
-    ]
-    assert "cells 2 failed, 1 timeout, 1 stalled, 1 skipped;" in endings(run_of(rows))
-
-
-@pytest.mark.parametrize(
-    ("workers", "said"),
-    [(None, ""), (1, "one after another, "), (4, "up to 4 side by side, ")],
-)
-def test_times_say_what_ran_beside(workers, said):
-    assert content(report_of(all_rows()[-5:], workers=workers))["workers"] == f"{said}one thread each."
-
-
-def test_sections_exist_only_for_what_ran():
-    check = row("falls", "simulation", "check", 0.5, suite="validation", expected=0.0, tolerance=1.0)
-    failed = dataclasses.replace(check, scene="sag", status="failed", reason="off")
-    report = report_of([check, failed])
-    made = content(report)
-    endings_title = "How cells, checks and stress tests ended"
-    assert [section["title"] for section in made["sections"]] == ["Validation", endings_title]
-    (worst,) = made["first"]
-    assert made["definitions"] == [] and worst["small"] and worst["pairs"][0][0] == "What went worst"
-    assert set(report.tables) == {"validation", "metrics", "endings"}
-    (block,) = made["sections"][0]["blocks"]
-    assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
-
-
-def test_every_metric_of_a_printed_table_is_defined_as_it_defines_itself():
-    definitions = dict(content(report_of(all_rows()))["definitions"])
-    assert (
-        definitions["Strain [J]"] == "definition of energy/strain" and "Curvature error [1/m]" in definitions
-    )
-
-
-def test_the_report_lists_the_stress_tests_that_did_not_converge_and_the_table_all():
-    report = report_of(all_rows())
-    assert [line[:3] for line in report.tables["extremes"].rows] == [
-        ("stiff", "simulation", "converged"), ("teleport", "simulation", "timeout"),
-    ]  # fmt: skip
-    sections = {s["title"]: s["blocks"] for s in content(report)["sections"]}
-    (block,) = sections["Stress"]
-    assert [[cell["text"] for cell in line[:3]] for line in block["groups"][0]["rows"]] == [
-        ["teleport", "Simulation", "timeout"]
-    ]
-    assert endings(report.run).endswith("of 2 stress tests 1 timeout.")
-
-
-def test_page_one_names_the_worst_of_each_kind():
-    stretched = [row("tshirt/kick", m, "energy/strain", v) for m, v in (("simulation", 0.1), ("snug", 0.9))]
-    found = failures(run_of([*all_rows(), *stretched]))
-    assert ("Supervised, tshirt/walk", "failed: diverged at step 7") in found
-    assert any(name == "Simulation, teleport" for name, _ in found)
-    assert ("SNUG, tshirt/kick", "mean strain 0.900 J, 9.00 times the simulation's") in found
-    assert not any("Skinning" in name for name, _ in found)  # no network: nobody expects better of it
-    assert failures(run_of([row(method="simulation"), row()])) == []  # as much strain is no failure
-
-
-def test_page_one_shows_the_network_the_best_of_others_and_a_baseline():
-    run = run_of(all_rows())
-    assert leads(run, run.garment_rows) == ["simulation", "snug", "pbns", "skinning"]
-    better = run_of(
-        [*all_rows(), *(row(s, "supervised", "curvature/error", 0.1, unit="1/m") for s in SCENES)]
-    )
-    assert leads(better, better.garment_rows)[2] == "supervised"
-    assert leads(run, run.garment_rows, ["pbns", "simulation"]) == ["simulation", "pbns"]
-
-
-def test_roll_outs_of_the_user_are_on_page_one_beside_snug_or_alone():
-    def mine(inside: float = 2.5):
-        rows = on_two_scenes("mine", 3.0, 9.0) + [
-            row(s, "mine", m, v, unit=u)
-            for s in SCENES
-            for m, v, u in (("penetration/surface", inside, "%"), ("dynamics/amplitude", 0.5, "1"))
-        ]
-        return [dataclasses.replace(r, role="external", seeded=False, pairing_group="") for r in rows]
-
-    reference = on_two_scenes("simulation", 0.5, 7.0) + on_two_scenes("skinning", 10.5, 17.0)
-    alone, beside = run_of([*reference, *mine()]), run_of([*all_rows(), *mine()])
-    assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
-    assert leads(beside, beside.garment_rows)[:3] == ["simulation", "snug", "mine"]
-    said = {topic: text.replace("\u00a0", " ") for topic, text in headline(alone)}
-    assert "mine has a relative excess of" in said["How near"]
-    assert said["How it moves"].startswith(
-        "Mine has less secondary motion: its hem amplitude is 50 % of the simulation's. 2.5 % "
-    )
-    assert "mine" in {line[0] for line in make_tables(alone)["overview"].rows}
-
-
-def test_a_roll_out_in_scenes_without_skinning_has_its_distance_on_page_one():
-    numbers = (("distance/rms", 12.0, "mm"), ("gap/energy", 0.25, "J"))
-    mine = [
-        dataclasses.replace(row(s, "mine", m, v, unit=u), role="external", seeded=False, pairing_group="")
-        for s in ("free_fall", "flag")
-        for m, v, u in numbers
-    ]
-    run = run_of([*(row(s, "simulation", "energy/total", 0.5) for s in ("free_fall", "flag")), *mine])
-    said = dict(headline(run))["How near"].replace("\u00a0", " ")
-    assert said == "mine lies 12.0 mm from the reference, with an energy gap of 0.250 J."
-
-
-def test_changed_networks_are_networks_where_a_run_has_no_others():
-    rows = on_two_scenes("snug-springs", 1.0, 9.0) + on_two_scenes("simulation", 0.5, 7.0)
-    changed = [dataclasses.replace(r, role="ablation", base="snug") for r in rows[:2]] + rows[2:]
-    run = run_of(changed)
-    assert leads(run, run.garment_rows) == ["simulation", "snug-springs"]
-    assert "SNUG, springs has" in near(changed + on_two_scenes("skinning", 10.5, 17.0))
-    both = run_of(changed + on_two_scenes("snug", 1.0, 9.0))
-    assert leads(both, both.garment_rows) == ["simulation", "snug"]
-
-
-def test_the_table_of_page_one_stays_short():
-    many = [row(scene, f"mine-{k}", "energy/total", 1.0 + k) for k in range(20) for scene in SCENES]
-    made = make_tables(run_of([*all_rows(), *many]))["overview"]
-    methods = [line[0] for line in made.rows]
-    assert len(methods) <= ROWS and {"simulation", "snug", "skinning"} < set(methods)
-    energies = make_tables(run_of([*all_rows(), *many]))["energies"]
-    short = shortened(energies, 12)
-    assert len(short.rows) == 12 and short.note.startswith("12 more rows are in tables/energies.csv")
-
-
-def test_a_shortened_table_has_rows_of_each_garment():
-    columns = (Column("garment", "Garment", text=True), Column("method", "Method", text=True))
-    lines = tuple((garment, f"{garment}-{k}") for garment in ("shirt", "tunic") for k in range(8))
-    short = shortened(Table("energies", columns, lines, grouped_by=("garment",)), 12)
-    assert short.rows == (*lines[:6], *lines[8:14])
-
-
-def test_a_figure_alone_in_its_row_keeps_its_width():
-    run, picture = run_of(all_rows()), Picture(Path("half.svg"), "said", 0.5)
-    block = FigureBlock("break_even", "against_vertices")
-    assert lay_out(Report(run, {}, {"break_even": [picture]}), block) == [
-        {"kind": "figure", "path": "figures/half.svg", "caption": "said", "width": 0.5}
-    ]
-    both = {"break_even": [picture], "against_vertices": [picture]}
-    assert [values["kind"] for values in lay_out(Report(run, {}, both), block)] == ["row"]
-
-
-def test_every_block_names_a_figure_or_table_that_is_declared():
-    figures = {figure.name for figure in (*FIGURES, *PICTURES)}
-    named = {
-        name for block in BLOCKS if isinstance(block, FigureBlock) for name in (block.name, block.beside)
-    }
-    assert named - {""} == figures
-
-
-def test_no_number_of_the_report_is_infinite_or_nan():
-    made = json.dumps(content(report_of(all_rows())), allow_nan=False)
-    assert not re.search(r"\b(nan|inf|NaN|None)\b", made)
-
-
-def test_the_page_says_how_many_seeds_there_were():
-    rows = seeds_of("snug", "energy/strain", (1.0, 1.1, 1.2)) + seeds_of("pbns", "energy/strain", (2.0, 2.1))
-    sections = content(report_of(rows + seeds_of("simulation", "energy/strain", (1.0,))))["sections"]
-    block = sections[0]["blocks"][0]
-    assert "±: standard deviation over 2 or 3 seeds. Without it: one seed" in block["note"]
-
-
-def test_methods_that_share_a_number_only_with_other_rows_are_their_own_family():
-    rows = [dataclasses.replace(row(), family="")]
-    assert run_of(rows).methods["snug"].family == "snug"

@@ -74,6 +74,7 @@ def test_batches_broadcast_and_gradients_flow():
 def test_closed_form_is_skinning_and_its_derivative(windows):
     points, transforms, above = (random_tensor(windows, 3, *s).float() for s in ((50, 3), (4, 3, 4), (50, 3)))
     weights = torch.softmax(random_tensor(50, 4), -1).float()
+    weights[::2, 1:3] = 0.0  # most joints do not move a vertex
     fast, slow = points.clone().requires_grad_(), points.double().requires_grad_()
     posed = FastSkin.apply(fast, weights, transforms)
     exact = skin(slow, weights.double(), transforms.double())

@@ -29,6 +29,7 @@ from snug.training.validation import Validation
 from tests.snug.training.dressing import swaying, tube_dress
 
 PLAIN = replace(DEFAULT, mixed=0.0)
+STEPS = 12
 # 28 windows and 16 in a batch: every stop is within an epoch.
 CLIPS = [swaying(30)]
 
@@ -39,7 +40,7 @@ def shaken(motion):
     return tube_dress().skinned(motion) + noise
 
 
-def short(kind="snug", *, steps=24, seed=0, recipe=PLAIN, clips=CLIPS, **options):
+def short(kind="snug", *, steps=STEPS, seed=0, recipe=PLAIN, clips=CLIPS, **options):
     options = {"progress": False, "every": 5, **options}
     if kind not in ("snug", "pbns") and "trajectories" not in options:
         options["trajectories"] = {clip.name: shaken(clip) for clip in clips}
@@ -79,25 +80,25 @@ def asked_after(steps):
 def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path):
     whole = short(kind, recipe=recipe)
     path = tmp_path / "run.safetensors"
-    for number, steps in enumerate((3, 13)):  # twice, the second time on a resumed run
+    for number, steps in enumerate((3, 5)):  # twice, the second time on a resumed run
         checkpoint = Checkpoint(path=path, resume=number > 0)
-        with pytest.raises(Interrupted, match=f"after step {(3, 16)[number]} of 24"):
+        with pytest.raises(Interrupted, match=f"after step {(3, 8)[number]} of {STEPS}"):
             short(kind, recipe=recipe, checkpoint=checkpoint, stop=asked_after(steps))
     checkpoint = Checkpoint(path=path, resume=True)
     resumed = short(kind, recipe=recipe, checkpoint=checkpoint)
     same_model(whole, resumed)
-    assert resumed.history[-1]["step"] == 24 and list(tmp_path.iterdir()) == [path]
+    assert resumed.history[-1]["step"] == STEPS and list(tmp_path.iterdir()) == [path]
     checkpoint.delete()
     assert not list(tmp_path.iterdir())
 
 
 def test_validation_resumes_bit_for_bit(tmp_path):
     validation = Validation(motions=[swaying(20, name="other", degrees=30.0)], every=4, patience=5)
-    whole = short(validation=validation)
+    whole = short(steps=24, validation=validation)
     checkpoint = Checkpoint(path=tmp_path / "run.safetensors", resume=True)
     with pytest.raises(Interrupted):
-        short(validation=validation, checkpoint=checkpoint, stop=asked_after(14))
-    same_model(whole, short(validation=validation, checkpoint=checkpoint))
+        short(steps=24, validation=validation, checkpoint=checkpoint, stop=asked_after(14))
+    same_model(whole, short(steps=24, validation=validation, checkpoint=checkpoint))
     assert whole.summary["validation"]["motions"] == ["other"]
 
 
@@ -228,7 +229,7 @@ def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):
             "snug",
             other,
             CLIPS,
-            steps=24,
+            steps=STEPS,
             seed=0,
             recipe=PLAIN,
             every=5,
@@ -240,7 +241,7 @@ def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):
             "snug",
             stiff,
             CLIPS,
-            steps=24,
+            steps=STEPS,
             seed=0,
             recipe=PLAIN,
             every=5,
@@ -253,7 +254,7 @@ def no_space(*_):
     raise OSError("no space left")
 
 
-def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
+def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatch, capsys):
     from snug import train as module
 
     out = tmp_path / "small.safetensors"
@@ -301,7 +302,9 @@ def test_command_resumes_what_it_interrupted(tmp_path, monkeypatch, capsys):
     assert out.read_bytes() == before
 
 
-def test_garments_are_trained_one_after_another_and_those_that_ended_stay(tmp_path, monkeypatch, capsys):
+def test_garments_are_trained_one_after_another_and_those_that_ended_stay(
+    tailored_once, tmp_path, monkeypatch, capsys
+):
     from snug import train as module
 
     monkeypatch.setattr(choices, "choose_motions", lambda options, data: ([swaying(20)], []))

@@ -33,14 +33,14 @@ def short(kind="snug", *, steps=60, seed=0, recipe=PLAIN, motions=None, **option
 
 @pytest.fixture(scope="module")
 def trained():
-    return short(steps=150)
+    return short(steps=100)
 
 
 def test_training_lowers_the_potential(trained):
     first, last = trained.history[0], trained.history[-1]
     assert last["loss"] < 0.9 * first["loss"] and last["strain"] < first["strain"]
     parts = sum(last[term] for term in DEFAULT.terms)
-    assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 150
+    assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 100
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_model_survives_its_file(trained, tmp_path):
     path = trained.save(tmp_path / "deep" / "model.safetensors")
     loaded = TrainedModel.load(path)
     assert [p.name for p in path.parent.iterdir()] == ["model.safetensors"]
-    assert (loaded.kind, loaded.recipe, loaded.steps) == ("snug", trained.recipe, 150)
+    assert (loaded.kind, loaded.recipe, loaded.steps) == ("snug", trained.recipe, 100)
     assert loaded.history == trained.history and loaded.megabytes == trained.megabytes
     assert read_tensors(path)[1]["unit"] == "J"  # of the losses, for whoever draws them
     motion = swaying(12)
@@ -138,7 +138,7 @@ def test_supervised_learns_what_it_is_shown():
     dressed, motion = tube_dress(), swaying(30)
     target = dressed.skinned(motion, smoothing=20)
     target[:, :, 1] -= 0.02
-    model = short("supervised", steps=150, recipe=SUPERVISED, motions=[motion], trajectories={"sway": target})
+    model = short("supervised", steps=100, recipe=SUPERVISED, motions=[motion], trajectories={"sway": target})
     assert model.recipe.window == 16 and model.recipe.mixed == 0
     start = vertex_loss(torch.as_tensor(target - [0, -0.02, 0]), torch.as_tensor(target)).mean()
     assert start == pytest.approx(4.0, rel=1e-3)  # 2 cm, squared

@@ -1,0 +1,134 @@
+"""Curvature and its errors: spheres, tori, cylinders, noise, and wrinkles that move."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from benchmarks.meshes import cylinder_patch, icosphere, right_grid, torus
+from benchmarks.metrics.surface.curvature import (
+    CurvatureSeries,
+    boundary_mask,
+    curvature_change,
+    curvature_error,
+    curvature_series,
+    mean_curvature,
+)
+
+
+def test_curvature_of_a_sphere_holds_at_its_five_valent_vertices_too():
+    x, faces = icosphere(3, 0.25)
+    assert not boundary_mask(faces, len(x)).any()
+    curvature, area = mean_curvature(x, faces)
+    assert area.sum() == pytest.approx(4 * np.pi * 0.25**2, rel=0.02)
+    assert np.abs(curvature * 0.25 - 1.0).max() < 1e-4
+
+
+def test_curvature_of_random_points_on_a_sphere_is_right_and_of_irregular_slivers_too_large():
+    """Mean curvature on a sphere and on slivers has the errors that the documents state."""
+    random = np.random.default_rng(0)
+    x = random.normal(size=(500, 3))
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    curvature, areas = mean_curvature(x, ConvexHull(x).simplices.astype(np.int64))
+    assert np.average(curvature, weights=areas) == pytest.approx(1.002, abs=5e-4)
+    _, faces = right_grid(20, 20, 1.0, 1.0)
+    place = np.stack(np.unravel_index(np.arange(21 * 21), (21, 21)), axis=1)
+    across, along = ((place + random.uniform(-0.3, 0.3, place.shape)) * (0.03, 0.003)).T
+    x = np.stack([np.cos(along) * np.cos(across), np.cos(along) * np.sin(across), np.sin(along)], axis=1)
+    inside = ((place > 0) & (place < 20)).all(axis=1)
+    curvature, areas = mean_curvature(x, faces)
+    assert 2.5 < np.average(curvature[inside], weights=areas[inside]) < 3.5
+
+
+def test_curvature_of_a_torus_converges_at_second_order():
+    errors = []
+    for cells in (16, 32, 64):
+        x, faces, exact = torus(cells, 0.3, 0.1)
+        errors.append(np.abs(mean_curvature(x, faces)[0] - exact).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders.min() > 1.9 and errors[-1] < 0.02
+
+
+def test_curvature_of_a_cylinder():
+    x, faces = cylinder_patch(40, 0.1)
+    curvature, _ = mean_curvature(x, faces)
+    inside = ~boundary_mask(faces, len(x))
+    assert np.abs(curvature[inside] - 5.0).max() < 2e-3  # 1/(2 R)
+
+
+def test_curvature_of_a_plane_is_zero_and_noise_gives_the_published_floor():
+    random = np.random.default_rng(3)
+    cells, h = 40, 0.015
+    i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+    flat = np.stack([h * i, 0.0 * i, h * j], -1).reshape(-1, 3)
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
+    inside = ~boundary_mask(faces, len(flat))
+    assert mean_curvature(flat, faces)[0][inside].max() < 1e-10
+    noisy = flat + random.normal(0, 0.5e-3, flat.shape)
+    series = curvature_series(noisy[None], faces)
+    assert 3.0 < series.means()[0] < 5.0  # 3.8 on an even mesh; right triangles lie near it
+
+
+def test_area_is_shared_out_whole_also_by_obtuse_triangles():
+    x = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.2, 0], [0.5, 1, 0.3]], float)
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 0, 2]])
+    corners = x[faces]
+    exact = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    assert mean_curvature(x, faces)[1].sum() == pytest.approx(exact.sum(), rel=1e-12)
+
+
+def test_curvature_is_blind_to_rigid_motion_and_scales_as_one_over_length():
+    x, faces = cylinder_patch(12, 0.3)
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    inside = ~boundary_mask(faces, len(x))
+    first = mean_curvature(x, faces)[0][inside]
+    assert mean_curvature(x @ turn.T + 5.0, faces)[0][inside] == pytest.approx(first, rel=1e-9)
+    assert mean_curvature(2 * x, faces)[0][inside] == pytest.approx(first / 2, rel=1e-12)
+
+
+def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_not():
+    cells = 30
+    i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
+
+    def waves(phase: float) -> np.ndarray:
+        return np.stack([0.01 * i, 0.004 * np.sin(0.8 * i + phase), 0.01 * j], -1).reshape(1, -1, 3)
+
+    still, moved = curvature_series(waves(0.0), faces), curvature_series(waves(2.0), faces)
+    assert curvature_error(still, still)[0] == 0.0
+    difference = abs(moved.means() - still.means())[0]
+    assert curvature_error(moved, still)[0] > 5.0 * difference
+    flat = curvature_series(waves(0.0) * [1, 0, 1], faces)
+    assert curvature_error(flat, still)[0] == pytest.approx(still.means()[0], rel=1e-9)
+
+
+def test_wrinkles_that_stay_have_no_change_and_those_that_travel_have_nearly_all_of_it():
+    cells, frames = 40, 20
+    i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
+    faces = right_grid(cells, cells, 1.0, 1.0)[1]
+
+    def waves(phases: np.ndarray, depth: float) -> np.ndarray:
+        height = depth * np.sin(0.2 * np.pi * i + phases[:, None, None])
+        frames = np.broadcast_arrays(0.01 * i, height, 0.01 * j)
+        return np.stack(frames, -1).reshape(len(phases), -1, 3)
+
+    def change(positions: np.ndarray) -> float:
+        return curvature_change(curvature_series(positions, faces))
+
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    fixed = waves(np.zeros(frames), 0.004)
+    fixed[1::2] = fixed[1::2] @ turn.T + 3.0
+    assert change(fixed) < 1e-9
+    phases = 2.0 * np.pi * np.arange(frames) / frames
+    travelling = change(waves(phases, 0.004))
+    assert 0.9 < travelling <= 1.0 + 1e-9
+    assert change(waves(phases, 0.002)) == pytest.approx(travelling, abs=0.02)  # how deep is not asked
+    assert change(waves(phases, 0.0)) is None  # flat
+
+
+def test_change_of_wrinkles_is_the_part_of_all_deviations_that_is_in_time():
+    # Two vertices keep 1 and 3, two of twice their area swap: of 1 + 1 + 2 + 2 about the mean of 2 the last.
+    h = np.array([[1.0, 3.0, 1.0, 3.0], [1.0, 3.0, 3.0, 1.0]])
+    area = np.array([1.0, 1.0, 2.0, 2.0]) * [[0.5], [1.5]]
+    assert curvature_change(CurvatureSeries(h, area)) == pytest.approx(4.0 / 6.0)

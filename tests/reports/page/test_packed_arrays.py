@@ -1,0 +1,69 @@
+"""Arrays in the page: packed into few bytes, and the values that are computed for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics.surface import curvature
+from reports.page.packed_arrays import Pack
+from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
+from tests.reports.page.test_page import block, unpacked
+from tests.reports.report_folder import sheet
+
+
+@pytest.mark.parametrize(
+    ("frames", "far", "least"), [(1, 30.0, 0.0), (3, 30.0, 0.0), (40, 30.0, 0.0), (9, 0.5, 1e-4)]
+)
+def test_positions_are_off_by_half_a_step_at_most(frames, far, least):
+    random = np.random.default_rng(1)
+    positions = 0.01 * far * random.normal(size=(frames, 50, 3)).cumsum(axis=0)
+    positions[-1, 0], positions[0, 1] = far, -far  # as far apart as can be, from one frame to the next
+    pack = Pack()
+    pack.positions("x", positions)
+    step = pack.entries["x"]["step"]
+    assert step == pytest.approx(max(2.0 * far / 65535, least))
+    error = np.abs(unpacked(pack.entries, pack.text())["x"] - positions)
+    assert error.max() <= 0.5 * step * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_values_are_off_by_less_than_a_hundredth_and_finer_where_small(signed):
+    random = np.random.default_rng(2)
+    values = random.exponential(size=(20, 60)) * (random.choice([-1, 1], size=(20, 60)) if signed else 1)
+    values[3, 4] = np.nan
+    pack = Pack()
+    pack.values("v", values, signed=signed)
+    found, values[3, 4] = unpacked(pack.entries, pack.text())["v"], 0.0
+    full = np.abs(values).max()
+    assert np.abs(found - values).max() <= full / 100
+    small = np.abs(values) < 0.01 * full
+    assert np.abs(found - values)[small].max() <= full / 1000
+
+
+def test_curvature_is_that_of_a_sphere_and_of_the_metric():
+    around, down = np.meshgrid(np.arange(40) * np.pi / 20, np.linspace(0.3, np.pi - 0.3, 40))
+    ring = [np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)]
+    globe = 0.5 * np.stack(ring, axis=-1).reshape(1, -1, 3)
+    line, column = np.meshgrid(np.arange(39), np.arange(40), indexing="ij")
+    a, b = (40 * line + column).ravel(), (40 * line + (column + 1) % 40).ravel()
+    faces = np.concatenate([np.stack([a, b, a + 40], axis=1), np.stack([b, b + 40, a + 40], axis=1)])
+    found = mean_curvature(globe, faces)[0]
+    inner = found > 0.0
+    assert inner.sum() == 38 * 40
+    assert np.abs(found[inner] - 2.0).max() < 0.05
+    crumpled = globe + np.random.default_rng(3).normal(scale=0.02, size=(2, *globe.shape[1:]))
+    declared = np.stack([curvature.mean_curvature(x, faces)[0] for x in crumpled])
+    np.testing.assert_allclose(mean_curvature(crumpled, faces)[:, inner], declared[:, inner], rtol=1e-9)
+
+
+def test_change_of_area_distance_and_depth_have_their_known_values():
+    x, faces = sheet(0.0)
+    rest = np.full(len(faces), 0.4 / 3 * 0.5 / 3 / 2)
+    np.testing.assert_allclose(area_change(1.1 * x, faces, rest), 21.0, rtol=1e-9)
+    np.testing.assert_allclose(distance(x[:2] + np.array([0.0, 0.003, 0.004]), x), 5.0, rtol=1e-9)
+    corners, box = block()
+    points = np.array([[0.5, 0.5, 0.98], [0.5, 0.5, 1.02], [0.01, 0.3, 0.4]])
+    skin = skin_of(np.stack([corners + 1.0, corners]), box)
+    np.testing.assert_allclose(depth(points, skin, 1), [20.0, 0.0, 10.0], atol=1e-9)
+    assert skin_of(corners, box[1:]) is None
