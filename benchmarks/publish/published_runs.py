@@ -79,6 +79,13 @@ RUNS = {
             "nearest-poses,pose-regression,ncs,ncs-static"
         },
     ),
+    "self_contact": PublishedRun(
+        "the same networks beside a reference whose cloth does not cross itself; one seed",
+        {
+            "": f"--suite garments --self-contact --trained --scenes 'tshirt/*' --methods {REFERENCES},snug,"
+            "pbns,supervised,fast-lbfgs-10"
+        },
+    ),
     "equal_data": PublishedRun(
         "networks with the same frames and numbers of steps",
         _validation("snug-data-[01]*,pbns-data-[01]*,supervised-data-[01]*,tailornet-data-[01]*,*-data-3,"
