@@ -156,7 +156,8 @@ class BuiltScene:
         kept: frames of the motion that a trajectory holds, or None for all.
         repeated: two sets of frames of the trajectory that show the same motion.
         specimen: of a textile test, which measures itself, or None.
-        self_contact: whether the cloth of simulations does not cross itself; no metric knows that term.
+        minimised: terms of simulations in place of `energies`, with self-contact, which no metric knows; none
+            where the cloth may cross itself.
         settle_uncrossed: like `settle`, with self-contact; None where a start is not simulated.
 
     Raises:
@@ -180,7 +181,7 @@ class BuiltScene:
     kept: np.ndarray | None = None
     repeated: tuple[np.ndarray, np.ndarray] | None = None
     specimen: Specimen | None = None
-    self_contact: bool = False
+    minimised: tuple[Energy, ...] = ()
     settle_uncrossed: Callable[[], np.ndarray] | None = None
 
     def __post_init__(self) -> None:

@@ -274,7 +274,7 @@ class Schedule:
             gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
             counterpart=counterpart, training=training, outside=plan.metrics,
             needs=(cell.task_id,), reads=reads, batch=scene.name,
-            units=self._frames(scene.motion) * MeasureCell.shares(len(cells) if cell == cells[0] else 0),
+            units=self._frames(scene.motion) * MeasureCell.shares(len(cells) if cells[:1] == (cell,) else 0),
             **of_scene | {"inputs": of_scene["inputs"] | inputs},
         )  # fmt: skip
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from benchmarks.assets.assets import Assets
 from benchmarks.scene import BuiltScene, Dressed, Scene
-from benchmarks.scenes.self_contact import demand_uncrossed, with_self_contact
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.contact_penalty.definition import ContactPenalty
@@ -59,29 +58,10 @@ def build(
         return moved_along(cloth, terms, body, garment, before.followed_by(motion.cut(0, 1)), start, shape)
 
     def settle_uncrossed() -> np.ndarray:
-        return settle(with_self_contact(energies))
+        return settle(apart())
 
-    cloth = garment.cloth()
-    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
-    energies = declared_energies(cloth)
-    # Which faces a vertex may touch is a matter of the body that the garment was made for.
-    obstacle = Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped())
-    dressed = Dressed(body, garment, motion, shape, before=before)
-    return BuiltScene(
-        name=scene.name,
-        cloth=cloth,
-        energies=energies,
-        dt=1.0 / motion.fps,
-        frames=motion.frames,
-        settle=settle_uncrossed if scene.self_contact else lambda: settle(energies),
-        self_contact=scene.self_contact,
-        settle_uncrossed=settle_uncrossed,
-        obstacle=obstacle,
-        origin_heights=dressed.pelvis[:, 1],
-        dressed=dressed,
-        warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
-        pin_positions=handles.__getitem__ if len(garment.pins) else None,
-    )
+    def apart() -> tuple[Energy, ...]:
+        from benchmarks.scenes.self_contact import with_self_contact  # loads the barrier
 
 
 def shape_of(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | None:
@@ -120,7 +100,10 @@ def settled(
     # The garment, unposed on that body, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1], betas)[0, 0]
     start = garment.rest_for(body, betas) @ root[:, :3].T + root[:, 3]
-    demand_uncrossed(start, energies, f"garment {garment.name}")
+    if any(term.joins_late for term in energies):
+        from benchmarks.scenes.self_contact import demand_uncrossed  # loads the barrier
+
+        demand_uncrossed(start, energies, f"garment {garment.name}")
     way = replace(motion, poses=poses, translations=translations)
     return _simulated(cloth, energies, body, garment, way, start, betas, "come to rest in the first pose")[-1]
 

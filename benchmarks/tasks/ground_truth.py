@@ -219,11 +219,10 @@ class SimulateQuasiStatic(Task):
         """Simulate each frame held still and write the trajectory."""
         import numpy as np
 
-        from benchmarks.scenes.self_contact import with_self_contact
         from reference_sim import simulate
 
         scene = build_scene(self.scene, context)
-        energies = with_self_contact(scene.energies) if scene.self_contact else scene.energies
+        energies = scene.minimised or scene.energies
         path = context.folder.quasi_static_path(scene.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory = simulate(

@@ -22,7 +22,7 @@ class SelfContact(Simulation):
         if settle is not None and crossing(scene.start, energies):
             scene = dataclasses.replace(scene, settle=settle)
         demand_uncrossed(scene.start, energies, scene.name)
-        super().prepare(dataclasses.replace(scene, self_contact=True))
+        super().prepare(dataclasses.replace(scene, minimised=energies))
 
 
 def make(*, models: Path, seed: int) -> SelfContact:

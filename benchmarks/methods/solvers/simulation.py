@@ -8,7 +8,6 @@ from typing import Any
 
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory.trajectory import Trajectory
 
@@ -39,10 +38,10 @@ class Simulation(Method):
         scene = self.scene
         assert scene is not None
         # Solvers that stop early are approximations of the declared terms; some know no others.
-        self_contact = scene.self_contact and "max_iterations" not in self.options
+        approximate = "max_iterations" in self.options
         return simulate(
             scene.cloth,
-            with_self_contact(scene.energies) if self_contact else scene.energies,
+            scene.energies if approximate else scene.minimised or scene.energies,
             dt=scene.dt,
             frames=frames,
             obstacle=scene.obstacle,

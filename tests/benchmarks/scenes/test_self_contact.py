@@ -62,7 +62,8 @@ def test_where_nothing_meets_it_is_the_simulation_and_is_measured_without_its_ba
 
 
 def test_solvers_that_stop_early_know_no_self_contact():
-    scene = dataclasses.replace(two_sheets(0.05), self_contact=True)
+    scene = two_sheets(0.05)
+    scene = dataclasses.replace(scene, minimised=with_self_contact(scene.energies))
     stopped = Simulation(options={"max_iterations": 2, "method": "newton"})
     stopped.prepare(scene)
     assert "energy/barrier" not in stopped.run().frame_fields
