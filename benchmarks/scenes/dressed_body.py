@@ -63,6 +63,30 @@ def build(
     def apart() -> tuple[Energy, ...]:
         from benchmarks.scenes.self_contact import with_self_contact  # loads the barrier
 
+        return with_self_contact(energies)
+
+    cloth = garment.cloth()
+    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
+    energies = declared_energies(cloth)
+    # Which faces a vertex may touch is a matter of the body that the garment was made for.
+    obstacle = Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped())
+    dressed = Dressed(body, garment, motion, shape, before=before)
+    return BuiltScene(
+        name=scene.name,
+        cloth=cloth,
+        energies=energies,
+        dt=1.0 / motion.fps,
+        frames=motion.frames,
+        settle=settle_uncrossed if scene.self_contact else lambda: settle(energies),
+        minimised=apart() if scene.self_contact else (),
+        settle_uncrossed=settle_uncrossed,
+        obstacle=obstacle,
+        origin_heights=dressed.pelvis[:, 1],
+        dressed=dressed,
+        warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
+        pin_positions=handles.__getitem__ if len(garment.pins) else None,
+    )
+
 
 def shape_of(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | None:
     """Return the shape (S,) whose first coefficients are `betas`, the others zero; None, the mean, for none.
