@@ -200,8 +200,8 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
-            f"{number(apart[1], 2)} 1/m in mean curvature: a smaller error is no evidence of a difference "
-            "from the simulation"
+            f"{number(apart[1], 2)} 1/m in mean curvature: an error below these shows no difference from the "
+            "simulation"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -259,7 +259,7 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         )
         sentences = [
             f"{snug} has an energy gap, the energy above the minimum of each time step, of "
-            f"{number(network.error)} J{network.fewer}; {others} is as fast with a smaller one"
+            f"{number(network.error)} J{network.fewer}; {others} is as fast with a smaller gap"
         ]
     else:
         within = " within repeats" if best.time > network.time else ""

@@ -43,9 +43,10 @@ def ablation_effects(run: Run) -> list[Table]:
             effects = [compare_methods(run, rows, metric, method, base).effect for metric in metrics]
             lines.append((garment, method, *effects))
     caption = (
-        "Each variant beside its base, over the scenes that both have: × the variant over the base, of "
-        "geometric means; of the total, whose zero is a choice, the variant less the base in points of "
-        "relative excess; where another value is not positive, the difference in the unit above."
+        "Each variant beside its base, over the scenes that both have. A number behind × is the variant over "
+        "the base, of geometric means. The total has an arbitrary zero: its numbers are the variant minus "
+        "the base in points of relative excess. Where another value is not positive, the number is the "
+        "difference in the unit above."
     )
     note = "Below: 95 % intervals over motions and seeds, each for itself."
     columns = (*HEAD, *map(metric_column, metrics))

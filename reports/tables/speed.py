@@ -99,7 +99,7 @@ def error_rivals(run: Run) -> list[Table]:
         Column("as_accurate_time", "Its run time", "ms"),
     )
     caption = (
-        f"SNUG and its rivals in {', '.join(scenes)}: the best method that is no slower within repeats, "
+        f"SNUG and its rivals in {', '.join(scenes)}: the best method not slower beyond repeats, "
         "and the fastest solver stopped early that is as accurate. A dash: none."
     )
     return table("error_rivals", columns, lines, caption)

@@ -61,7 +61,10 @@ def fabric_bands(run: Run) -> list[Table]:
         Column("length_least", "Bending length, least", "mm"),
         Column("length_largest", "Bending length, largest", "mm"),
     )  # fmt: skip
-    caption = "Published drape coefficients, and the bending lengths that give them by the reference."
+    caption = (
+        "Published drape coefficients, and the bending lengths that give them by the reference, of fabrics "
+        "of one density."
+    )
     return table("fabric_bands", columns, lines, caption)
 
 
