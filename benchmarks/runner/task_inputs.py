@@ -31,7 +31,7 @@ class TaskInputs:
     def machine(self, device: str = "cpu") -> dict[str, Any]:
         """Return the machine, as times of another are not reused. device: of a training; else cpu."""
         facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
-        names = ("processor", "cores", "python", "accelerator")
+        names = ("processor", "python", "accelerator")  # one thread works, however many cores there are
         return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
 
     @cached_property

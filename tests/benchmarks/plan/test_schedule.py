@@ -115,6 +115,16 @@ def test_only_what_trains_depends_on_the_accelerator(tmp_path, monkeypatch):
     assert {id[0] for id in own if own[id] != other[id]} == {"network"}
 
 
+def test_nothing_depends_on_how_many_cores_there_are(tmp_path, monkeypatch):
+    cell = Cell(dressed_scene("kick"), find_method("snug"), 0, ("garments",))
+    plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
+    found = []
+    for cores in (1, 2):
+        monkeypatch.setattr(provenance, "usable_cores", lambda cores=cores: cores)
+        found.append({task.id: task.inputs for task in tasks_of(plan)})
+    assert found[0] == found[1]
+
+
 def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(tmp_path):
     cell = Cell(dressed_scene("kick"), find_method("simulation"), 0, ("garments",))
     plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
