@@ -22,7 +22,7 @@ along with the body, at no cost.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,13 +91,21 @@ def _asked(group: SceneRollOuts) -> list[RollOut]:
     of_steps = scene.substeps == 1 and scene.frames > FIRST_FULL_FRAME
     if scene.dressed is None or len(scene.cloth.pins) or not of_steps:
         return []
-    return [r for r in group.roll_outs if r.entry.conserving and len(r.positions) == scene.frames]
+    whole = [r for r in group.roll_outs if r.entry.conserving and len(r.positions) == scene.frames]
+    # Solvers stopped early leave self-contact out, so they keep no law of it.
+    return [r for r in whole if not r.entry.truncated] if scene.minimised else whole
 
 
 def _laws_of(group: SceneRollOuts) -> dict[RollOut, LawSeries]:
     """Return the laws of all conserving roll-outs at once: they share the search trees."""
     asked = _asked(group)
-    return dict(zip(asked, law_series(group.scene, [roll_out.positions for roll_out in asked])))
+    positions = [roll_out.positions for roll_out in asked]
+    return dict(zip(asked, law_series(with_minimised_terms(group.scene), positions)))
+
+
+def with_minimised_terms(scene: BuiltScene) -> BuiltScene:
+    """Return the scene with the terms that its simulations minimise, self-contact among them."""
+    return replace(scene, energies=scene.minimised or scene.energies)
 
 
 @dataclass(frozen=True)
