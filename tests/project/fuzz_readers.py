@@ -14,7 +14,6 @@ import os
 import pickle
 import random
 import re
-import resource
 import sys
 import time
 import traceback
@@ -27,6 +26,7 @@ import numpy as np
 
 from benchmarks.external.roll_out_files import read_roll_out
 from benchmarks.external.roll_out_option import RollOutFileError
+from benchmarks.process.memory import peak_memory
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory, TrajectoryError
@@ -382,7 +382,7 @@ def main(count: int, folder: Path, first: int = 0) -> dict[str, Any]:
         place.write_bytes(data)
         print(reader.name, file=sys.stderr, flush=True)
         reader.read(place)  # what nobody has touched is read
-    start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = peak_memory()
     for number in range(first, first + count):
         reader, data = READERS[number % len(READERS)], valid[number % len(READERS)]
         path = folder / f"mutated{reader.suffix}"
@@ -395,10 +395,10 @@ def main(count: int, folder: Path, first: int = 0) -> dict[str, Any]:
         slowest, refused = max(slowest, seconds), refused + was_refused
         if what or seconds > 10.0:
             problems.append(dataclasses.asdict(Problem(reader.name, number, what, seconds)))
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peak = peak_memory()
     return {
         "problems": problems, "refused": refused, "slowest": slowest,
-        "megabytes": (peak - start) / 1e3, "peak": peak / 1e3,
+        "megabytes": peak - start, "peak": peak,
     }  # fmt: skip
 
 
