@@ -72,11 +72,11 @@ RUNS = {
         ("frames_tshirt-sudden_stop",),
     ),
     "handles": PublishedRun(
-        "networks of few handles and the floors of their spaces; two branches; learners without training",
+        "networks of few handles and floors of their spaces; Neural Cloth Simulation; learners without training",
         {
             "": f"--suite garments {THREE} --scenes 'tshirt/*' --methods {REFERENCES},snug,snug-floor,pbns,"
             "handles-20,handles-40,handles-80,handles-20-floor,handles-40-floor,handles-80-floor,"
-            "nearest-poses,pose-regression,ncs,ncs-static"
+            "nearest-poses,pose-regression,ncs"
         },
     ),
     "self_contact": PublishedRun(
