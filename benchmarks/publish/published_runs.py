@@ -72,7 +72,7 @@ RUNS = {
         ("frames_tshirt-sudden_stop",),
     ),
     "handles": PublishedRun(
-        "networks of few handles and floors of their spaces; Neural Cloth Simulation; learners without training",
+        "networks of few handles and their floors; Neural Cloth Simulation; learners without training",
         {
             "": f"--suite garments {THREE} --scenes 'tshirt/*' --methods {REFERENCES},snug,snug-floor,pbns,"
             "handles-20,handles-40,handles-80,handles-20-floor,handles-40-floor,handles-80-floor,"
