@@ -210,6 +210,11 @@ class BuiltScene:
         return self.start_state[1]
 
     @property
+    def simulated_energies(self) -> tuple[Energy, ...]:
+        """Terms that a simulation minimises: those it is measured by, or these and self-contact."""
+        return self.minimised or self.energies
+
+    @property
     def terms(self) -> tuple[str, ...]:
         """Names of the energy terms of this scene, in the order of the tables."""
         return (*(e.name for e in self.energies), "inertia")

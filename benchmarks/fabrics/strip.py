@@ -62,6 +62,20 @@ class Strip:
         """Length [m] from where the clamp acts to the free end."""
         return float(self.cloth.rest_positions[:, 0].max() - self.clamp)
 
+    def hanging_along(self, s: np.ndarray, aside: np.ndarray, depth: np.ndarray) -> np.ndarray:
+        """Return positions (V, 3) [m] of the strip along a curve that begins downwards in the origin.
+
+        Args:
+            s: (n,) from where the clamp acts, over the length.
+            aside: (n,) of the curve there, over the length.
+            depth: (n,) the same downwards; above the clamp the strip is straight.
+        """
+        x = self.cloth.rest_positions.copy()
+        along = (x[:, 0] - self.clamp) / self.length
+        x[:, 0] = self.length * np.interp(along, s, aside)
+        x[:, 1] = -self.length * np.where(along > 0, np.interp(along, s, depth), along)
+        return x
+
     def chord(self, x: np.ndarray) -> np.ndarray:
         """Return (width, height) [m] of the chord from clamp to tip, height downwards, at x (V, 3) [m]."""
         tip = x[self.tip].mean(axis=0)

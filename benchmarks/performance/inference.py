@@ -31,8 +31,8 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     chosen = settings.training
     dressed, motions = dressed_body(vertices), training_motions()
     model = untrained_model(chosen.kind, dressed, motions, seed=0, recipe=chosen.recipe)
-    _frame_seconds(model, dressed, motions[0])
-    runs = [_frame_seconds(model, dressed, motions[0]) for _ in range(settings.repeats)]
+    frame_seconds(model, dressed, motions[0])
+    runs = [frame_seconds(model, dressed, motions[0]) for _ in range(settings.repeats)]
     frames = 1e3 * np.concatenate(runs)
     with tempfile.TemporaryDirectory() as folder:
         size = model.save(Path(folder) / "model.safetensors").stat().st_size
@@ -42,14 +42,14 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
         "inference": float(np.median(frames)),
         "inference_p95": float(np.quantile(frames, 0.95)),
         "inference_least": float(frames.min()),
-        "inference_cold": 1e3 * float(np.median(_frame_seconds(model, dressed, motions[0], swept=SWEPT))),
+        "inference_cold": 1e3 * float(np.median(frame_seconds(model, dressed, motions[0], swept=SWEPT))),
         "parameters": sum(p.numel() for p in model.network.parameters()),
         "network_memory": model.megabytes,
         "model_file": size / 1e6,
     }
 
 
-def _frame_seconds(
+def frame_seconds(
     model: TrainedModel, dressed: DressedBody, motion: Motion, *, swept: int = 0
 ) -> list[float]:
     """Return wall times [s] of each frame of a roll-out; inputs and joint transforms are ready before.

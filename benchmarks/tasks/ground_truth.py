@@ -222,11 +222,10 @@ class SimulateQuasiStatic(Task):
         from reference_sim import simulate
 
         scene = build_scene(self.scene, context)
-        energies = scene.minimised or scene.energies
         path = context.folder.quasi_static_path(scene.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory = simulate(
-            scene.cloth, energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
+            scene.cloth, scene.simulated_energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
             start=scene.start, quasi_static=True, tolerance=TOLERANCE, pin_positions=scene.pin_positions,
         )  # fmt: skip
         context.tell(self.units)

@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.performance.inference import _frame_seconds
+from benchmarks.performance.inference import frame_seconds
 from benchmarks.performance.learning import dressed_body, training_motions
 from benchmarks.process.timing import one_thread
 from snug.recipes.named import RECIPE_OF_KIND
@@ -49,7 +49,7 @@ def main():
         weights, inputs = np.ones((2, count // 2), np.float32)
         reading = least(partial(np.dot, weights, inputs))
         for _ in range(2):  # the first one compiles
-            frames = _frame_seconds(model, dressed, motions[0])
+            frames = frame_seconds(model, dressed, motions[0])
         frame = float(np.median(frames))
         print(
             f"{kind:12} {4e-6 * count:5.2f} MB {1e3 * reading:5.3f} ms {2e3 * count / operations:8.4f} ms "

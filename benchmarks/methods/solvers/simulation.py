@@ -41,7 +41,7 @@ class Simulation(Method):
         approximate = "max_iterations" in self.options
         return simulate(
             scene.cloth,
-            scene.energies if approximate else scene.minimised or scene.energies,
+            scene.energies if approximate else scene.simulated_energies,
             dt=scene.dt,
             frames=frames,
             obstacle=scene.obstacle,

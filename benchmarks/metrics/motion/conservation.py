@@ -105,7 +105,7 @@ def _laws_of(group: SceneRollOuts) -> dict[RollOut, LawSeries]:
 
 def with_minimised_terms(scene: BuiltScene) -> BuiltScene:
     """Return the scene with the terms that its simulations minimise, self-contact among them."""
-    return replace(scene, energies=scene.minimised or scene.energies)
+    return replace(scene, energies=scene.simulated_energies)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from benchmarks.validation.convergence import demand_converged
 from reference_sim.energies.bend_hinge.definition import BendHinge, dihedral_angles
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import GRAVITY
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 
@@ -76,13 +77,9 @@ def _tip(curvature: float, gamma: float, columns: int) -> np.ndarray:
     bend = BendHinge(cloth, rest_angles=dihedral_angles(rolled, cloth.hinges))
     acceleration = gamma * strip.stiffness / length**3 / MATERIAL.areal_density
     potential = Potential([StretchStVK(cloth), bend, Gravity(cloth, acceleration=acceleration)])
-    s, aside, depth = exact(curvature, gamma)
-    along = (flat[:, 0] - strip.clamp) / length
-    start = flat.copy()
-    start[:, 0] = length * np.interp(along, s, aside)
-    start[:, 1] = -np.where(along > 0, length * np.interp(along, s, depth), flat[:, 0] - strip.clamp)
-    start[cloth.free, 2] += PUSH * along[cloth.free] ** 2
-    strength = (curvature**2 + gamma) * strip.stiffness / MATERIAL.areal_density / 9.81
+    start = strip.hanging_along(*exact(curvature, gamma))
+    start[cloth.free, 2] += PUSH * ((flat[cloth.free, 0] - strip.clamp) / length) ** 2
+    strength = (curvature**2 + gamma) * strip.stiffness / MATERIAL.areal_density / GRAVITY
     rest = demand_converged(minimise(potential, start, tolerance=1e-6 * strength), "the curled strip")
     tip = rest.positions[strip.tip].mean(axis=0) - flat[strip.tip].mean(axis=0) * [0, 0, 1]
     return tip / length

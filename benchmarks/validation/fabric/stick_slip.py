@@ -128,12 +128,9 @@ class Pressed:
 
     def _elastica(self, strain: float, tip: float) -> np.ndarray:
         """Return positions (V, 3) [m] on the elastica of that strain, its tip at height `tip` [m]."""
-        strip, x = self.strip, self.strip.cloth.rest_positions.copy()
         s, (_, _, aside, depth) = exact(strain)[:2]
-        along = (x[:, 0] - strip.clamp) / strip.length
-        below = np.where(along > 0, np.interp(along, s, depth), along)
-        x[:, 0] = strip.length * np.interp(along, s, aside)
-        x[:, 1] = tip + strip.length * (1 - strain - below)
+        x = self.strip.hanging_along(s, aside, depth)
+        x[:, 1] += tip + self.strip.length * (1 - strain)
         return x
 
     def floor_force(self, x: np.ndarray) -> np.ndarray:

@@ -136,9 +136,8 @@ class TrainingContact:
             return batch.frames.ravel(), *self._kept
         rest = self.template
         if batch.betas is not None:
-            moved = torch.tensordot(
-                self.directions, batch.betas, ([2], [1])
-            )  # (P, 3, N), as FastSkin reads it
+            # (P, 3, N), as FastSkin reads it
+            moved = torch.tensordot(self.directions, batch.betas, ([2], [1]))
             rest = (rest[..., None] + moved).permute(2, 0, 1)[:, None]
         rows = np.arange(batch.frames.size)
         if isinstance(self.cache, ContactCache):  # the first frames of all windows, then the second ones
