@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from benchmarks.methods.catalogue.ablations import RECIPE_DEVIATIONS
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS
 from benchmarks.methods.catalogue.equal_data import EQUAL_DATA
+from benchmarks.methods.catalogue.networks import HANDLES
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import Preset
 from benchmarks.results.ensemble import MEMBERS
@@ -182,7 +183,8 @@ SUITES = (
         methods=_solvers,
         # Learned ones, and solvers that start from `snug-dynamic`, as in suite garments.
         more_methods=(
-            "pbns-springs", "santesteban2019", "tailornet", "simulation-1e-4",
+            "pbns-springs", "santesteban2019", "tailornet", "ncs", *(entry.name for entry in HANDLES),
+            "nearest-poses", "pose-regression", "simulation-1e-4",
             *(entry.name for entry in METHODS if entry.role in ("solver", "warm-started")
               and entry.reporting.base != "snug-dynamic"),
         ),

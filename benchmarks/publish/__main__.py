@@ -98,7 +98,11 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
         Whether it is published; the reason stands on standard error where it is not.
     """
     parts = commands(name, run, out, more)
+    whole = next(iter(parts))
     for folder, line in parts.items():
+        if folder != whole and not folder.exists():
+            with new_folder(folder) as part:  # networks and their data are not made twice
+                shutil.copytree(whole, part, dirs_exist_ok=True)
         print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
         if status := subprocess.run(line, check=False).returncode:
             print(f"{PROGRAM}: {name}: {folder}: exit status {status}; not published", file=sys.stderr)
@@ -107,7 +111,6 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
             found = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
             print(f"{PROGRAM}: {folder}: {found}", file=sys.stderr)
             return False
-    whole = next(iter(parts))
     if len(parts) > 1:
         whole = out / name
         shutil.rmtree(whole, ignore_errors=True)  # what it was merged from stays

@@ -12,6 +12,7 @@ MADE = "push_recovery,dance_turn,cartwheel_lean,climbing_steps,sit_and_stand"
 ALL_TESTS = f"--test-motions {RECORDED},{MADE}"
 REFERENCES = "simulation,simulation-perturbed-1e-4,simulation-refrozen,skinning"
 THREE = "--seeds 0,1,2"
+OTHERS = "handles-20,handles-40,handles-80,ncs,nearest-poses,pose-regression"  # learned, of other forms
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class PublishedRun:
     Attributes:
         question: that its numbers answer.
         parts: name -> options of `benchmarks.run`; several parts are merged into one folder. They are apart
-            where a part has other scenes or times.
+            where a part has other scenes or times. Later parts begin with what the first has trained.
         pictures: figures that the documents show, by their names in the folder `figures` of the report.
     """
 
@@ -40,9 +41,12 @@ RUNS = {
         "all methods on 22 test motions; error against run time on two clips",
         {
             "garments": f"--suite garments {THREE} {ALL_TESTS} --scenes 'tshirt/*' --methods {REFERENCES},"
-            "simulation-1e-8,snug,pbns,supervised,fast-lbfgs-10,snug-no-collision,snug+cleanup",
+            f"simulation-1e-8,snug,pbns,supervised,fast-lbfgs-10,snug-no-collision,snug+cleanup,{OTHERS}",
             "speed": f"--suite speed {THREE} {ALL_TESTS} "
-            "--scenes tshirt/push_recovery@clip,tshirt/01_01_a@clip",
+            "--scenes tshirt/push_recovery@clip,tshirt/01_01_a@clip --methods 'simulation,simulation-1e-[28],"
+            "simulation-dt/*,simulation-perturbed-*,simulation-refrozen,skinning,snug,supervised,pbns,"
+            "fast-lbfgs-*,lbfgs-*,newton-[1248],vbd-20,xpbd-40,gradient-descent-10,skinning+lbfgs-4,"
+            f"snug+fast-lbfgs-*,snug+lbfgs-2,snug+newton-2,{OTHERS}'",
         },
         ("energy_series_tshirt-01_01_a", "error_against_time", "frames_tshirt-01_01_a", "training"),
     ),
