@@ -1,7 +1,6 @@
-"""Backward Euler against its exact discrete answers, and the loop around it: pins, files, failures.
+"""The loop around the steps of backward Euler: first guesses, pins, files, failures.
 
-The recurrences are those of the scheme itself, not of the continuous problem; so what is left is round-off
-and the minimiser's tolerance, which each test states.
+The suite `validation` holds the steps to their exact discrete answers: fall, momenta, energy, oscillations.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, simulate
 from reference_sim.command.summary import summarise
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Energy, Gravity, StretchStVK
 from reference_sim.progress import progress_bar
-from tests.reference_sim.meshes import box, grid, patch, random_rotation
+from tests.reference_sim.meshes import box, grid, random_rotation
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
 DOWN = np.array([0.0, -GRAVITY, 0.0])
@@ -29,35 +28,7 @@ def terms_of(cloth: Cloth) -> list[Energy]:
     return [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
 
 
-def potential_energy(energies: list[Energy], x: np.ndarray) -> float:
-    """[J] from the definitions alone."""
-    return sum(float(energy.energy(torch.as_tensor(x)).sum()) for energy in energies)
-
-
-# Exact answers
-
-
-@pytest.mark.parametrize("guess", ["previous", "extrapolated"])
-def test_free_fall_is_the_discrete_parabola(guess):
-    """x_n = x_0 + n dt v_0 + g dt^2 n (n + 1) / 2 for every vertex: nothing is strained on the way."""
-    cloth = Cloth(SHEET, FACES)
-    start = SHEET @ random_rotation(1).T
-    v0, dt = np.array([0.3, 1.0, -0.2]), 1 / 30
-    result = simulate(
-        cloth,
-        terms_of(cloth),
-        start=start,
-        velocity=np.tile(v0, (len(SHEET), 1)),
-        frames=31,
-        dt=dt,
-        guess=guess,
-    )
-    assert result.status == "converged", result.reason
-    n = np.arange(31)[:, None, None]
-    exact = start + n * dt * v0 + DOWN * dt**2 * n * (n + 1) / 2
-    # Round-off of positions of 5 m, thirty times; the parabola itself is 0.16 m away by then.
-    assert result.positions == pytest.approx(exact, abs=1e-11)
-    assert np.abs(exact[-1] - (start + v0 + DOWN / 2)).max() > 0.1
+# Steps
 
 
 def test_falling_without_velocity_kept_is_a_ladder():
@@ -65,72 +36,6 @@ def test_falling_without_velocity_kept_is_a_ladder():
     result = simulate(cloth, terms_of(cloth), frames=11, dt=0.02, quasi_static=True)
     n = np.arange(11)[:, None, None]
     assert result.positions == pytest.approx(SHEET + n * DOWN * 0.02**2, abs=1e-13)
-
-
-def tumbling(frames: int = 16, dt: float = 1 / 60) -> tuple[Cloth, list[Energy], Trajectory, np.ndarray]:
-    """An unpinned crumpled sheet thrown with a spin, and its velocities (T, V, 3) as the scheme has them."""
-    x, faces = patch(5, cells=5)
-    cloth = Cloth(0.3 * x, faces)
-    generator = np.random.default_rng(2)
-    start = 0.33 * x @ random_rotation(3).T + generator.normal(0, 0.004, x.shape)
-    v0 = np.cross([2.0, -1.0, 3.0], start) + np.array([0.5, 2.0, 0.0]) + generator.normal(0, 0.1, x.shape)
-    energies = terms_of(cloth)
-    result = simulate(cloth, energies, start=start, velocity=v0, frames=frames, dt=dt, tolerance=1e-10)
-    assert result.status == "converged", result.reason
-    v = np.concatenate([v0[None], np.diff(result.positions, axis=0) / dt])
-    return cloth, energies, result, v
-
-
-def test_momentum_and_angular_momentum_balance():
-    """P' - P = dt sum F, L' = L - dt sum m v x v' + dt tau(x'); the weight is the only outer force."""
-    cloth, _, result, v = tumbling()
-    m, dt, x = cloth.masses[:, None], 1 / 60, result.positions
-    P = (m * v).sum(axis=1)
-    # A gradient of 1e-10 weights at each of 36 vertices for 17 ms, against momenta of 0.01 N s.
-    tolerance = 1e-10 * 36 * cloth.masses.mean() * GRAVITY * dt + 1e-15
-    assert np.diff(P, axis=0) == pytest.approx(np.tile(dt * m.sum() * DOWN, (15, 1)), abs=2 * tolerance)
-    L = np.cross(x, m * v).sum(axis=1)
-    lost = np.cross(m * v[:-1], v[1:]).sum(axis=1)
-    torque = np.cross(x[1:], m * DOWN).sum(axis=1)
-    assert np.abs(lost).max() > 1e-3  # the scheme's own loss is no small number here
-    assert L[1:] == pytest.approx(L[:-1] - dt * lost + dt * torque, abs=2 * tolerance)
-
-
-def test_each_step_pays_for_its_change_of_velocity():
-    """Phi' + |v' - v|^2_M / 2 <= Phi + |v|^2_M / 2: backward Euler never gains energy."""
-    cloth, energies, result, v = tumbling()
-    m = cloth.masses[:, None]
-    phi = np.array([potential_energy(energies, x) for x in result.positions])
-    before = phi[:-1] + 0.5 * (m * v[:-1] ** 2).sum(axis=(1, 2))
-    after = phi[1:] + 0.5 * (m * np.diff(v, axis=0) ** 2).sum(axis=(1, 2))
-    assert (after <= before + 1e-12 * np.abs(before)).all()
-    kinetic = 0.5 * (m * v**2).sum(axis=(1, 2))
-    assert (np.diff(phi + kinetic) < 0).all()  # and with membrane modes excited it truly loses some
-
-
-def test_a_stretched_membrane_rings_at_the_discrete_frequency():
-    """z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega_h^2 dt^2) with the eigenvalue of the mesh's own Laplacian."""
-    cells, stretch, amplitude, dt = 8, 1.2, 1e-5, 0.01
-    flat, faces = grid(cells, cells)
-    border = np.flatnonzero((flat[:, [0, 2]] % 1 == 0).any(axis=1))
-    cloth = Cloth(flat, faces, pins=border)
-    mode = np.sin(np.pi * flat[:, 0]) * np.sin(np.pi * flat[:, 2])
-    start = stretch * flat
-    start[:, 1] = amplitude * mode
-    start[border, 1] = 0
-    result = simulate(cloth, [StretchStVK(cloth)], start=start, frames=50, dt=dt, tolerance=1e-12)
-    assert result.status == "converged", result.reason
-
-    material, h = cloth.material, 1 / cells
-    tension = (material.lame_lambda + material.lame_mu) * (stretch**2 - 1)
-    square = tension / material.areal_density * (4 / h**2) * 2 * np.sin(np.pi * h / 2) ** 2
-    z = [amplitude, amplitude / (1 + square * dt**2)]
-    while len(z) < 50:
-        z.append((2 * z[-1] - z[-2]) / (1 + square * dt**2))
-    assert min(z) < -0.1 * amplitude  # it swings through
-    # The membrane stiffens with the slope squared: (pi amplitude)^2 = 1e-9 of the answer.
-    assert result.positions[:, :, 1] == pytest.approx(np.outer(z, mode), abs=1e-8 * amplitude)
-    assert result.positions[:, :, [0, 2]] == pytest.approx(np.tile(start[:, [0, 2]], (50, 1, 1)), abs=1e-9)
 
 
 def test_in_a_taut_state_the_first_guess_does_not_matter():
@@ -144,14 +49,6 @@ def test_in_a_taut_state_the_first_guess_does_not_matter():
     assert np.ptp(runs[0].positions[-1][:, 1]) > 1e-3
     # 1e-9 weights over a stiffness of 10 N/m, twenty steps.
     assert runs[0].positions == pytest.approx(runs[1].positions, abs=1e-10)
-
-
-def test_substeps_are_smaller_steps_of_which_every_other_is_kept():
-    cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    halved = simulate(cloth, terms_of(cloth), frames=6, dt=1 / 30, substeps=2)
-    fine = simulate(cloth, terms_of(cloth), frames=11, dt=1 / 60)
-    assert halved.positions == pytest.approx(fine.positions[::2], abs=1e-12)
-    assert halved.times == pytest.approx(fine.times[::2], rel=1e-14)
 
 
 # Pins

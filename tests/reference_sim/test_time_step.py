@@ -5,40 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reference_sim import GRAVITY, Cloth, Obstacle, simulate
+from reference_sim import Cloth, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from tests.reference_sim.meshes import grid, sphere
 
 SHEET, FACES = grid(5, 5, width=0.4, depth=0.4)
 
 
-@pytest.mark.parametrize("substeps", [1, 2, 5])
-def test_free_fall_is_the_exact_sum_over_the_small_steps(substeps):
-    cloth = Cloth(SHEET, FACES)
-    fall = simulate(cloth, [Gravity(cloth)], dt=0.1, frames=5, substeps=substeps)
-    n, h = substeps * np.arange(5), 0.1 / substeps
-    expected = SHEET[:, 1] - (0.5 * GRAVITY * h**2 * n * (n + 1))[:, None]
-    np.testing.assert_allclose(fall.positions[:, :, 1], expected, atol=1e-12)
-    np.testing.assert_allclose(fall.times, 0.1 * np.arange(5))
-
-
-def test_frames_of_sub_steps_are_every_nth_frame_of_small_steps():
+def test_frames_of_sub_steps_are_every_nth_frame_of_small_steps_and_sum_their_work():
     cloth = Cloth(SHEET, FACES, pins=[0, 5])
     terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
-    hand = SHEET[[0, 5]]
-    coarse = simulate(
-        cloth, terms, dt=0.06, frames=4, substeps=3, pin_positions=lambda k: hand + np.array([0, 0.03 * k, 0])
-    )
-    fine = simulate(
-        cloth, terms, dt=0.02, frames=10, pin_positions=lambda k: hand + np.array([0, 0.01 * k, 0])
-    )
+    coarse = simulate(cloth, terms, dt=0.06, frames=4, substeps=3)
+    fine = simulate(cloth, terms, dt=0.02, frames=10)
     assert coarse.status == fine.status == "converged"
-    np.testing.assert_allclose(coarse.positions, fine.positions[::3], atol=1e-7)
+    np.testing.assert_allclose(coarse.positions, fine.positions[::3], atol=1e-12)
+    np.testing.assert_allclose(coarse.times, fine.times[::3], rtol=1e-14)
     for name in ("iterations", "factorisations"):
         sums = fine.frame_fields[name][1:].reshape(3, 3).sum(axis=1)
         np.testing.assert_array_equal(coarse.frame_fields[name][1:], sums)
-    worst = fine.frame_fields["gradient_norm"][1:].reshape(3, 3).max(axis=1)
-    assert (coarse.frame_fields["gradient_norm"][1:] <= 1e-6).all() and (worst <= 1e-6).all()
 
 
 def test_pins_arrive_exactly():

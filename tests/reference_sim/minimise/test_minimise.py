@@ -103,7 +103,7 @@ def test_the_energy_never_rises(method):
     assert energies[-1] < start - 0.01 and len(energies) > 10
 
 
-@pytest.mark.parametrize("energies", [(StretchStVK, BendHinge), (StretchStVK,), (StretchSpring, BendHinge)])
+@pytest.mark.parametrize("energies", [(StretchStVK,), (StretchSpring, BendHinge)])
 def test_a_flat_compressed_sheet_is_a_saddle_and_not_an_answer(energies):
     """Pressed together between two held sides and flat, it is in balance out of its plane, and unstable."""
     x0 = SHEET * [0.9, 1, 1]
