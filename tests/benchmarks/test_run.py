@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import resource
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -32,42 +29,7 @@ from tests.benchmarks.runner.misbehaving import interrupt_at
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def command(*words: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-m", "benchmarks.run", *words],
-        capture_output=True, text=True, cwd=cwd, timeout=120, env=environment,
-    )  # fmt: skip
-
-
 # --- quick answers ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("word", ["--help", "--list"])
-def test_help_and_list_answer_within_a_second(word):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    answer = command(word)
-    assert answer.returncode == 0 and "hanging_sheet" in answer.stdout
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)  # of the processor: others may have the machine
-    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1.0
-
-
-@pytest.mark.parametrize("word", ["--help", "--list", "--dry-run"])
-def test_nothing_heavy_is_loaded_before_there_is_something_to_do(word, tmp_path):
-    code = (
-        "import sys; sys.argv = ['run', sys.argv[1]]\n"
-        "import runpy, contextlib, io\n"
-        "with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):\n"
-        "    runpy.run_module('benchmarks.run', run_name='__main__')\n"
-        "print([m for m in ('torch', 'vtk', 'vtkmodules', 'pyvista', 'pandas', 'numba', 'igl', 'scipy', "
-        "'skfem', 'matplotlib') if m in sys.modules])"
-    )
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    answer = subprocess.run(
-        [sys.executable, "-c", code, word], capture_output=True, text=True, cwd=tmp_path, env=environment
-    )
-    assert answer.stdout.strip().endswith("[]"), answer.stdout + answer.stderr
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_help_names_every_exit_status(capsys):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -228,14 +226,3 @@ def test_histories_come_from_the_models_headers(made, tmp_path):
         write_model(tmp_path / kind, kind)
     taught = [training.read_history(tmp_path / kind, kind) for kind in ("supervised", "tailornet", "dynamic")]
     assert len({history.panel for history in taught}) == 3
-
-
-def test_the_command_answers_without_loading_anything_heavy():
-    probe = (
-        "import sys, reports.build\n"
-        "try:\n    reports.build.main(['--help'])\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'pandas', 'scipy', 'matplotlib', 'torch', 'h5py', 'typst', 'pyvista'}\n"
-        "heavy |= {'reference_sim.cloth', 'reference_sim.trajectory', 'snug.body.parametric_body'}\n"
-        "sys.exit(bool(heavy & set(sys.modules)))"
-    )
-    assert subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=60).returncode == 0

@@ -18,7 +18,6 @@ from benchmarks.metrics.surface import body_shape
 from benchmarks.plan.choose_cells import choose_suites
 from benchmarks.plan.plan import network_of
 from benchmarks.presets import PRESETS, find_preset
-from benchmarks.run import main
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES, all_scenes
@@ -152,26 +151,6 @@ def test_presets_grow():
     assert sizes == sorted(sizes) and [preset.name for preset in PRESETS] == ["smoke", "quick", "paper"]
     only_named = ("fabric", "engines", "performance")
     assert (*choose_suites([]), *only_named) == choose_suites(["all"])
-
-
-TRAININGS = {"snug", "snug.recipes", "snug.recipes.recipe", "snug.recipes.named", "snug.recipes.deviations"}
-
-
-def test_the_hanging_sheet_loads_no_body_no_distance_no_contact_and_no_network(tmp_path, monkeypatch):
-    out = tmp_path / "run"
-    words = ["--preset", "smoke", "--scenes", "hanging_sheet", "--methods", "simulation,newton-1"]
-    monkeypatch.setattr("benchmarks.runner.execute_plan.make_report", lambda log: "")
-    assert main([*words, "-o", str(out)]) == 0
-    for method in ("simulation", "newton-1"):
-        record = json.loads((out / "cache" / "cell" / "hanging_sheet" / f"{method}.json").read_text())
-        loaded = set(record["outcome"]["result"]["modules"])  # by the process of the cell
-        assert "reference_sim.energies.stretch_stvk" in loaded  # the list is not empty by mistake
-        # Names of trainings stand in the list of methods.
-        assert {name for name in loaded if name.startswith("snug")} <= TRAININGS
-        for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
-            assert name not in loaded, f"{name} was loaded"
-    text = (out / "results.csv").read_text()
-    assert "energy/strain" in text and "energy/collision" not in text and "penetration" not in text
 
 
 def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):

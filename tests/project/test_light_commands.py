@@ -1,0 +1,62 @@
+"""Commands and lists answer at once: what measures, learns or draws is loaded when there is work for it."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROBE = """
+import runpy, sys
+del sys.argv[0]
+try:
+    runpy.run_module(sys.argv[0], run_name="__main__")
+except SystemExit as end:
+    assert not end.code, end.code
+print("LOADED", *sys.modules)
+"""
+LIBRARIES = {"torch", "numba", "igl", "scipy", "pyvista"}
+MEASURED = LIBRARIES | {"vtk", "vtkmodules", "pandas", "skfem", "matplotlib"}
+
+# module, its words, a word of its answer, what must not be loaded.
+LIGHT = [
+    ("benchmarks.run", ["--help"], "hanging_sheet", MEASURED),
+    ("benchmarks.run", ["--list"], "hanging_sheet", MEASURED),
+    ("benchmarks.run", ["--dry-run"], "hanging_sheet", MEASURED),
+    ("reference_sim.simulate", ["--help"], "--young-modulus", {"torch", "numba", "igl", "meshio", "h5py"}),
+    ("snug.check", ["--help"], "usage:", LIBRARIES | {"numpy"}),
+    ("snug.train", ["--help"], "examples:", {"torch"}),
+    (
+        "reports.build",
+        ["--help"],
+        "usage:",
+        {"numpy", "pandas", "scipy", "matplotlib", "torch", "h5py", "typst", "pyvista", "reference_sim.cloth"}
+        | {"reference_sim.trajectory", "snug.body.parametric_body"},
+    ),
+    ("benchmarks.performance.registry", [], "", {"numpy", "torch", "reference_sim", "snug"}),
+    ("benchmarks.results.run_folder", [], "", {"numpy", "torch", "pandas"}),
+]
+
+
+@pytest.mark.parametrize(
+    ("module", "words", "answer", "heavy"), LIGHT, ids=[" ".join([name, *words]) for name, words, *_ in LIGHT]
+)
+def test_nothing_heavy_is_loaded_before_there_is_something_to_do(module, words, answer, heavy, tmp_path):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE, module, *words],
+        capture_output=True, text=True, timeout=120, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)  # of the processor: others may have the machine
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    said, _, modules = done.stdout.rpartition("LOADED")
+    loaded = set(modules.split())
+    assert answer in said and "runpy" in loaded and loaded.isdisjoint(heavy), loaded & heavy
+    assert list(tmp_path.iterdir()) == []
+    if words != ["--dry-run"]:  # which reads clips
+        assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1.0
