@@ -1,11 +1,10 @@
-"""The simulator by itself: no import circle, no heavy package that it does not need, no need of cvxopt."""
+"""The simulator by itself: no heavy package that it does not need, no need of cvxopt."""
 
 from __future__ import annotations
 
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -70,20 +69,6 @@ def test_without_the_packages_of_its_solver_it_ends_at_the_same_place(tmp_path):
         assert np.abs(other.positions - results[0].positions).max() < 1e-10
 
 
-def imported(path: Path, module: str, modules: set[str]) -> Iterator[str]:
-    """Modules of the package that a file imports, those inside functions and for types alone included."""
-    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom):
-            parts = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
-            base = ".".join([*parts, *([node.module] if node.module else [])])
-            for alias in node.names:
-                name = f"{base}.{alias.name}"
-                yield from {name if name in modules else base} & modules - {module}
-        elif isinstance(node, ast.Import):
-            yield from {alias.name for alias in node.names} & modules - {module}
-
-
 def test_every_lazy_name_is_defined_by_one_module_of_its_package():
     package = ROOT / "reference_sim/energies"
     defined: dict[str, list[str]] = {}
@@ -99,15 +84,3 @@ def test_every_lazy_name_is_defined_by_one_module_of_its_package():
     assert sorted(energies.__all__) == sorted(MODULE_OF)
     for name in MODULE_OF:
         assert getattr(energies, name).__name__ == name
-
-
-def test_no_module_imports_itself_by_a_circle():
-    files = {}
-    for path in (ROOT / "reference_sim").rglob("*.py"):
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        files[".".join(parts).removesuffix(".__init__")] = path
-    above = {name: set(imported(path, name, set(files))) for name, path in files.items()}
-    assert "reference_sim.minimise.descent" in above["reference_sim.minimise.newton"]
-    while free := {name for name, needs in above.items() if not needs}:
-        above = {name: needs - free for name, needs in above.items() if name not in free}
-    assert not above, f"circles among or above {sorted(above)}"
