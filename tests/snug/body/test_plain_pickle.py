@@ -1,6 +1,5 @@
 """The restricted pickle reader: plain values come back as they are, and nothing in a file is ever run."""
 
-import io
 import pickle
 import struct
 from collections import OrderedDict, defaultdict
@@ -177,21 +176,3 @@ def test_sizes_and_broken_files_are_refused(tmp_path, content):
         read_plain_pickle(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value) and len(str(caught.value)) < 500
     assert "MemoryError" not in str(caught.value)  # refused before anything of that size is asked for
-
-
-def test_mutated_files_are_read_or_refused(tmp_path):
-    random = np.random.default_rng(0)
-    stream = io.BytesIO()
-    pickle.dump({**ROLL_OUT, "J": scipy.sparse.csc_matrix(np.eye(3))}, stream, 2)
-    sound = np.frombuffer(stream.getvalue(), dtype=np.uint8)
-    refused = 0
-    for _ in range(400):
-        mutated = sound.copy()
-        where = random.integers(len(sound), size=random.integers(1, 6))
-        mutated[where] = random.integers(256, size=len(where))
-        try:
-            read_plain_pickle(written(tmp_path / "a.pkl", mutated.tobytes()))
-        except PlainPickleError as error:
-            refused += 1
-            assert "\n" not in str(error)
-    assert 50 < refused < 400
