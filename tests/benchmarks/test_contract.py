@@ -312,8 +312,7 @@ def test_a_wrong_gradient_is_found_however_many_vertices_do_not_feel_it(factor, 
     ("word", "words"),
     [("gone.py", "gone.py: no such file"), ("empty.py", "declares none of METHODS, SCENES, METRICS")],
 )
-def test_the_command_refuses_in_one_line(word, words, tmp_path, monkeypatch, capsys):
+def test_the_command_refuses_in_one_line(word, words, tmp_path, monkeypatch, refused):
     (tmp_path / "empty.py").write_text("")
     monkeypatch.chdir(tmp_path)
-    assert check.main([word]) == 2
-    assert words in capsys.readouterr().err
+    refused(words, check.main, [word])

@@ -164,7 +164,7 @@ def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path
 
 
 @pytest.mark.parametrize("what", ["file", "entry", "no cache", "twice", "no run", "taken", "outside"])
-def test_what_cannot_be_merged_is_named(folder, tmp_path, what, capsys):
+def test_what_cannot_be_merged_is_named(folder, tmp_path, what, refused):
     import shutil
 
     one, two = folder("one", [row("energy/total", 1.0)]), folder("two", [row("energy/total", 1.0)])
@@ -187,10 +187,7 @@ def test_what_cannot_be_merged_is_named(folder, tmp_path, what, capsys):
         (tmp_path / "both").mkdir()
         (tmp_path / "both" / "letter").write_text("dear")
     names = [one, one] if what == "twice" else [one, tmp_path / "none"] if what == "no run" else names
-    assert command.main([*map(str, names), "-o", str(tmp_path / "both")]) == 2
-    error = capsys.readouterr().err
-    assert said in error and error.count("\n") == 1
-    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+    refused(said, command.main, [*map(str, names), "-o", str(tmp_path / "both")])
 
 
 def test_numbers_that_differ_are_refused_by_their_cell():

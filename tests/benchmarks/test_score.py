@@ -230,14 +230,11 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_refusal_is_one_line_and_leaves_nothing(name, tmp_path, monkeypatch, capsys):
+def test_a_refusal_is_one_line_and_leaves_nothing(name, tmp_path, monkeypatch, refused):
     words, hint = REFUSED[name]
     np.savez(tmp_path / "mine.npz", positions=np.ones((10, 5, 3)))
     monkeypatch.chdir(tmp_path)
-    assert score.main([*words, "--preset", "smoke", "-o", "out"]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1 and hint in err
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.npz"]
+    refused(hint, score.main, [*words, "--preset", "smoke", "-o", "out"])
 
 
 # --- a scene taken home ----------------------------------------------------------------------------------

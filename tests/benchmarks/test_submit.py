@@ -189,13 +189,11 @@ def test_a_program_of_another_name_is_refused(entry, capsys):
     )
 
 
-def test_what_is_no_entry_has_status_2(tmp_path, capsys):
-    assert main(["check", str(tmp_path)]) == 2
+def test_what_is_no_entry_has_status_2(tmp_path, refused):
+    refused("no such file", main, ["check", str(tmp_path)])
     (tmp_path / "entry.toml").write_text("title =")
-    assert main(["check", str(tmp_path)]) == 2
-    assert main(["judge", str(tmp_path)]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert ["no such file" in lines[0], "not readable as TOML" in lines[1], len(lines)] == [True, True, 3]
+    refused("not readable as TOML", main, ["check", str(tmp_path)])
+    refused("judge", main, ["judge", str(tmp_path)])
 
 
 @pytest.fixture

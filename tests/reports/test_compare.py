@@ -163,7 +163,7 @@ def test_exit_status_and_lines(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("what", ["absent", "preset", "nothing shared", "pattern"])
-def test_bad_input_is_one_line_and_status_2(tmp_path, capsys, what):
+def test_bad_input_is_one_line_and_status_2(tmp_path, refused, what):
     one = write(tmp_path / "a", rows_of(), preset="quick")
     if what == "preset":
         write(tmp_path / "b", rows_of(), preset="smoke")
@@ -171,7 +171,4 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, capsys, what):
         other = [row("skirt/turn")] if what == "nothing shared" else rows_of()
         write(tmp_path / "b", other, preset="quick")
     options = ["--metrics", "energy/strian"] if what == "pattern" else []
-    assert command.main([one, str(tmp_path / "b"), *options]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == "" and captured.err.startswith("reports.compare: ")
-    assert captured.err.count("\n") == 1
+    refused("reports.compare: ", command.main, [one, str(tmp_path / "b"), *options])

@@ -136,13 +136,10 @@ def test_normals_of_a_sphere_point_outwards():
         (["--width", "7"], "--width 64 to 2000"),
     ],
 )
-def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, capsys, change, said):
+def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, said):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(film, "SWATCH", "pass")
-    assert filmed(run, "x.gif", *change) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("reports.film: ") and error.count("\n") == 1 and said in error
-    assert list(tmp_path.iterdir()) == []
+    assert refused(said, filmed, run, "x.gif", *change).startswith("reports.film: ")
 
 
 def test_without_opengl_or_the_extra_it_says_what_to_install(run, tmp_path, monkeypatch, capsys):

@@ -123,7 +123,7 @@ def test_failed_cells_are_listed_once_with_their_reason(made):
 
 
 @pytest.mark.parametrize("what", ["absent", "empty", "broken config", "broken rows", "no rows"])
-def test_no_run_folder_is_one_line_and_status_2(tmp_path, capsys, what):
+def test_no_run_folder_is_one_line_and_status_2(tmp_path, refused, what):
     run = RunFolder(tmp_path / "run")
     if what != "absent":
         run.path.mkdir()
@@ -134,11 +134,7 @@ def test_no_run_folder_is_one_line_and_status_2(tmp_path, capsys, what):
         run.config_path.write_text("{", encoding="utf-8")
     if what == "broken rows":
         run.rows_path.write_text("a,b\n", encoding="utf-8")
-    before = sorted(tmp_path.rglob("*"))
-    assert build.main([str(run.path)]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("reports.build: ") and error.count("\n") == 1 and str(run.path) in error
-    assert sorted(tmp_path.rglob("*")) == before
+    assert refused(str(run.path), build.main, [str(run.path)]).startswith("reports.build: ")
 
 
 def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
@@ -183,19 +179,16 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     assert said.startswith("Not as the run wrote them: results.csv.")
 
 
-def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, capsys):
+def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, refused):
     run = RunFolder(tmp_path)
     run.write_rows(all_rows())
     run.config_path.write_text("{}", encoding="utf-8")
-    assert build.main([str(tmp_path)]) == 2
-    assert "run the benchmark again" in capsys.readouterr().err
+    refused("run the benchmark again", build.main, [str(tmp_path)])
     run.write_config({"format": FORMAT})
     lines = run.rows_path.read_text(encoding="utf-8").splitlines()
     old = COLUMNS.index("garment")
     run.rows_path.write_text("\n".join(",".join(line.split(",")[:old]) for line in lines), encoding="utf-8")
-    assert build.main([str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1 and "the columns should be" in error and str(run.rows_path) in error
+    assert str(run.rows_path) in refused("the columns should be", build.main, [str(tmp_path)])
 
 
 def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):

@@ -83,12 +83,9 @@ def test_a_killed_run_holds_its_folder_no_longer(tmp_path, monkeypatch):
     assert run.main(words_of(tmp_path, "simulation")) == 0
 
 
-def test_a_folder_of_an_earlier_version_is_refused_in_one_line(tmp_path, capsys):
+def test_a_folder_of_an_earlier_version_is_refused_in_one_line(tmp_path, refused):
     (tmp_path / "run.json").write_text('{"command": "python -m benchmarks.run", "finished": null}')
-    assert run.main(words_of(tmp_path, "simulation")) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "earlier version" in said and "new folder" in said
-    assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+    assert "new folder" in refused("earlier version", run.main, words_of(tmp_path, "simulation"))
 
 
 def test_what_a_killed_run_was_writing_is_removed(tmp_path):

@@ -40,11 +40,12 @@ def shaken(motion):
     return tube_dress().skinned(motion) + noise
 
 
-def short(kind="snug", *, steps=STEPS, seed=0, recipe=PLAIN, clips=CLIPS, **options):
+def short(kind="snug", *, dressed=None, steps=STEPS, seed=0, recipe=PLAIN, clips=CLIPS, **options):
     options = {"progress": False, "every": 5, **options}
     if kind not in ("snug", "pbns") and "trajectories" not in options:
         options["trajectories"] = {clip.name: shaken(clip) for clip in clips}
-    return train_network(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
+    dressed = tube_dress() if dressed is None else dressed
+    return train_network(kind, dressed, clips, steps=steps, seed=seed, recipe=recipe, **options)
 
 
 def same_model(a, b):
@@ -223,38 +224,16 @@ def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):
     with pytest.raises(Interrupted):
         short(checkpoint=checkpoint, stop=asked_after(2))
     body = replace(dressed.body, template=1.01 * dressed.body.template)
-    with pytest.raises(TensorFileError, match="another data"):
-        other = DressedBody(body, dressed.garment)
-        train_network(
-            "snug",
-            other,
-            CLIPS,
-            steps=STEPS,
-            seed=0,
-            recipe=PLAIN,
-            every=5,
-            progress=False,
-            checkpoint=checkpoint,
-        )
-    with pytest.raises(TensorFileError, match="another material"):
-        train_network(
-            "snug",
-            stiff,
-            CLIPS,
-            steps=STEPS,
-            seed=0,
-            recipe=PLAIN,
-            every=5,
-            progress=False,
-            checkpoint=checkpoint,
-        )
+    for other, named in ((DressedBody(body, dressed.garment), "another data"), (stiff, "another material")):
+        with pytest.raises(TensorFileError, match=named):
+            short(dressed=other, checkpoint=checkpoint)
 
 
 def no_space(*_):
     raise OSError("no space left")
 
 
-def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatch, capsys):
+def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatch, capsys, refused):
     from snug import train as module
 
     out = tmp_path / "small.safetensors"
@@ -286,14 +265,11 @@ def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatc
     before = out.read_bytes()
     others = {"seed": "1", "recipe": "paper", "steps": "9", "vertices": "300", "model": "pbns"}
     for name, value in others.items():
-        assert module.main([*words, f"--{name}", value]) == 2
-        said = capsys.readouterr().err
-        assert said.count("\n") == 1 and f"small.safetensors: of another {name}" in said.replace(
-            "number of ", ""
-        )
+        said = refused("small.safetensors: of another ", module.main, [*words, f"--{name}", value])
+        assert f"of another {name}" in said.replace("number of ", "")
     for other in ([swaying(21)], [swaying(16, name="held")]), ([swaying(20)], []):
         monkeypatch.setattr(choices, "choose_motions", lambda options, data, other=other: other)
-        assert module.main(words) == 2 and "of another body, garment or motions" in capsys.readouterr().err
+        refused("of another body, garment or motions", module.main, words)
     monkeypatch.setattr(choices, "choose_motions", lambda options, data: (library[:1], library[1:]))
     assert out.read_bytes() == before
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
