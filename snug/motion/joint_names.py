@@ -83,15 +83,16 @@ def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, str
     except OSError as problem:
         raise MotionError(f"{file}: cannot be read ({problem.strerror}); check --joint-map") from None
     except (ValueError, RecursionError) as problem:
-        reason = " ".join(str(problem).split())
+        reason = " ".join(str(problem).split())[:200]
         raise MotionError(f'{file}: not a TOML file ({reason}); write lines as left_hip = "LHip"') from None
     for ours, theirs in table.items():
         if ours not in JOINT_NAMES:
-            raise MotionError(f"{file}: '{ours}' is none of our joints; they are {', '.join(JOINT_NAMES)}")
+            known = ", ".join(JOINT_NAMES)
+            raise MotionError(f"{file}: '{ours[:40]}' is none of our joints; they are {known}")
         if not isinstance(theirs, str) or not theirs or theirs not in names:
             near = get_close_matches(str(theirs), [name for name in names if name], n=3)
             hint = f"did you mean {' or '.join(near)}?" if near else "look into its hierarchy"
-            raise MotionError(f"{file}: {path.name} has no joint '{theirs}' for {ours}; {hint}")
+            raise MotionError(f"{file}: {path.name} has no joint '{str(theirs)[:40]}' for {ours}; {hint}")
     return table
 
 
