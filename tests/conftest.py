@@ -2,6 +2,7 @@
 
 import gc
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,7 +22,7 @@ def refused(capsys, tmp_path) -> Callable[..., str]:
     """
 
     def check(hint: str, main: Callable[..., int], *arguments: Any) -> str:
-        before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
+        before = _files(tmp_path)
         capsys.readouterr()
         try:
             status = main(*arguments)
@@ -29,7 +30,12 @@ def refused(capsys, tmp_path) -> Callable[..., str]:
             status = end.code
         out, error = capsys.readouterr()
         assert status == 2 and out == "" and error.count("\n") == 1 and hint in error, error
-        assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+        assert _files(tmp_path) == before
         return error
 
     return check
+
+
+def _files(folder: Path) -> dict[Path, int]:
+    """What lies in a folder, and when each file was last written."""
+    return {path: path.stat().st_mtime_ns if path.is_file() else 0 for path in folder.rglob("*")}
