@@ -160,3 +160,8 @@ def simulate_walk(garment: Garment, body: Body, frames: int = 30) -> Trajectory:
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
         start=scene.start, velocity=scene.start_velocity, pin_positions=scene.pin_positions,
     )  # fmt: skip
+
+
+def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)

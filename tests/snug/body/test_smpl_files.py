@@ -1,0 +1,215 @@
+"""A body of a user's file: every layout gives the same body, and what is broken is refused in one line."""
+
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix, csc_matrix
+from scipy.spatial.transform import Rotation
+
+from snug.body.skeleton import JOINT_NAMES, BodyError
+from snug.body.smpl_files import read_body
+from tests.snug.body.other_bodies import (
+    lowered,
+    other_mesh,
+    plain_arrays,
+    smpl_arrays,
+    volume,
+    with_hands,
+)
+
+
+@pytest.fixture(scope="module")
+def small(body):
+    """Another mesh, of 1000 vertices."""
+    return other_mesh(body, 1996)
+
+
+@pytest.fixture(scope="module")
+def layouts(small):
+    """Return arrays of the body layouts that users have: SMPL, SMPL-H, SMPL-X, A pose and plain."""
+    smpl = smpl_arrays(small)
+    return {
+        "SMPL": smpl,
+        "SMPL-H": with_hands(smpl, face=False),
+        "SMPL-X": with_hands(smpl, face=True),
+        "A pose": plain_arrays(lowered(small, 40.0)),
+        "plain": plain_arrays(small),
+    }
+
+
+def saved(path, arrays):
+    if path.suffix == ".pkl":
+        sparse = {k: csc_matrix(v) if k == "J_regressor" else v for k, v in arrays.items()}
+        path.write_bytes(pickle.dumps(sparse, protocol=2))
+    else:
+        np.savez(path, **arrays)
+    return path
+
+
+@pytest.mark.parametrize("ending", [".npz", ".pkl"])
+@pytest.mark.parametrize("layout", ["SMPL", "SMPL-H", "SMPL-X", "A pose", "plain"])
+def test_every_layout_gives_the_same_body(small, layouts, layout, ending, tmp_path):
+    user = read_body(saved(tmp_path / f"user{ending}", layouts[layout]))
+    np.testing.assert_allclose(user.template, small.template, atol=1e-12)
+    np.testing.assert_allclose(user.joint_template, small.joint_template, atol=1e-12)
+    np.testing.assert_allclose(user.skinning_weights, small.skinning_weights, atol=1e-12)
+    np.testing.assert_array_equal(user.faces, small.faces)
+    assert user.parents.tolist() == small.parents.tolist()
+    if layout.startswith("SMPL"):
+        betas = np.linspace(-1.0, 1.0, 10)
+        np.testing.assert_allclose(user.joints(betas), small.joints(betas), atol=1e-12)
+        np.testing.assert_allclose(user.shaped(betas), small.shaped(betas), atol=1e-12)
+    else:
+        assert user.shape_count == 0
+
+
+def test_shapes_of_an_a_pose_are_lifted_with_it(small, tmp_path):
+    """The person of a shape, in the A pose, has a T pose that skinning takes back to it."""
+    betas = np.array([1.0, -0.7, 0.4])
+    low = lowered(small, 40.0)
+    shapes = {"shapedirs": 0.02 * np.random.default_rng(0).normal(size=(*small.template.shape, 3))}
+    shapes["J_shapedirs"] = 0.01 * np.random.default_rng(1).normal(size=(24, 3, 3))
+    shapes["J_shapedirs"][:, 0] = 0.0
+    user = read_body(saved(tmp_path / "a.npz", plain_arrays(low) | shapes))
+    poses = np.zeros((1, 24, 3))
+    poses[0, [JOINT_NAMES.index("left_shoulder"), JOINT_NAMES.index("right_shoulder")], 2] = np.radians(
+        [-40.0, 40.0]
+    )
+    shift = (low.joint_template[0] - user.joint_template[0])[None]
+    back = user.vertices(poses, shift, betas)[0]
+    np.testing.assert_allclose(back, low.template + shapes["shapedirs"] @ betas, atol=1e-12)
+
+
+def test_pose_correctives_are_what_smpl_says(small, layouts, tmp_path):
+    """Rest pose: none. Posed: the rest shape that is skinned has moved by posedirs (R - I)."""
+    posedirs = 0.003 * np.random.default_rng(0).normal(size=(len(small.template), 3, 207))
+    user = read_body(saved(tmp_path / "a.npz", layouts["SMPL"] | {"posedirs": posedirs}))
+    still = np.zeros((1, 24, 3)), np.zeros((1, 3))
+    np.testing.assert_allclose(user.vertices(*still)[0], small.template, atol=1e-12)
+    poses = np.random.default_rng(1).normal(scale=0.5, size=(2, 24, 3))
+    turns = Rotation.from_rotvec(poses[:, 1:].reshape(-1, 3)).as_matrix().reshape(2, 23, 3, 3)
+    betas = np.linspace(-1.0, 1.0, 10)
+    posed = user.vertices(poses, np.zeros((2, 3)), betas)
+    for frame in range(2):
+        moved = posedirs @ (turns[frame] - np.eye(3)).ravel()
+        corrected = dataclasses.replace(small, template=small.template + moved)
+        expected = corrected.vertices(poses[frame : frame + 1], np.zeros((1, 3)), betas)[0]
+        np.testing.assert_allclose(posed[frame], expected, atol=1e-12)
+    assert np.abs(posed - small.vertices(poses, np.zeros((2, 3)), betas)).max() > 0.01
+
+
+def test_training_poses_the_body_with_its_correctives(small, tmp_path):
+    import torch
+
+    from snug.body.skinning import add_pose_correctives, skin
+
+    posedirs = 0.003 * np.random.default_rng(0).normal(size=(len(small.template), 3, 189))
+    user = dataclasses.replace(small, pose_directions=posedirs)
+    poses = np.random.default_rng(1).normal(scale=0.5, size=(2, 24, 3))
+    transforms = torch.as_tensor(user.transforms(poses, np.zeros((2, 3))))
+    rest, weights = (torch.as_tensor(a) for a in (user.template, user.skinning_weights))
+    rest = add_pose_correctives(rest, torch.as_tensor(posedirs), transforms, user.parents.tolist())
+    posed = skin(rest, weights, transforms).numpy()
+    np.testing.assert_allclose(posed, user.vertices(poses, np.zeros((2, 3))), atol=1e-12)
+
+
+def test_correctives_of_fingers_are_left_out(layouts, small, tmp_path):
+    posedirs = np.zeros((len(small.template), 3, 459))
+    posedirs[:, 0] = np.arange(459)
+    user = read_body(saved(tmp_path / "a.npz", layouts["SMPL-H"] | {"posedirs": posedirs}))
+    assert user.pose_directions[0, 0].tolist() == list(range(189))
+
+
+def test_the_eyes_of_a_head_are_closed(small, layouts, tmp_path):
+    sides = np.linalg.norm(np.diff(small.template[small.faces[:, [0, 1, 2, 0]]], axis=1), axis=2).sum(axis=1)
+    reach = np.bincount(small.faces.ravel(), np.repeat(sides, 3))
+    around = (small.faces == np.argmin(reach)).any(axis=1)
+    user = read_body(saved(tmp_path / "a.npz", layouts["SMPL"] | {"f": small.faces[~around]}))
+    assert volume(user.template, user.faces) == pytest.approx(volume(small.template, small.faces), rel=0.01)
+    edges = np.sort(user.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2)
+
+
+def test_quadrilaterals_become_triangles(small, layouts, tmp_path):
+    doubled = small.faces[:, [0, 1, 2, 2]]  # each falls into the triangle and one without area
+    with pytest.raises(BodyError, match="closed surface"):
+        read_body(saved(tmp_path / "a.npz", layouts["SMPL"] | {"f": doubled}))
+
+
+def changed(key, change):
+    def of(arrays):
+        array = np.array(arrays[key])
+        return {**arrays, key: change(array)}
+
+    return of
+
+
+def moved_joint(regressor):
+    regressor[18] *= 1e6
+    return regressor
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda a: {k: v for k, v in a.items() if k != "weights"}, "no array weights or blend_weights"),
+        (changed("weights", lambda w: w[:, :22]), "expected numbers of shape (1000, 24)"),
+        (changed("weights", lambda w: 2 * w), "sum to one"),
+        (changed("v_template", lambda v: v * np.nan), "not finite"),
+        (changed("v_template", lambda v: v * 1000), "in metres"),
+        (changed("v_template", lambda v: v * [1000, 1, 1]), "in metres"),
+        (changed("v_template", lambda v: v[:, [0, 2, 1]] * [1, 1, -1]), "in metres"),
+        (changed("v_template", lambda v: v * [-1, 1, -1]), "face +z"),
+        (changed("v_template", lambda v: v + np.array([0.5, 0, 0])), "beside x = 0"),
+        (changed("shapedirs", lambda s: s[:3]), "shapedirs"),
+        (lambda a: {k: v for k, v in a.items() if k != "J_regressor"}, "no joints"),
+        (lambda a: a | {"J_regressor": np.array([{"sparse": 1}], dtype=object)}, "plain arrays"),
+        (changed("J_regressor", moved_joint), "left_elbow"),
+        (changed("kintree_table", lambda t: np.full((2, 24), 30)), "hangs on 30"),
+        (changed("kintree_table", lambda t: t[:, :23]), "(2, 23)"),
+        (lambda a: a | {"f": a["f"][a["v_template"][a["f"], 1].min(axis=1) > 0.12]}, "a hole at vertex"),
+        (changed("f", lambda f: f[:, ::-1]), "inwards"),
+        (changed("f", lambda f: f + 1), "vertex 1000"),
+        (lambda a: a | {"rest_pose": np.full((24, 3), 0.2)}, "rest_pose"),
+        (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
+    ],
+    ids=range(20),
+)
+def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
+    path = saved(tmp_path / "broken.npz", change(layouts["SMPL"]))
+    with pytest.raises(BodyError) as caught:
+        read_body(path)
+    message = str(caught.value)
+    assert says in message and str(path) in message and "\n" not in message
+
+
+@pytest.mark.parametrize("name", ["kintree_table", "f", "weights", "v_template"])
+def test_what_need_not_be_sparse_is_refused_in_one_line(name, layouts, tmp_path):
+    arrays = layouts["SMPL"]
+    path = tmp_path / "sparse.pkl"
+    path.write_bytes(pickle.dumps(arrays | {name: coo_matrix(arrays[name])}))
+    with pytest.raises(BodyError, match=f"{name} is a sparse matrix; give a plain array"):
+        read_body(path)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "arrays", "says"),
+    [(75.0, {}, "to 60"), (40.0, {"posedirs": np.zeros((1000, 3, 207))}, "leave them out")],
+)
+def test_arms_that_hang_too_low_are_refused(small, tmp_path, degrees, arrays, says):
+    path = saved(tmp_path / "low.npz", plain_arrays(lowered(small, degrees)) | arrays)
+    with pytest.raises(BodyError, match=says):
+        read_body(path)
+
+
+@pytest.mark.parametrize("ending", [".npz", ".pkl"])
+@pytest.mark.parametrize("content", [None, b"", b"not a zip", b"PK\x03\x04 cut", b"\x93NUMPY\x01\x00", b"N."])
+def test_a_file_that_is_no_body_is_refused_in_one_line(tmp_path, content, ending):
+    path = tmp_path / f"body{ending}"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BodyError) as caught:
+        read_body(path)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
