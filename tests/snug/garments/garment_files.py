@@ -54,3 +54,8 @@ def doubled_along(positions, faces, cut):
     left = positions[faces].mean(axis=1)[:, 0] < 0
     faces[left] = copy[faces[left]]
     return np.concatenate([positions, positions[cut]]), faces
+
+
+def saved(tmp_path, garment, *, positions=None, faces=None, uv=None, name="mine.obj"):
+    positions = garment.rest_positions if positions is None else positions
+    return write_obj(tmp_path / name, positions, garment.faces if faces is None else faces, uv)

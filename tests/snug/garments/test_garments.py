@@ -7,14 +7,13 @@ import igl
 import numpy as np
 import pytest
 
-from snug.garments.cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
 from snug.garments.garment import GarmentError, smooth_weights
 from snug.garments.openings import name_openings
 from snug.garments.templates import GARMENT_TEMPLATES, find_template, tailor_tshirt, tailor_tunic
 from tests.reference_sim.meshes import edge_counts, girth
 from tests.snug.body.other_bodies import BODIES, other_mesh, simulate_walk
 
-WAIST = "spine1"
+KINDS = [pattern.name for pattern in GARMENT_TEMPLATES]
 
 
 @pytest.fixture(scope="session")
@@ -29,7 +28,7 @@ def wardrobe(body, shirts):
     return {"tshirt": shirts[1000], **others}
 
 
-@pytest.fixture(params=[pattern.name for pattern in GARMENT_TEMPLATES])
+@pytest.fixture(params=KINDS)
 def garment(request, wardrobe):
     return wardrobe[request.param]
 
@@ -52,8 +51,8 @@ def test_openings_are_named_by_their_place(body, garment):
         np.testing.assert_array_equal(found[name], loop)
 
 
-def waist(body):
-    return body.joint_template[body.joint_names.index(WAIST), 1]
+def at(body, name):
+    return body.joint_template[body.joint_names.index(name)]
 
 
 @pytest.mark.parametrize("count", [300, 1000, 2000, 4400])
@@ -92,16 +91,19 @@ def test_one_piece(garment):
     assert component.max() == 0
 
 
-@pytest.mark.parametrize("count", [300, 1000, 4400])
-def test_clear_of_the_body_at_vertices_and_within_triangles(body, shirts, count):
-    corners = shirts[count].rest_positions[shirts[count].faces]
+@pytest.mark.parametrize("which", [*KINDS, 300, 4400])
+def test_clear_of_the_body_at_vertices_and_within_triangles(body, shirts, wardrobe, which):
+    """Every sort at 1000 vertices, the T-shirt at others too."""
+    garment = wardrobe[which] if which in KINDS else shirts[which]
+    corners = garment.rest_positions[garment.faces]
     rng = np.random.default_rng(3)
     shares = rng.dirichlet(np.ones(3), size=len(corners))
     inside = np.einsum("fk,fkd->fd", shares, corners)
-    vertices = igl.signed_distance(shirts[count].rest_positions, body.template, body.faces)[0]
+    vertices = igl.signed_distance(garment.rest_positions, body.template, body.faces)[0]
     within = igl.signed_distance(inside, body.template, body.faces)[0]
-    assert vertices.min() >= 0.015 - 1e-9
-    assert within.min() >= 0.0145  # random points are not the samples that tailoring looks at
+    assert vertices.min() >= garment.parameters["clearance"] - 1e-9
+    # Random points are not the samples that tailoring looks at.
+    assert within.min() >= garment.parameters["clearance"] - 5e-4
 
 
 def test_faces_point_away_from_the_body(body, garment):
@@ -117,7 +119,7 @@ def test_faces_point_away_from_the_body(body, garment):
 def test_cut_lines_are_plane_and_even(body, shirt):
     points = shirt.rest_positions
     assert np.ptp(points[shirt.hem, 1]) < 1e-4
-    hip, ankle = (body.joint_template[body.joint_names.index(n), 1] for n in ("left_hip", "left_ankle"))
+    hip, ankle = (at(body, n)[1] for n in ("left_hip", "left_ankle"))
     assert ankle < points[shirt.hem, 1].mean() < hip
     assert np.ptp(points[shirt.loops["left_sleeve"], 0]) < 1e-4
     for loop in shirt.loops.values():
@@ -143,7 +145,7 @@ def test_the_tunic_is_longer_and_flares_by_what_is_asked(body, shirts):
     low = [girth(g.rest_positions, g.faces, 1, hem + 0.004) for g in (flared, straight)]
     # A little above the hem, where the cone is 4 mm of its height narrower; chords lose the rest.
     assert (low[0] - low[1]) / (2 * np.pi) == pytest.approx(0.045, abs=0.002)
-    above = [girth(g.rest_positions, g.faces, 1, waist(body) + 0.05) for g in (flared, straight)]
+    above = [girth(g.rest_positions, g.faces, 1, at(body, "spine1")[1] + 0.05) for g in (flared, straight)]
     assert above[0] == pytest.approx(above[1], abs=0.01)
 
 
@@ -159,7 +161,7 @@ def test_ease_is_girth_at_waist_and_cuff(body, shirts):
     """On a finer mesh, where a section's chords are close to its curve (at 1000 vertices they lose 1 cm)."""
     loose = shirts[2000]
     tight = tailor_tshirt(body, ease=0.0, vertices=2000)
-    at_waist = [girth(g.rest_positions, g.faces, 1, waist(body)) for g in (loose, tight)]
+    at_waist = [girth(g.rest_positions, g.faces, 1, at(body, "spine1")[1]) for g in (loose, tight)]
     assert at_waist[0] - at_waist[1] == pytest.approx(0.06, abs=0.003)
     # Steiner: a convex section grown by d is 2 pi d longer. Here the arm is convex; the chords
     # cost 2 mm. The waist is as wide as chest and hips ask.
@@ -168,13 +170,13 @@ def test_ease_is_girth_at_waist_and_cuff(body, shirts):
     assert girth(loose.rest_positions, loose.faces, 0, cuff) == pytest.approx(
         arm + 2 * np.pi * 0.015 + 0.06, abs=0.005
     )
-    assert at_waist[0] > girth(body.template, body.faces, 1, waist(body)) + 2 * np.pi * 0.015 + 0.06
+    assert at_waist[0] > girth(body.template, body.faces, 1, at(body, "spine1")[1]) + 2 * np.pi * 0.015 + 0.06
 
 
 def test_the_shirt_hangs_from_the_chest(body, shirt):
     """Not pressed into the waist, nor between the legs: below the chest girth does not shrink."""
     points, faces = shirt.rest_positions, shirt.faces
-    levels = np.linspace(points[shirt.hem, 1].mean() + 0.01, waist(body) + 0.15, 8)[::-1]
+    levels = np.linspace(points[shirt.hem, 1].mean() + 0.01, at(body, "spine1")[1] + 0.15, 8)[::-1]
     girths = [girth(points, faces, 1, level) for level in levels]
     assert np.diff(girths).min() > -0.01
     front = points[shirt.hem][:, 2] > 0
@@ -263,10 +265,6 @@ def another(body):
     return other_mesh(body, 5000)
 
 
-def at(body, name):
-    return body.joint_template[body.joint_names.index(name)]
-
-
 def test_every_kind_has_its_openings_and_no_other(garment):
     _, edges, counts = edge_counts(garment.faces)
     assert set(garment.loops) == OPENINGS[garment.name] and counts.max() == 2
@@ -279,11 +277,6 @@ def test_every_kind_has_its_openings_and_no_other(garment):
         assert np.sign(np.round(points[loop, 0].mean(), 6)) == side, name
     assert set(garment.pins) == set(garment.loops.get("waist", ()))
     assert len(garment.hem) == len(set(garment.hem.tolist())) > 0
-
-
-def test_every_kind_is_clear_of_the_body(body, garment):
-    distance = igl.signed_distance(garment.rest_positions, body.template, body.faces)[0]
-    assert distance.min() >= garment.parameters["clearance"] - 1e-9
 
 
 def test_legs_are_as_long_as_asked_and_each_follows_its_own(body, wardrobe):
@@ -330,50 +323,10 @@ def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
     assert np.allclose(dress.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", [pattern.name for pattern in GARMENT_TEMPLATES])
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_fits_another_mesh(another, kind):
     garment = find_template(kind).tailor(another, vertices=500)
     assert set(garment.loops) == OPENINGS[kind]
-
-
-def test_a_neck_is_cut_above_high_shoulders(body):
-    """Lower neck joint by 4 cm: then the shoulders are as high beside it as they are on other bodies."""
-    joints = body.joint_template.copy()
-    joints[body.joint_names.index("neck"), 1] -= 0.04
-    low = dataclasses.replace(body, joint_template=joints)
-    neck = neck_cut(low, 0.015)
-    assert neck.point[1] > joints[body.joint_names.index("neck"), 1] + 0.005
-    assert neck_cut(body, 0.015).point[1] == at(body, "neck")[1]
-    shirt = tailor_tshirt(low, vertices=500)
-    assert np.abs(shirt.rest_positions[shirt.loops["neck"], 0]).max() < neck.reach - 0.005
-
-
-def test_the_bend_of_a_cut_ends(body):
-    cut = CutPlane("neck", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), bend=3.0)
-    z = np.linspace(-0.5, 0.5, 2001)
-    points = np.stack([0 * z, 0 * z, z], axis=1)
-    height = cut.height(points)
-    near, far = np.abs(z) <= BEND_SPAN, np.abs(z) >= 2 * BEND_SPAN
-    assert np.array_equal(height[near], 3.0 * z[near] ** 2)
-    assert height[far] == pytest.approx(6.0 * BEND_SPAN**2)
-    slope = cut.normals(points)
-    assert slope[:, 2] / slope[:, 1] == pytest.approx(np.gradient(height, z), abs=4e-3)
-
-
-def test_a_corner_that_clipping_left_twice_counts_once():
-    """A square with a second corner 10 micrometres from one: on both cuts too."""
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [1e-6, 1, 0], [0, 1, 0], [0, 0.5, 0], [0.5, 1, 0],
-                       [0.5, 0, 0], [1, 0.5, 0], [0.5, 0.5, 0]])  # fmt: skip
-    ring = [0, 7, 1, 8, 2, 6, 3, 4, 5]
-    faces = np.array([[9, a, b] for a, b in zip(ring, np.roll(ring, -1), strict=True)])
-    cuts = [
-        SEAM_CUT,
-        CutPlane("top", (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
-        CutPlane("side", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        CutPlane("hem", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
-    ]
-    (loop,) = outlines(points, faces, cuts)
-    assert sorted(name for name, _ in loop) == ["hem", "seam", "side", "top"]
 
 
 def test_a_body_too_large_for_the_grid_is_refused_at_once(body):
@@ -388,7 +341,7 @@ def test_a_body_too_large_for_the_grid_is_refused_at_once(body):
 @pytest.mark.slow
 @pytest.mark.parametrize("vertices", [500, 1000])
 @pytest.mark.parametrize("wearer", BODIES)
-@pytest.mark.parametrize("kind", [pattern.name for pattern in GARMENT_TEMPLATES])
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_on_every_body_is_simulated(kind, wearer, vertices, tmp_path):
     simulated = simulate_walk(
         find_template(kind).tailor(BODIES[wearer](), vertices=vertices), BODIES[wearer]()

@@ -1,0 +1,49 @@
+"""Planes that cut a garment out of an offset surface: the neck, bends, corners on two cuts."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from snug.garments.cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
+from snug.garments.templates import tailor_tshirt
+
+
+def test_a_neck_is_cut_above_high_shoulders(body):
+    """Lower neck joint by 4 cm: then the shoulders are as high beside it as they are on other bodies."""
+    joints = body.joint_template.copy()
+    joints[body.joint_names.index("neck"), 1] -= 0.04
+    low = dataclasses.replace(body, joint_template=joints)
+    neck = neck_cut(low, 0.015)
+    assert neck.point[1] > joints[body.joint_names.index("neck"), 1] + 0.005
+    assert neck_cut(body, 0.015).point[1] == body.joint_template[body.joint_names.index("neck"), 1]
+    shirt = tailor_tshirt(low, vertices=500)
+    assert np.abs(shirt.rest_positions[shirt.loops["neck"], 0]).max() < neck.reach - 0.005
+
+
+def test_the_bend_of_a_cut_ends(body):
+    cut = CutPlane("neck", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), bend=3.0)
+    z = np.linspace(-0.5, 0.5, 2001)
+    points = np.stack([0 * z, 0 * z, z], axis=1)
+    height = cut.height(points)
+    near, far = np.abs(z) <= BEND_SPAN, np.abs(z) >= 2 * BEND_SPAN
+    assert np.array_equal(height[near], 3.0 * z[near] ** 2)
+    assert height[far] == pytest.approx(6.0 * BEND_SPAN**2)
+    slope = cut.normals(points)
+    assert slope[:, 2] / slope[:, 1] == pytest.approx(np.gradient(height, z), abs=4e-3)
+
+
+def test_a_corner_that_clipping_left_twice_counts_once():
+    """A square with a second corner 10 micrometres from one: on both cuts too."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [1e-6, 1, 0], [0, 1, 0], [0, 0.5, 0], [0.5, 1, 0],
+                       [0.5, 0, 0], [1, 0.5, 0], [0.5, 0.5, 0]])  # fmt: skip
+    ring = [0, 7, 1, 8, 2, 6, 3, 4, 5]
+    faces = np.array([[9, a, b] for a, b in zip(ring, np.roll(ring, -1), strict=True)])
+    cuts = [
+        SEAM_CUT,
+        CutPlane("top", (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        CutPlane("side", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        CutPlane("hem", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
+    ]
+    (loop,) = outlines(points, faces, cuts)
+    assert sorted(name for name, _ in loop) == ["hem", "seam", "side", "top"]
