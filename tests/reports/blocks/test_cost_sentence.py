@@ -1,0 +1,48 @@
+"""Sentence of page one on cost: how fast the network is, and what beats it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from reports.blocks import page_one_sentences
+from tests.reports.report_folder import row as any_row
+from tests.reports.report_folder import run_of
+from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
+
+
+def test_run_times_on_page_one_are_of_the_garment_compared():
+    rows = all_rows() + [row("skirt/stop", m, "cost/frame", 500.0, "ms") for m in ("snug", "simulation")]
+    assert cost_sentence(run_of(rows)).startswith(
+        "SNUG takes 0.250 ms a frame on one core in 2 scenes, the simulation 400 times as long. SNUG has an "
+    )
+
+
+def test_nothing_is_nearer_of_those_that_were_looked_at():
+    numbers = {"snug": ("a", "b"), "pbns": ("a",)}
+    rows = [
+        any_row(scene, method, metric, value / (1 + (method == "pbns")), suite="speed")
+        for method, scenes in numbers.items()
+        for scene in scenes
+        for metric, value in (("gap/energy", 2.0), ("cost/frame", 4.0))
+    ]
+    run = run_of(rows)
+    frame = run.cells("speed", "garments")
+    (sentence,) = page_one_sentences._rivals(run, frame, ["a", "b"])
+    others = "of the methods measured in all of these scenes, none is as fast with a smaller gap"
+    assert sentence.endswith(others)
+    assert page_one_sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
+
+
+def test_a_rival_within_the_uncertainty_of_the_reference_is_as_near():
+    rows = [
+        dataclasses.replace(
+            row(SCENES[0], method, metric, value), uncertainty=None if metric == "cost/frame" else 0.3
+        )
+        for method, time, error in (("snug", 1.0, 5.3), ("pbns", 0.5, 5.0), ("newton-1", 12.0, 1.0))
+        for metric, value in (("cost/frame", time), ("gap/energy", error))
+    ]
+    rows += [row(SCENES[0], "simulation", "cost/frame", 100.0, "ms")]
+    sentence = cost_sentence(run_of(rows))
+    assert "PBNS is no slower and has an energy gap of 5.00 J, below the 5.30 J of SNUG, by less" in sentence
+    sure = [dataclasses.replace(r, uncertainty=0.1 if r.uncertainty else None) for r in rows]
+    assert "below the 5.30 J of SNUG. The fastest" in cost_sentence(run_of(sure))

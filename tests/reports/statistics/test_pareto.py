@@ -1,0 +1,95 @@
+"""Points of run time and error: fronts, what beats what, and how run times scatter."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from reports.statistics.pareto import (
+    Point,
+    beaten_by,
+    fastest,
+    front,
+    overtaken,
+    points_of,
+    solvers,
+    truncated,
+)
+from tests.reports.report_folder import run_of
+from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
+
+
+def test_the_front_holds_those_that_nothing_beats():
+    points = [Point("a", 1.0, 5.0), Point("b", 2.0, 6.0), Point("c", 3.0, 1.0), Point("d", 3.0, 2.0)]
+    assert [p.method for p in front(points)] == ["a", "c"]
+    assert fastest(points, 2.0) == points[2]
+    assert fastest(points, 0.5) is None
+
+
+def test_points_need_every_scene():
+    run = run_of(all_rows())
+    everywhere = points_of(run, run.cells("speed"), ["sheet", *SCENES], "gap/energy")
+    assert [p.method for p in everywhere] == ["simulation", "newton-1", "newton-4"]
+    worn = points_of(run, run.cells("speed"), SCENES, "gap/energy")
+    alone = {"newton-1", "newton-4", "lbfgs-5", "lbfgs-20"}
+    assert {p.method for p in solvers(run, worn)} == {"simulation", *alone}
+    assert {p.method for p in truncated(run, worn)} == alone
+
+
+def test_a_run_time_spreads_as_its_repeats_do_else_as_its_seeds():
+    rows = [row(SCENES[0], "newton-1", m, v) for m, v in (("cost/frame", 10.0), ("gap/energy", 0.2))]
+    rows += [
+        dataclasses.replace(row(SCENES[0], "snug", metric, value), seed=seed)
+        for seed, time in ((0, 1.0), (1, 3.0))
+        for metric, value in (("cost/frame", time), ("gap/energy", 0.1))
+    ]
+    run = run_of(rows)
+    points = points_of(run, run.cells("speed"), SCENES[:1], "gap/energy")
+    spreads = {p.method: p.time_spread for p in points}
+    assert spreads == {"newton-1": 0.0, "snug": pytest.approx(2.0 * 2.0**0.5)}  # twice the deviation
+    rows.append(row(SCENES[0], "newton-1", "cost/spread", 25.0, "%"))
+    run = run_of(rows)
+    (again,) = solvers(run, points_of(run, run.cells("speed"), SCENES[:1], "gap/energy"))
+    assert again.time_spread == 2.5  # [ms] from the fastest repeat to the slowest
+
+
+def test_as_fast_is_within_the_scatter_of_run_times():
+    point, twin = Point("snug", 0.350, 4.2, 0.008), Point("supervised", 0.357, 3.7, 0.006)
+    assert overtaken(point, [twin]) and beaten_by([point, twin], point) is twin
+    assert not overtaken(twin, [point])  # which is less accurate
+    slower = dataclasses.replace(twin, time=0.361)
+    assert not overtaken(point, [slower]) and beaten_by([point, slower], point) is None
+    assert not overtaken(
+        Point("snug", 0.350, 4.2), [Point("supervised", 0.357, 3.7)]
+    )  # no repeats: no scatter
+
+
+def test_a_rival_is_no_faster_for_repeats_that_scatter():
+    point, wide = Point("snug", 1.36, 0.53, 0.1), Point("snug+lbfgs-1", 19.1, 0.32, 19.6)
+    assert beaten_by([point, wide], point) is None
+    shaky = dataclasses.replace(point, time_spread=20.0)
+    assert beaten_by([shaky, wide], shaky) is None
+    rows = [row(SCENES[0], "snug", "cost/spread", 10.0, "%")] + [
+        row(SCENES[0], method, metric, value)
+        for method, time, gap in (("snug", 1.0, 0.3), ("pbns", 1.05, 0.2), ("newton-1", 12.0, 0.1))
+        for metric, value in (("cost/frame", time), ("gap/energy", gap))
+    ]
+    rows += [row(SCENES[0], "simulation", "cost/frame", 100.0, "ms")]
+    assert "PBNS is no slower within repeats and has an energy gap of 0.200 J, below" in cost_sentence(
+        run_of(rows)
+    )
+
+
+def test_a_point_is_of_the_seeds_that_did_every_scene():
+    rows = [
+        dataclasses.replace(row(scene, "snug", metric, value), seed=seed)
+        for seed, values in ((0, (1.0, 3.0)), (1, (9.0, None)))
+        for scene, value in zip(SCENES, values)
+        for metric in ("cost/frame", "gap/energy")
+        if value is not None
+    ]
+    gone = {"value": None, "seed": 1, "status": "diverged", "reason": "no end"}
+    rows.append(dataclasses.replace(row(SCENES[1], "snug", "cost/frame", 0.0), **gone))
+    (found,) = points_of(run_of(rows), run_of(rows).frame, SCENES, "gap/energy")
+    assert (found.time, found.error, found.fewer) == (2.0, 2.0, " (2 of 4 roll-outs)")

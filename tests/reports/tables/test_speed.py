@@ -1,0 +1,89 @@
+"""Tables of suite speed: crossings, rivals, uncertainty of the reference."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from reports.statistics.break_even import compared_scenes
+from reports.tables import make_tables
+from reports.tables.speed import crossings, error_rivals, reference_uncertainty
+from tests.reports.report_folder import run_of
+from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
+
+
+def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_room_for(tmp_path):
+    more = [f"snug-{k}" for k in range(9)]
+    costs = (("cost/frame", 0.25), ("cost/train", 9.0), ("cost/data", 0.0))
+    rows = [
+        dataclasses.replace(row(scene, method, *cost), role="ablation")
+        for scene in SCENES
+        for method in more
+        for cost in costs
+    ]
+    (table,) = crossings(run_of(all_rows() + rows))
+    assert {line[1] for line in table.rows} == {"snug", *more}
+
+
+def test_every_network_has_its_crossings_in_a_table():
+    (table,) = crossings(run_of(all_rows()))
+    found = {line[2]: line[4:6] for line in table.rows}
+    assert {line[2]: line[3] for line in table.rows}["lbfgs-20"] == "energy gap"
+    assert {line[1] for line in table.rows} == {"snug"}
+    assert found["simulation"] == (2000.0, pytest.approx(200.5, rel=1e-3))
+    assert {line[2]: line[6:] for line in table.rows}["simulation"] == (pytest.approx(200.0), 400.0)
+    assert found["lbfgs-20"][0] == 13000.0 and set(found) == {"simulation", "lbfgs-20", "lbfgs-5"}
+    others = run_of([r for r in all_rows() if "snug" not in r.method])
+    assert crossings(others) == error_rivals(others) == []
+
+
+def test_garments_have_crossings_by_themselves():
+    rows = all_rows()
+    # Where no truncated solver was timed, nothing says how fast a solver as good would be.
+    rows += [dataclasses.replace(r, scene="skirt/stop", garment="skirt") for r in rows if r.method == "snug"]
+    rows += [
+        dataclasses.replace(r, scene="tunic/stop", garment="tunic", value=4.0 * r.value)
+        for r in rows
+        if r.scene == SCENES[0]
+    ]
+    run = run_of(rows)
+    assert list(compared_scenes(run, run.cells("speed"))) == ["tshirt", "tunic"]
+    (table,) = crossings(run)
+    found = {line[0]: line[4] for line in table.rows if line[2] == "simulation"}
+    assert found == {"tshirt": 2000.0, "tunic": 2000.0}
+
+
+def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():
+    run = run_of(all_rows())
+    assert cost_sentence(run).endswith(
+        " SNUG has an energy gap, the energy above the minimum of each time step, of 0.100 J; no other "
+        "method is as fast with a smaller gap. The fastest solver stopped early with as small an energy gap "
+        "is L-BFGS, 20 iterations, 16.0 ms a frame."
+    )
+    (table,) = error_rivals(run)
+    assert table.rows == (
+        ("Energy gap", 0.1, 0.25, "", None, None, "lbfgs-20", 16.0),
+        ("Curvature error [1/m]", 5.0, 0.25, "skinning", 4.5, 0.1, "lbfgs-5", 4.0),
+    )
+    (table,) = crossings(run)
+    paid = {line[2]: (line[4], line[6]) for line in table.rows}
+    assert paid == {method: (frames, 200.0) for method, frames in
+                    (("simulation", 2000.0), ("lbfgs-20", 13000.0), ("lbfgs-5", 53000.0))}  # fmt: skip
+
+
+def test_the_reference_has_its_uncertainty_and_its_error_in_time_in_a_table():
+    more = {"role": "reference-variant", "family": "simulation-dt", "level": 4.0}
+    rows = [dataclasses.replace(row(SCENES[0], "simulation-dt-4", "distance/rms", 30.0, "mm"), **more)]
+    (table,) = reference_uncertainty(run_of(all_rows() + rows))
+    assert [column.name for column in table.columns] == ["of", "curvature/error", "distance/rms"]
+    assert table.rows == (
+        ("ensemble of the reference, root mean square", None, 21.0), ("4 steps a frame", None, 30.0),
+        ("SNUG", 5.0, 50.0),
+    )  # fmt: skip
+
+
+def test_a_run_of_suite_speed_alone_has_its_methods_on_page_one():
+    made = make_tables(run_of(all_rows()))["overview"]
+    assert {"simulation", "snug", "skinning"} < {line[0] for line in made.rows}
+    assert "None" not in made.caption and all(scene in made.caption for scene in SCENES)
