@@ -17,7 +17,7 @@ from benchmarks.submit import entry as entries
 from benchmarks.submit.__main__ import main
 from benchmarks.submit.entry import read_entry
 from snug.motion.library import TEST
-from tests.benchmarks.runner.tasks_by_hand import InProcess
+from tests.benchmarks.runner.tasks_by_hand import run_in_this_process
 
 SUBMISSIONS = Path(__file__).resolve().parents[2] / "submissions"
 FOLDERS = sorted(path.parent for path in SUBMISSIONS.glob("*/entry.toml"))
@@ -39,10 +39,7 @@ roll_outs = "{{scene}}.npz"
 def small():
     """One small scene stands for the eight, and every task is run in this process."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "benchmarks.runner.execute_plan.LocalExecutor",
-            lambda folder, assets, _: InProcess(folder, assets),
-        )
+        run_in_this_process(patch)
         patch.setattr(entries, "PRESET", find_preset("smoke"))
         patch.setattr(entries, "SCENES", (SCENE,))
         yield

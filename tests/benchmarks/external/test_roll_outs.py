@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import time
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +14,7 @@ from benchmarks.external.roll_out_option import (
     FileConventions,
     RollOutFileError,
     RollOutOption,
-    parse_roll_out,
 )
-from benchmarks.external.vertex_correspondence import same_topology
-from benchmarks.meshes import torus
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
@@ -257,31 +253,6 @@ def test_vertices_without_triangles_are_matched_by_the_start_alone(tmp_path):
         rows(path, match_vertices=True)
 
 
-@pytest.mark.parametrize("flip", [False, True])
-def test_a_symmetric_mesh_is_laid_on_itself_where_it_is_nearest(flip):
-    i, j = np.meshgrid(np.arange(6), np.arange(6), indexing="ij")
-    points = np.stack([i, j, 0 * i], axis=-1).reshape(-1, 3).astype(float)
-    a = (i[:-1, :-1] * 6 + j[:-1, :-1]).ravel()
-    faces = np.concatenate([np.stack([a, a + 6, a + 7], 1), np.stack([a, a + 7, a + 1], 1)])
-    two = np.concatenate([faces, faces + 36])  # two pieces of the same form
-    both = np.concatenate([points, points + np.array([9.0, 0.0, 0.0])])
-    order = RANDOM.permutation(72)
-    theirs = np.argsort(order)[two][RANDOM.permutation(len(two))]
-    found = same_topology(theirs[:, ::-1] if flip else theirs, two, both[order], both)
-    assert np.array_equal(order[found], np.arange(72))
-    theirs[0] = theirs[0, [1, 0, 2]]
-    assert same_topology(theirs[:-1], two, both[order], both) is None
-
-
-def test_a_mesh_with_a_thousand_symmetries_is_laid_on_itself_in_a_moment():
-    points, faces, _ = torus(24, 0.3, 0.1)
-    order = RANDOM.permutation(len(points))
-    clock = time.perf_counter()
-    found = same_topology(np.argsort(order)[faces], faces, points[order] + 0.01, points)
-    assert np.array_equal(order[found], np.arange(len(points)))
-    assert time.perf_counter() - clock < 10.0
-
-
 # --- damaged files ---------------------------------------------------------------------------------------
 
 
@@ -330,26 +301,3 @@ def test_a_pickle_that_would_run_code_does_not(tmp_path):
     with pytest.raises(RollOutFileError, match=r"mine\.pkl"):
         read_roll_out(tmp_path / "mine.pkl")
     assert not (tmp_path / "ran").exists()
-
-
-# --- the option ------------------------------------------------------------------------------------------
-
-
-def test_an_option_says_everything_of_a_roll_out():
-    assert parse_roll_out("mine=a.npz,other-mesh").stated.other_mesh
-    option = parse_roll_out("mine=out/{scene}.pc2,units=cm,up=z,fps=60,match-vertices,ms=2.2")
-    assert option == RollOutOption("mine", "out/{scene}.pc2", FileConventions("cm", "z", 60.0, True), 2.2)
-    assert option.path_for("tshirt/kick") == "out/tshirt-kick.pc2"
-    assert entry_of(option, "tshirt/kick") is None  # there is no file for that scene
-
-
-@pytest.mark.parametrize(
-    ("text", "hint"),
-    [("mine", "NAME=FILE"), ("=a.npz", "NAME=FILE"), ("a b=a.npz", "letters"), ("m=a.npz,x", "unknown word"),
-     ("m=a.npz,units=inch", "choose from m, cm, mm"), ("m=a.npz,fps=fast", "no number"),
-     ("m=a.npz,fps=-1", "positive"), ("m=a.npz,ms=0", "positive")],
-)  # fmt: skip
-def test_a_wrong_option_is_one_line(text, hint):
-    with pytest.raises(RollOutFileError, match=hint) as refused:
-        parse_roll_out(text)
-    assert "\n" not in str(refused.value)

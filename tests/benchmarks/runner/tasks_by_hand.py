@@ -6,6 +6,7 @@ import dataclasses
 import time
 
 import numpy as np
+import pytest
 
 from benchmarks.assets.assets import Assets
 from benchmarks.methods.catalogue.trainings import TRAININGS
@@ -88,3 +89,10 @@ class InProcess:
 
     def close(self):
         self._named.clear()
+
+
+def run_in_this_process(patch: pytest.MonkeyPatch) -> None:
+    """Let runs do every task in this process: none is begun, and nothing is compiled again."""
+    patch.setattr(
+        "benchmarks.runner.execute_plan.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
+    )

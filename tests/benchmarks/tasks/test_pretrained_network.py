@@ -29,7 +29,7 @@ from benchmarks.training import Training
 from snug import trained
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import PBNS
-from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, context, dressed_scene
+from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, run_in_this_process
 from tests.benchmarks.tasks.test_cell_tasks import TINY, plan_of
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -180,9 +180,7 @@ def test_the_option_takes_the_package_or_a_folder(tmp_path):
 def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp_path, monkeypatch, capsys):
     packaged = tmp_path / "packaged"
     monkeypatch.setattr(training_run, "FOLDER", packaged)
-    monkeypatch.setattr(
-        "benchmarks.runner.execute_plan.LocalExecutor", lambda folder, assets, _: InProcess(folder, assets)
-    )
+    run_in_this_process(monkeypatch)
     monkeypatch.setattr(Plan, "open_assets", lambda plan: assets_of(tube_dress(), WALK))
     requests = []
 

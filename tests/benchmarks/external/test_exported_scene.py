@@ -1,0 +1,203 @@
+"""A scene is exported, made elsewhere and read back: the numbers are those of a run."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from benchmarks import export
+from benchmarks.external.exported_scene import write_scene
+from benchmarks.external.roll_out_option import FileConventions, RollOutOption
+from benchmarks.external.scene_files import write_obj
+from benchmarks.external.scene_fit import expected_positions
+from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods.outside.stored_roll_out import entry_of
+from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metrics.energies.energy import energy_series
+from benchmarks.metrics.surface.curvature import curvature_series
+from benchmarks.tasks.metric_task import measured
+from reference_sim import Trajectory
+from reference_sim.files.mesh_files import read_mesh
+from snug.motion.files import read_motion
+from snug.motion.options import MotionFileOptions
+from snug.networks.dressed_body import DressedBody
+from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene
+from tests.snug.training.dressing import swaying, tube_dress
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """The files of a dressed scene, the scene, and nothing else."""
+    tube, motion = tube_dress(), swaying(12)
+    garment = dataclasses.replace(tube.garment, loops={"hem": np.arange(15), "neck": np.arange(135, 150)})
+    assets = assets_of(DressedBody(tube.body, garment), motion)
+    declared = dataclasses.replace(
+        dressed_scene("sway"), options={"settle_frames": 4, "warm_up_frames": 2}, sizes=()
+    )
+    built = declared.build(assets)
+    start = built.start_state
+    scene = dataclasses.replace(built, settle=lambda: start)
+    folder = tmp_path_factory.mktemp("home") / "scene"
+    score_command = "python -m benchmarks.score mine.npz"
+    write_scene(folder, declared, scene, preset="smoke", score=score_command, simulation=None)
+    return folder, scene
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as stored:
+        return dict(stored)
+
+
+def rodrigues(poses: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) of axis-angles (..., 3), by the matrix exponential."""
+    return expm(np.cross(np.eye(3), poses[..., None, :]))
+
+
+def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray:
+    """Linear blend skinning from the exported files alone. turn: from the motion's axes to y up."""
+    given, moved = arrays(folder / "skinning.npz"), arrays(folder / motion)
+    joints, parents = given["joints"], given["parents"]
+    frames = len(moved["poses"])
+    local = rodrigues(moved["poses"].reshape(frames, -1, 3))
+    world, at = np.empty((frames, 24, 3, 3)), np.empty((frames, 24, 3))
+    for j, parent in enumerate(parents):
+        own = (
+            local[:, j]
+            if j < 22 or motion == "motion_smpl.npz"
+            else np.broadcast_to(np.eye(3), (frames, 3, 3))
+        )
+        if parent < 0:
+            world[:, j], at[:, j] = own, joints[j] + moved["trans"]
+        else:
+            world[:, j] = world[:, parent] @ own
+            at[:, j] = at[:, parent] + world[:, parent] @ (joints[j] - joints[parent])
+    local = given["rest_positions"][:, None] - joints  # (V,24,3)
+    placed = np.einsum("tjab,vjb->tvja", world, local) + at[:, None]
+    return np.einsum("vj,tvja->tva", given["smoothed_weights"], placed) @ turn.T
+
+
+def measured_of(scene, path: Path) -> dict:
+    """Its rows beside the simulation's, a second opinion left out."""
+    entry = entry_of(RollOutOption("mine", str(path), FileConventions()), scene.name)
+    method = entry.make(models=Path(), seed=0)
+    method.prepare(scene)
+    return rows_beside(scene, entry, method.run(), method.quasi_static())
+
+
+def rows_beside(scene, entry, trajectory, static) -> dict:
+    group = SceneRollOuts(scene)
+    group.quasi_static = expected_positions(scene)
+    fall = Trajectory(group.quasi_static + 0.01, trajectory.faces, trajectory.times)
+    held = None if static is None else static.positions
+    for one, made, own in ((find_method("simulation"), fall, None), (entry, trajectory, held)):
+        group.roll_outs.append(RollOut(group, one, made, suites=("garments",), quasi_static=own))
+    return measured(group.roll_outs[1])[0]
+
+
+def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home, tmp_path):
+    folder, scene = home
+    inside = find_method("skinning").make(models=Path(), seed=0)
+    inside.prepare(scene)
+    own = inside.run()
+    expected = rows_beside(scene, find_method("skinning"), own, inside.quasi_static())
+    elsewhere = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
+    assert np.abs(elsewhere - own.positions).max() < 1e-6  # the method computes in float32
+    np.savez(tmp_path / "mine.npz", positions=elsewhere, fps=30.0, quasi_static=elsewhere)
+    found = measured_of(scene, tmp_path / "mine.npz")
+    assert found.keys() == expected.keys() and len(found) > 25
+    for name, value in expected.items():
+        np.testing.assert_allclose(found[name], value, rtol=2e-3, atol=2e-5, err_msg=name)
+    # The very positions of the method, by way of a file: to the last digit.
+    np.savez(tmp_path / "own.npz", positions=own.positions, fps=30.0, quasi_static=own.positions)
+    assert measured_of(scene, tmp_path / "own.npz") == expected
+    # Without its answer to poses held still, what needs that is left out and nothing else.
+    np.savez(tmp_path / "less.npz", positions=own.positions)
+    less = measured_of(scene, tmp_path / "less.npz")
+    assert {name.partition("/")[0] for name in expected.keys() - less.keys()} <= {"dynamics"}
+    assert "dynamics/quasi_static_difference" not in less and less.items() <= expected.items()
+
+
+def test_the_motion_as_amass_has_it_is_the_same_motion(home):
+    folder, _ = home
+    y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    turned = skinned_elsewhere(folder, "motion_amass.npz", y_up)
+    assert np.abs(turned - skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))).max() < 1e-12
+    read = read_motion(folder / "motion_amass.npz", MotionFileOptions())
+    assert np.abs(read.poses[:, :20] - swaying(12).poses[:, :20]).max() < 1e-12 and read.fps == 30.0
+
+
+def test_what_is_exported_is_the_scene(home):
+    folder, scene = home
+    cloth, obstacle = arrays(folder / "cloth.npz"), arrays(folder / "obstacle.npz")
+    assert np.array_equal(cloth["start_positions"], scene.start) and np.array_equal(
+        cloth["masses"], scene.cloth.masses
+    )
+    assert np.array_equal(obstacle["positions"], scene.obstacle.positions)
+    rest = read_mesh(folder / "rest.obj")
+    assert np.array_equal(rest.positions, scene.cloth.rest_positions)
+    assert np.array_equal(rest.faces, scene.cloth.faces)
+    facts = json.loads((folder / "scene.json").read_text())
+    assert facts["material"]["young_modulus"] == 70e3 and facts["energies"]["collision"]["margin_m"] == 0.004
+    assert (facts["fps"], facts["frames"], facts["warm_up_frames"]) == (30.0, 12, 2)
+    text = (folder / "README.txt").read_text()
+    assert all(path.name in text for path in folder.iterdir() if path.name != "README.txt")
+    assert not list(folder.parent.glob(".*part"))
+
+
+def exported(folder: Path):
+    """The class of docs/scene-files.md, as it stands there, opened on an exported folder."""
+    page = (Path(__file__).parents[3] / "docs" / "scene-files.md").read_text()
+    names: dict = {}
+    exec(page[page.index("import json") :].partition("```")[0], names)
+    return names["Exported"](folder)
+
+
+@pytest.mark.parametrize("name", ["skinning", "simulation", "sunk"])
+def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name):
+    """In numpy, by the code of the documents, which shares nothing with that of the project."""
+    folder, scene = home
+    if name == "sunk":  # vertices of all depths, some of them below skin that they must not meet
+        positions = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
+        positions += np.random.default_rng(0).normal(0, 0.03, positions.shape)
+    else:
+        method = find_method(name).make(models=Path(), seed=0)
+        method.prepare(scene)
+        positions = method.run().positions
+    ours, files = energy_series(scene, [positions])[0], exported(folder)
+    curvature = curvature_series(positions, scene.cloth.faces).means()
+    for frame in (0, 2, 7):
+        x, last, last_but_one = (positions[max(frame - i, 0)] for i in range(3))
+        found = {
+            "strain": files.strain(x), "bending": files.bending(x), "gravity": files.gravity(x, frame),
+            "inertia": files.inertia(x, last, last_but_one) if frame > 1 else 0.0,
+            "collision": files.collision(x, frame),
+        }  # fmt: skip
+        assert found.keys() | {"total"} == ours.keys() and (name != "sunk" or found["collision"] > 0)
+        for term, value in found.items():
+            np.testing.assert_allclose(value, ours[term][frame], rtol=1e-10, err_msg=f"{term}, {frame}")
+        np.testing.assert_allclose(sum(found.values()), ours["total"][frame], rtol=1e-10)
+        np.testing.assert_allclose(files.mean_curvature(x), curvature[frame], rtol=1e-10)
+
+
+def test_a_uv_of_corners_is_written_into_the_mesh(tmp_path):
+    positions, faces = np.eye(3), np.array([[0, 1, 2]])
+    write_obj(tmp_path / "a.obj", positions, faces, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]]))
+    assert (tmp_path / "a.obj").read_text().endswith("vt 0.0 0.5\nf 1/1 2/2 3/3\n")
+
+
+def test_scenes_without_a_body_are_exported_too(tmp_path, capsys):
+    assert export.main(["flag", "--preset", "smoke", "-o", str(tmp_path / "flag"), "--reference"]) == 0
+    cloth = arrays(tmp_path / "flag" / "cloth.npz")
+    assert cloth["pin_positions"].shape == (10, 7, 3) and len(cloth["pins"]) == 7
+    assert not (tmp_path / "flag" / "obstacle.npz").exists()
+    reference = Trajectory.load(tmp_path / "flag" / "reference.vtkhdf")
+    assert np.array_equal(arrays(tmp_path / "flag" / "reference.npz")["positions"], reference.positions)
+    assert export.main(["flag", "--preset", "smoke", "-o", str(tmp_path / "flag")]) == 2
+    assert export.main(["flags", "--preset", "smoke", "-o", str(tmp_path / "other")]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["flag"]
+    assert capsys.readouterr().err.count("\n") == 2
