@@ -6,58 +6,23 @@ import numpy as np
 import pytest
 import torch
 
-from reference_sim import GRAVITY, Cloth, Material, Potential, Result, minimise
+from reference_sim import GRAVITY, Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
 from reference_sim.minimise import MINIMISERS, STATUSES, make_minimiser
-from reference_sim.minimise.lbfgs_history import LBFGSHistory
 from reference_sim.minimise.newton import NewtonRun
-from tests.reference_sim.meshes import grid, patch, random_rotation
+from tests.reference_sim.meshes import patch, random_rotation
+from tests.reference_sim.minimise.minima import (
+    FACES,
+    SHEET,
+    TOLERANCE,
+    assert_minimum,
+    free_hessian,
+    gradient_by_torch,
+    hanging,
+)
 
 both = pytest.mark.parametrize("method", MINIMISERS)
-TOLERANCE = 1e-6  # relative residual, the default that a result promises
-SHEET, FACES = grid(8, 8, width=0.5, depth=0.5)
 SIDES = np.flatnonzero((SHEET[:, 0] == 0) | (SHEET[:, 0] == 0.5))
-
-
-def hanging() -> tuple[Potential, np.ndarray]:
-    cloth = Cloth(SHEET, FACES, pins=[0, 8])
-    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]), SHEET
-
-
-def gradient_by_torch(potential: Potential, x: np.ndarray) -> np.ndarray:
-    """(V, 3) [N] from the definitions alone."""
-    variable = torch.as_tensor(x).clone().requires_grad_(True)
-    sum(energy.energy(variable).sum() for energy in potential.energies).backward()
-    return variable.grad.numpy()
-
-
-def free_hessian(potential: Potential, x: np.ndarray) -> np.ndarray:
-    """Dense, over the free vertices, from the definitions alone."""
-    total = np.zeros((x.size, x.size))
-    for energy in potential.energies:
-        for stencil, block in zip(energy.stencils, Energy.hessian_blocks(energy, x)):
-            places = (3 * stencil[:, None] + np.arange(3)).ravel()
-            total[np.ix_(places, places)] += block
-    free = np.setdiff1d(np.arange(len(x)), potential.cloth.pins)
-    rows = (3 * free[:, None] + np.arange(3)).ravel()
-    return total[np.ix_(rows, rows)]
-
-
-def assert_minimum(potential: Potential, x0: np.ndarray, result: Result) -> None:
-    """Pins still, gradient small and no negative curvature, by another way than the minimiser's own."""
-    x, pins = result.positions, potential.cloth.pins
-    assert result.status == "converged", result.reason
-    assert (x[pins] == x0[pins]).all() and np.isfinite(x).all()
-    gradient = gradient_by_torch(potential, x)
-    gradient[pins] = 0
-    norm = np.abs(gradient).max() / (potential.cloth.masses.mean() * GRAVITY)
-    assert norm <= TOLERANCE
-    # The two gradients differ by round-off of forces of 1 N in vertices of 1e-3 N.
-    assert result.gradient_norm == pytest.approx(norm, abs=1e-9)
-    values = np.linalg.eigvalsh(free_hessian(potential, x))
-    assert values[0] > -1e-10 * values[-1]
-    assert result.energy == pytest.approx(potential.value(x), rel=1e-12, abs=1e-20)
-    assert sum(result.terms.values()) == pytest.approx(result.energy, rel=1e-9, abs=1e-20)
 
 
 @both
@@ -325,27 +290,6 @@ def test_no_matrix_is_factorised_twice_and_no_step_measured_twice():
     assert len(set(asked)) == len(asked) >= 25
 
 
-def test_without_a_preconditioner_newton_takes_over_at_once():
-    potential, x = hanging()
-    minimiser = make_minimiser(potential, "lbfgs")
-    minimiser.preconditioner.factorise = lambda data: False
-    assert_minimum(potential, x, minimiser.minimise(x))
-    alone = make_minimiser(potential, "lbfgs", finish=False)
-    alone.preconditioner.factorise = lambda data: False
-    assert alone.minimise(x).status == "stalled"
-
-
-def test_lbfgs_and_its_finish_share_iterations_and_clock(monkeypatch):
-    potential, x0 = hanging()
-    result = minimise(potential, x0, "lbfgs", max_iterations=30, patience=20)
-    assert (result.status, result.iterations) == ("max_iterations", 30)
-    ticks = iter(range(100_000))
-    monkeypatch.setattr("time.perf_counter", lambda: float(next(ticks)))  # a second for every look at it
-    cut = minimise(potential, x0, "lbfgs", patience=10, switch=1e-6, timeout=90)
-    assert cut.status == "timeout" and cut.iterations > 10
-    assert next(ticks) < 90 + 40
-
-
 def test_a_watchdog_ends_when_time_is_up(monkeypatch):
     """A sheet 1e4 times as stiff as cotton goes up to 40 steps before it looks back."""
     cloth = Cloth(SHEET, FACES, Material(young_modulus=7e8), pins=[0, 8])
@@ -362,26 +306,3 @@ def test_unknown_names_are_refused():
         minimise(potential, x0, "bfgs")
     with pytest.raises(TypeError, match="tolerence"):
         minimise(potential, x0, tolerence=1e-3)
-
-
-@pytest.mark.parametrize("memory", [0, 1, 5, 20])
-def test_the_two_loop_recursion_is_the_update_of_a_dense_matrix(memory):
-    """H <- (I - rho s y^T) H (I - rho y s^T) + rho s s^T for the pairs remembered, oldest first."""
-    generator = np.random.default_rng(1)
-    first, history, pairs = generator.uniform(1, 2, 12), LBFGSHistory(memory), []
-    for k in range(9):
-        s = generator.normal(size=12)
-        y = (
-            s * generator.uniform(1, 5, 12) * (-1 if k == 6 else 1)
-        )  # one pair of negative curvature is left out
-        history.add(s, y)
-        pairs += [] if k == 6 else [(s, y)]
-    assert len(history) == min(memory, 8)
-    H = np.diag(1 / first)
-    for s, y in pairs[-memory:] if memory else []:
-        V = np.eye(12) - np.outer(y, s) / (s @ y)
-        H = V.T @ H @ V + np.outer(s, s) / (s @ y)
-    g = generator.normal(size=12)
-    assert history.direction(g, lambda q: q / first) == pytest.approx(-H @ g, rel=1e-12, abs=1e-12)
-    history.clear()
-    assert history.direction(g, lambda q: q / first) == pytest.approx(-g / first, rel=1e-15)
