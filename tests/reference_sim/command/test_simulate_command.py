@@ -15,8 +15,6 @@ import pytest
 import reference_sim
 from reference_sim import Cloth, Material, Trajectory
 from reference_sim.command.simulate_command import main
-from reference_sim.command.simulate_inputs import choose_pins
-from reference_sim.command.simulate_options import EXAMPLES, make_parser
 from reference_sim.energies import StretchStVK
 from reference_sim.files.mesh_files import read_mesh
 from tests.reference_sim.meshes import grid, sphere
@@ -42,21 +40,6 @@ def folder(tmp_path, monkeypatch):
     for k in range(4):
         write(f"ball/ball_{k}.obj", BALL + np.array([0.01 * k, -0.156, 0]), BALL_FACES)
     return tmp_path
-
-
-def test_help_gives_units():
-    said = make_parser().format_help()
-    for flag, unit in (("young-modulus", "[Pa]"), ("thickness", "[m]"), ("density", "[kg/m^3]")):
-        assert re.search(rf"--{flag} \S+\s[^-]*{re.escape(unit)}", said)
-
-
-def test_every_example_of_the_help_is_understood():
-    lines = EXAMPLES.replace("\\\n", " ").splitlines()
-    commands = [line.split("#")[0].split() for line in lines if line.strip().startswith("python -m")]
-    assert len(commands) >= 4
-    for arguments in commands:
-        assert arguments[:3] == ["python", "-m", "reference_sim.simulate"]
-        make_parser().parse_args([word.strip("'") for word in arguments[3:]])
 
 
 def test_the_module_is_a_command_and_the_function_stays_what_it_is():
@@ -356,11 +339,3 @@ def test_interrupted_by_hand(folder, capsys, monkeypatch):
     monkeypatch.setattr("reference_sim.command.simulate_run.simulate", interrupt)
     assert main(["sheet.obj", "-o", "out.vtkhdf"]) == 130
     assert "--resume goes on from out.vtkhdf" in capsys.readouterr().err
-
-
-def test_pins_by_index_place_and_height():
-    tall = np.column_stack([np.arange(5.0), np.linspace(0, 2, 5), np.zeros(5)])
-    assert choose_pins(None, tall).tolist() == []
-    assert choose_pins("3, 1", tall).tolist() == [3, 1]
-    assert choose_pins("top", tall).tolist() == [4]
-    assert choose_pins("x > 1.5, y<=1.5", tall).tolist() == [2, 3]
