@@ -22,8 +22,8 @@ WORN = {
 SCENES = ("tshirt/walk", "tshirt/jump")
 
 
-def row(scene, method, metric, value, unit="1") -> Row:
-    return any_row(scene, method, metric, value, suite="speed", unit=unit)
+def row(scene, method, metric, value, unit="1", **more) -> Row:
+    return any_row(scene, method, metric, value, **{"suite": "speed", "unit": unit, **more})
 
 
 def cost_sentence(run) -> str:

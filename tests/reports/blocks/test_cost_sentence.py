@@ -35,9 +35,7 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
 
 def test_a_rival_within_the_uncertainty_of_the_reference_is_as_near():
     rows = [
-        dataclasses.replace(
-            row(SCENES[0], method, metric, value), uncertainty=None if metric == "cost/frame" else 0.3
-        )
+        row(SCENES[0], method, metric, value, uncertainty=None if metric == "cost/frame" else 0.3)
         for method, time, error in (("snug", 1.0, 5.3), ("pbns", 0.5, 5.0), ("newton-1", 12.0, 1.0))
         for metric, value in (("cost/frame", time), ("gap/energy", error))
     ]

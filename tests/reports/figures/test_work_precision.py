@@ -110,7 +110,7 @@ def test_any_metric_against_any_other(tmp_path, capsys):
     assert (tmp_path / "figures/curvature-error_against_cost-frame.svg").is_file()
     # Suites other than garments and speed have their metrics too. A single zero is left out, not the figure.
     far = [
-        dataclasses.replace(row("fast", method, metric, value), suite="extremes")
+        row("fast", method, metric, value, suite="extremes")
         for method, value in (("simulation", 1.0), ("snug", 2.0), ("skinning", 0.0))
         for metric in ("motion/strain", "motion/offset")
     ]

@@ -17,10 +17,7 @@ def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_ro
     more = [f"snug-{k}" for k in range(9)]
     costs = (("cost/frame", 0.25), ("cost/train", 9.0), ("cost/data", 0.0))
     rows = [
-        dataclasses.replace(row(scene, method, *cost), role="ablation")
-        for scene in SCENES
-        for method in more
-        for cost in costs
+        row(scene, method, *cost, role="ablation") for scene in SCENES for method in more for cost in costs
     ]
     (table,) = crossings(run_of(all_rows() + rows))
     assert {line[1] for line in table.rows} == {"snug", *more}
@@ -74,7 +71,7 @@ def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays(
 
 def test_the_reference_has_its_uncertainty_and_its_error_in_time_in_a_table():
     more = {"role": "reference-variant", "family": "simulation-dt", "level": 4.0}
-    rows = [dataclasses.replace(row(SCENES[0], "simulation-dt-4", "distance/rms", 30.0, "mm"), **more)]
+    rows = [row(SCENES[0], "simulation-dt-4", "distance/rms", 30.0, "mm", **more)]
     (table,) = reference_uncertainty(run_of(all_rows() + rows))
     assert [column.name for column in table.columns] == ["of", "curvature/error", "distance/rms"]
     assert table.rows == (
