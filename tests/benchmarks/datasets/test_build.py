@@ -1,14 +1,12 @@
-"""Data sets: built by sequence, and learned from without being in memory."""
+"""Data sets are built by sequence: what was interrupted, damaged or added alone is made."""
 
 from __future__ import annotations
 
 import json
-import shutil
 import signal
 import subprocess
 import sys
 import time
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,94 +15,11 @@ import pytest
 from benchmarks import dataset
 from benchmarks.datasets import build as build_dataset
 from benchmarks.fingerprint.digest import damaged
-from benchmarks.tasks import ground_truth
 from reference_sim.trajectory.trajectory import Trajectory
-from snug import train as train_command
-from snug.motion.library import make_motion
-from snug.networks.dressed_body import DressedBody
-from snug.networks.tensor_file import TensorFileError
-from snug.recipes.named import RECIPE_OF_KIND
-from snug.training.checkpoint import Checkpoint
-from snug.training.losses.vertex_targets import TargetError
-from snug.training.simulated_data import INDEX, MISSING, DataSet, DataSetError, settings_of
-from snug.training.train_network import train_network
-from snug.training.training_loop import Interrupted
-from tests.benchmarks.runner.tasks_by_hand import InProcess
+from snug.training.simulated_data import INDEX, MISSING, DataSet, DataSetError
+from tests.benchmarks.datasets.data_by_hand import FRAMES, changed_index, words
 from tests.project.own_memory import children, needs_proc, own_memory
 from tests.snug.training.dressing import tube_dress
-
-FRAMES = 18  # two windows of the supervised network
-
-
-@pytest.fixture(scope="module")
-def tube(tmp_path_factory) -> Path:
-    """The tube of the other tests as a garment of one's own."""
-    path = tmp_path_factory.mktemp("garment") / "tube.obj"
-    garment = tube_dress().garment
-    lines = ["v {!r} {!r} {!r}".format(*map(float, point)) for point in garment.rest_positions]
-    lines += ["f {} {} {}".format(*face) for face in garment.faces + 1]
-    path.write_text("\n".join(lines))
-    np.savez(path.with_name("tube.weights.npz"), weights=garment.skinning_weights)
-    return path
-
-
-class Here(InProcess):
-    """Simulates in this process; stops as by Ctrl-C after `most` sequences."""
-
-    most, done = 1_000_000, 0
-
-    def __init__(self, plan, folder, assets) -> None:
-        super().__init__(folder, assets)
-
-    def together(self, ready, bar):
-        for one in super().together(ready, bar):
-            Here.done += 1
-            yield one
-            if Here.done >= Here.most:
-                raise KeyboardInterrupt
-
-
-def draped(scene, entry, folder) -> Trajectory:
-    """In place of a simulation: the garment skinned to the body, and times as a clock shows them."""
-    worn = scene.dressed
-    positions = DressedBody(worn.body, worn.garment).skinned(worn.motion)
-    clock = np.full(len(positions), time.perf_counter())
-    times = np.arange(len(positions)) / worn.motion.fps
-    return Trajectory(positions, worn.garment.faces, times, clock, status="converged")
-
-
-make_once = cache(make_motion)  # half a second for each command otherwise
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """No processes and no simulation."""
-    monkeypatch.setattr(build_dataset, "executor_of", Here)
-    monkeypatch.setattr(ground_truth, "simulated", draped)
-    monkeypatch.setattr(build_dataset, "embedded_motions", lambda names: [*map(make_once, names)])
-    monkeypatch.setattr(Here, "done", 0)
-    return Here
-
-
-def words(tube: Path, out: Path, *more: str) -> list[str]:
-    given = ["--sequences", "3", "--frames", str(FRAMES), "--settle", "2", "--garment", str(tube)]
-    return ["build", *given, *more, "-o", str(out)]
-
-
-@pytest.fixture(scope="module")
-def built(tube, tmp_path_factory) -> Path:
-    out = tmp_path_factory.mktemp("data") / "three"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build_dataset, "executor_of", Here)
-        patch.setattr(ground_truth, "simulated", draped)
-        assert dataset.main(words(tube, out)) == 0
-    return out
-
-
-@pytest.fixture
-def mine(built, tmp_path) -> Path:
-    """A copy to damage."""
-    return Path(shutil.copytree(built, tmp_path / "mine"))
 
 
 def flip(path: Path) -> None:
@@ -197,12 +112,6 @@ def test_what_another_build_ends_while_this_one_makes_ready_is_kept(tube, here, 
     assert [line.usable for line in DataSet.read(out).sequences] == [True, True, True]
 
 
-def _index(folder: Path, change) -> None:
-    index = json.loads((folder / INDEX).read_text())
-    change(index)
-    (folder / INDEX).write_text(json.dumps(index))
-
-
 @pytest.mark.parametrize(
     ("more", "said"),
     [
@@ -254,114 +163,16 @@ def test_more_sequences_are_mixed_from_the_given_ones(tube, tmp_path):
     ],
 )
 def test_a_broken_index_is_refused_in_a_line(mine, change, said):
-    _index(mine, change)
+    changed_index(mine, change)
     with pytest.raises(DataSetError, match=said) as caught:
         DataSet.read(mine)
     assert str(mine) in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_motion_of_other_length_is_refused(mine):
-    _index(mine, lambda index: index["sequences"][0].update(frames=7))
+    changed_index(mine, lambda index: index["sequences"][0].update(frames=7))
     with pytest.raises(DataSetError, match="18 frames, 7 by dataset"):
         DataSet.read(mine).motions()
-
-
-# --- learning from it --------------------------------------------------------------------------------------
-
-
-def taught(built: Path, kind: str, *, stored: bool, steps: int = 3, **options):
-    """A network of the data set, from the files or from memory."""
-    found = DataSet.read(built)
-    trajectories: dict = found.targets()
-    if not stored:
-        trajectories = {
-            line.name: Trajectory.load(built / line.trajectory).positions for line in found.sequences
-        }
-    return train_network(
-        kind, tube_dress(), found.motions(), steps=steps, seed=0, recipe=RECIPE_OF_KIND[kind],
-        trajectories=trajectories, progress=False, every=1, **options,
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", ["supervised", "tailornet"])
-def test_files_teach_the_same_as_memory_to_the_last_bit(built, kind):
-    there, stored = (taught(built, kind, stored=stored) for stored in (False, True))
-    for name, tensor in there.network.state_dict().items():
-        assert tensor.equal(stored.network.state_dict()[name]), name
-    assert [row["loss"] for row in there.history] == [row["loss"] for row in stored.history]
-
-
-def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp_path):
-    checkpoint = Checkpoint(path=tmp_path / "c.safetensors", resume=True)
-    count = iter(range(10))
-    with pytest.raises(Interrupted):
-        taught(
-            built, "supervised", stored=True, steps=4, checkpoint=checkpoint, stop=lambda: next(count) == 1
-        )
-    whole, resumed = taught(built, "supervised", stored=True, steps=4), None
-    _index(mine, lambda i: i["sequences"][0]["digests"].update({i["sequences"][0]["vertices"]: "0"}))
-    with pytest.raises(TensorFileError, match="another data"):
-        taught(mine, "supervised", stored=True, steps=4, checkpoint=checkpoint)
-    resumed = taught(built, "supervised", stored=True, steps=4, checkpoint=checkpoint)
-    for name, tensor in whole.network.state_dict().items():
-        assert tensor.equal(resumed.network.state_dict()[name]), name
-
-
-@pytest.mark.parametrize(
-    ("damage", "said"),
-    [
-        (lambda x: x.__setitem__((5, 7, 1), np.nan) or x, "'02_01' is not finite at frame 5"),
-        (lambda x: x[:-1], "expected \\(18, 150, 3\\) of float32"),
-        (lambda x: x.astype(float), "of float64, expected"),
-        (lambda x: np.array(["a", None], dtype=object), "02_01"),
-        (lambda x: None, "02_01"),
-    ],
-)
-@pytest.mark.parametrize("kind", ["supervised", "tailornet"])
-def test_vertices_that_are_not_as_the_index_says_are_named(mine, kind, damage, said):
-    path = mine / DataSet.read(mine).sequences[1].vertices
-    found = damage(np.load(path))
-    path.write_bytes(path.read_bytes()[:-9]) if found is None else np.save(path, found)
-    with pytest.raises(TargetError, match=said):
-        taught(mine, kind, stored=True)
-
-
-def test_the_command_learns_from_a_data_set(built, tube, tmp_path, capsys):
-    out = tmp_path / "m.safetensors"
-    given = ["--dataset", str(built), "--steps", "2", "-o", str(out)]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(signal, "signal", lambda *_: None)
-        assert train_command.main([*given, "--model", "supervised", "--garment", str(tube)]) == 0
-        assert out.is_file() and "3 motions, 54 frames, recipe supervised" in capsys.readouterr().out
-        assert train_command.main([*given, "--vertices", "300"]) == 2
-        assert "another garment: tube there, tshirt here" in capsys.readouterr().err
-    for words, said in (
-        (["--model", "supervised"], "learns from simulations; add --dataset DIR"),
-        (["--dataset", "x", "--motions", "y"], "leave out --motions"),
-        (["--dataset", "x", "--model", "tailornet", "--recipe", "paper"], "leave out --recipe"),
-        (["--dataset", str(tmp_path)], "no such file"),
-    ):
-        assert train_command.main(words) == 2
-        error = capsys.readouterr().err
-        assert said in error and error.count("\n") == 1
-
-
-def test_settings_tell_garments_and_bodies_apart():
-    import dataclasses
-
-    dressed = tube_dress()
-    own = settings_of(dressed.body, dressed.garment)
-    moved = dressed.garment.rest_positions.copy()
-    moved[3, 1] += 1e-5
-    larger = dataclasses.replace(dressed.body, template=1.01 * dressed.body.template)
-    others = {
-        "mesh": settings_of(dressed.body, dataclasses.replace(dressed.garment, rest_positions=moved)),
-        "body": settings_of(larger, dressed.garment),
-    }
-    for name, other in others.items():
-        assert [key for key in own if own[key] != other[key]] == [name]
-    rounded = dataclasses.replace(dressed.garment, rest_positions=dressed.garment.rest_positions + 1e-12)
-    assert settings_of(dressed.body, rounded) == own
 
 
 # --- many sequences ----------------------------------------------------------------------------------------
