@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.results.row import DECLARED, Row
-from benchmarks.runner.rows import NOT_FALLING, SPREAD
+from benchmarks.runner.rows import SPREAD
 
 MOST_NAMED = 3  # cells, tasks or stages that a line names
 
@@ -45,10 +45,6 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
         differences = {remark.partition("; ")[2] for remark in pretrained.values()}
         same = differences.pop() if len(differences) == 1 else "the reasons of their rows say what differs"
         lines.append(f"pretrained, not trained here: {', '.join(pretrained)}; {same}")
-    rising = [f"{row.scene} x {row.method}" for row in rows if row.reason.startswith(NOT_FALLING)]
-    if rising:
-        named_cells = _first_of(list(dict.fromkeys(rising)))
-        lines.append(f"more iterations or a smaller tolerance, and a larger gap: {named_cells}")
     return lines
 
 
