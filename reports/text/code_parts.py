@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from argparse import SUPPRESS, ArgumentParser
+from collections.abc import Sequence
 from importlib import import_module
 
 from benchmarks.metrics import declared
@@ -35,6 +36,27 @@ def option_rows(parser: ArgumentParser) -> Rows:
         for action in shown
     ]
     return [("Option", "Meaning"), *(row for row in rows if "--help" not in row[0])]
+
+
+def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
+    """Return the heading and the rows that are asked for, in the order of their names.
+
+    Args:
+        rows: a heading, then rows whose first cells have the names.
+        names: as "--seed" or "dtype"; none for all rows.
+
+    Raises:
+        ValueError: a name that no row has.
+
+    >>> chosen_rows([("Field", "Content"), ("`dt`", "[s]"), ("`frames`", "number")], ["frames"])
+    [('Field', 'Content'), ('`frames`', 'number')]
+    """
+    if not names:
+        return rows
+    row_of_name = {name: row for row in rows[1:] for name in re.findall(r"[\w-]+", row[0])}
+    if unknown := [name for name in names if name not in row_of_name]:
+        raise ValueError(f"no row has the name '{unknown[0]}'")
+    return [rows[0], *(row_of_name[name] for name in names)]
 
 
 def attribute_rows(path: str) -> Rows:
