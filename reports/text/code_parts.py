@@ -1,4 +1,4 @@
-"""Tables of a document whose texts the code has: options, attributes, recipes, presets, suites, kernels."""
+"""Tables of a document whose texts the code has: options, attributes, recipes, presets, suites."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS
-from reference_sim.kernels.fast_kernels import USES
-from snug.garments.templates import GARMENT_TEMPLATES
 from snug.recipes.named import RECIPES
 
 Rows = list[tuple[str, ...]]
@@ -156,29 +154,9 @@ def suite_rows() -> Rows:
     return [("Suite", "Question"), *((f"`{suite.name}`", suite.description) for suite in SUITES)]
 
 
-def garment_rows() -> Rows:
-    """Return a heading and a row of each kind of tailored garment, with the defaults of its function."""
-    rows = []
-    for kind in GARMENT_TEMPLATES:
-        cut = [
-            f"{name}={parameter.default:g}"
-            for name, parameter in inspect.signature(kind.tailor).parameters.items()
-            if name not in ("body", "vertices")
-        ]
-        rows.append((f"`{kind.name}`", f"`{kind.tailor.__name__}`", f"`{', '.join(cut)}`"))
-    return [("Kind", "Function", "Cut"), *rows]
-
-
-def kernel_rows() -> Rows:
-    """Return a heading and a row of each use of a fast kernel."""
-    return [("Use", "The function returns: asked by"), *((f"`{use}`", text) for use, text in USES.items())]
-
-
 PARTS = {
     "metrics": metric_rows,
     "presets": preset_rows,
     "suites": suite_rows,
-    "kinds of garments": garment_rows,
-    "uses of kernels": kernel_rows,
     "options of benchmarks.run": lambda: option_rows(make_parser()),
 }

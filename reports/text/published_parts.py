@@ -36,7 +36,7 @@ FORMS = (
 
 LIBRARY_TABLES = {"clips": clip_rows, "distances": distance_rows}
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
-ORIGIN = ("Run", "Day", "Commit", "Processor", "Cores")  # heads
+ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
 
 
 def published_part(words: str) -> str:
@@ -70,7 +70,7 @@ def published_part(words: str) -> str:
         return claim_counts(_claims(*folders))
     if kind == "runs":
         parts = [(folder, part) for folder in folders for part in origins(RunFolder(folder).read_config())]
-        lines = dict.fromkeys((folder.name, *part[:4]) for folder, part in parts)
+        lines = dict.fromkeys((folder.name, *part[:3]) for folder, part in parts)
         return markdown_table([ORIGIN, *lines])
     raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
 
