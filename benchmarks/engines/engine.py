@@ -39,9 +39,11 @@ class EngineCloth:
 
     Attributes:
         energies: static terms that the engine minimises, gravity aside; empty where they are not documented.
+        explicit: forces of a time step are those at its start; otherwise those at its end.
     """
 
     energies: Sequence[Energy] = ()
+    explicit: bool = False
 
     def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (V, 3) [m] and velocities [m/s] a time step of dt [s] after x and v."""

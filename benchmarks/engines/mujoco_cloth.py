@@ -31,6 +31,7 @@ class MujocoCloth(EngineCloth):
         cloth = specimen.cloth
         self.model = mujoco.MjModel.from_xml_string(model_xml(cloth, integrator))
         self.energies = (StretchStVK(cloth),)
+        self.explicit = integrator == "Euler"
         self.rest = cloth.rest_positions
         self.free = np.setdiff1d(np.arange(cloth.vertex_count), cloth.pins)
         bodies = self.model.flex_vertbodyid[self.free]

@@ -39,7 +39,7 @@ class RollOut:
         seconds: processor time (T-1,) [s] of each frame.
         step: time step of the engine [s].
         last_steps: last time step of each frame; empty where the engine does not tell.
-        energies: as those of EngineCloth.
+        energies, explicit: as those of EngineCloth.
     """
 
     specimen: Specimen
@@ -49,6 +49,7 @@ class RollOut:
     step: float
     last_steps: Sequence[Step] = ()
     energies: Sequence[Energy] = ()
+    explicit: bool = False
 
     @property
     def milliseconds(self) -> float:
@@ -86,8 +87,9 @@ def roll_out(engine: Engine, sample: Specimen, factor: int = 1) -> RollOut:
             steps.append(Step(*frame.before, frame.x, FRAME / substeps))
         clock = time.process_time()
     return RollOut(
-        sample, np.array(positions), velocity, np.array(seconds), FRAME / substeps, steps, cloth.energies
-    )
+        sample, np.array(positions), velocity, np.array(seconds), FRAME / substeps, steps, cloth.energies,
+        cloth.explicit,
+    )  # fmt: skip
 
 
 @cache

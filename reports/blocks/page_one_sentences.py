@@ -61,7 +61,7 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     unseen = "" if set(worn["scene"]) <= set(run.trained_on) else kind
     count = len(excess.by_motion)
     beside = published_beside(run, first)
-    motions = f"{count} {unseen}motion{'' if count == 1 else 's'}{_independent(excess)}"
+    motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
     sentences = [
         f"On {motions} {run.label(first)} has a "
         f"relative excess of {_share(excess)}{f', {beside}' if beside else ''}, where the energy of the "
@@ -73,9 +73,9 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     if count > 1:
         scene, worst = excess.worst
         sentences.append(
-            f"These numbers are geometric means{_once(excess)}; the arithmetic mean of {run.label(first)} is "
-            f"{number(excess.mean, 2)} %, and its worst motion, {scene.partition('/')[2] or scene}, has "
-            f"{number(worst, 2)} %"
+            f"These numbers are geometric means over {_repeated(excess)}. The arithmetic mean of "
+            f"{run.label(first)} over motions is {number(excess.mean, 2)} %, and its worst motion, "
+            f"{scene.partition('/')[2] or scene}, has {number(worst, 2)} %"
         )
     return _joined(sentences)
 
@@ -91,17 +91,12 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
     return f"{'; '.join(parts)}." if parts else ""
 
 
-def _independent(excess: Excess) -> str:
-    """Return " from 11 independent sources" where some motions are segments of one recording."""
+def _repeated(excess: Excess) -> str:
+    """Return what the means are taken over: "motions", or "11 sources" and what these are."""
     count = excess.effect.motions
-    return f" from {count} independent sources" if count < len(excess.by_motion) else ""
-
-
-def _once(excess: Excess) -> str:
-    """Return what the means are taken over."""
-    if _independent(excess):
-        return ", in which the segments of one recording count once"
-    return " over motions"
+    if count == len(excess.by_motion):
+        return "motions"
+    return f"{count} sources: recordings, whose segments are averaged first, and motions made by code"
 
 
 def _joined(sentences: Sequence[str]) -> str:
@@ -196,16 +191,18 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
 def _trust(run: Run, timed: pd.DataFrame) -> str:
     """Say how uncertain the reference itself is, what its time step leaves out, and how claims came out."""
     sentences = []
+    count = timed["scene"].nunique()
+    where = f"in {count} scene{'' if count == 1 else 's'}"
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(
-            f"equally valid simulations lie {number(apart[0], 2)} mm apart and differ by "
-            f"{number(apart[1], 2)} 1/m in mean curvature: an error below these shows no difference from the "
-            "simulation"
+            f"simulations that are equally valid lie {number(apart[0], 2)} mm and "
+            f"{number(apart[1], 2)} 1/m of mean curvature from the reference, {where}: a smaller error "
+            "shows no difference from it"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
-        count = int(run.methods[finest].level or 0)
+        steps = int(run.methods[finest].level or 0)
         strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
         words = [
             f"{what} {number(one.value / other.value, 2)} times"
@@ -214,14 +211,14 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
         ]
         sentences.append(
             "The reference is converged in each time step of 1/30 s, but not in the step size: with "
-            f"{count} steps a frame {' and '.join(words)} as large"
+            f"{steps} steps a frame {' and '.join(words)} as large, {where}"
         )
     lines = paper_claims.judged(run)
     counted = paper_claims.counts(lines)
     if counted:
         total = counted.total()
         claims = f"{total} primary claim{'' if total == 1 else 's'}"
-        sentences.append(f"of the paper's {claims} {paper_claims.in_words(counted)}")
+        sentences.append(f"of {claims} taken from the paper {paper_claims.in_words(counted)}")
         sentences += _claims_that_fail(run, lines)
     return _joined(sentences)
 
@@ -259,7 +256,7 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         )
         sentences = [
             f"{snug} has an energy gap, the energy above the minimum of each time step, of "
-            f"{number(network.error)} J{network.fewer}; {others} is as fast with a smaller gap"
+            f"{number(network.error)} J{network.fewer}; {others} that is at least as fast has a smaller gap"
         ]
     else:
         within = " within repeats" if best.time > network.time else ""
@@ -271,7 +268,7 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         ]
     if solver:
         costs = f"{run.label(solver.method)}, {number(solver.time)} ms a frame"
-        sentences.append(f"the fastest solver stopped early with as small an energy gap is {costs}")
+        sentences.append(f"the fastest solver stopped early whose gap is no larger is {costs}")
     return sentences
 
 

@@ -133,8 +133,10 @@ class Effect:
 
     def _shown(self, value: float) -> float:
         if self.scale == EXCESS:  # points between typical shares of the two
-            first, second = (off_scale(end, EXCESS) for end in (self.second + value, self.second))
-            return float(first) - float(second)
+            first, second = self.second + self.value, self.second
+            # The mean nearer to 0 stays and the other moves: so it is the same in either order.
+            first, second = (first, first - value) if abs(first) < abs(second) else (second + value, second)
+            return float(off_scale(first, EXCESS)) - float(off_scale(second, EXCESS))
         return float(off_scale(value, self.scale))
 
     @property

@@ -8,6 +8,7 @@ import pandas as pd
 
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import mean_of
+from reports.statistics.relative_excess import relative_metric
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import GARMENT, METHOD, Cell, Table, metric_column, table
 
@@ -43,13 +44,13 @@ def ablation_effects(run: Run) -> list[Table]:
             effects = [compare_methods(run, rows, metric, method, base).effect for metric in metrics]
             lines.append((garment, method, *effects))
     caption = (
-        "Each variant beside its base, over the scenes that both have. A number behind × is the variant over "
-        "the base, of geometric means. The total has an arbitrary zero: its numbers are the variant minus "
-        "the base in points of relative excess. Where another value is not positive, the number is the "
-        "difference in the unit above."
+        "Effect of each variant, over the scenes that it shares with its base. ×: variant over base, of "
+        "geometric means. Numbers without × are variant minus base, in the unit of the column; of relative "
+        "excess, in points."
     )
     note = "Below: 95 % intervals over motions and seeds, each for itself."
-    columns = (*HEAD, *map(metric_column, metrics))
+    shown = [relative_metric(metric.name) if metric.arbitrary_zero else metric for metric in metrics]
+    columns = (*HEAD, *map(metric_column, shown))
     return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
 
 

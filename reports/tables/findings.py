@@ -123,7 +123,8 @@ def errors_in_spreads(run: Run) -> list[Table]:
                 lines.append((garment, method, *values))
     columns = (GARMENT, METHOD, *(Column(metric.name, metric.title) for metric in metrics))
     caption = (
-        "Errors over the spread of the reference ensemble: root mean square of the error over seeds, and of "
-        "the spread over members, means over motions, divided: 1 is as near as another valid simulation."
+        "Each number is a root-mean-square error over seeds, divided by the root-mean-square distance of "
+        "the equally valid simulations from the reference; both are means over motions. 1 means: as near as "
+        "another valid simulation."
     )
     return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))

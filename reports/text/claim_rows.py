@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from reports.run.finished_run import Run
 from reports.statistics.effects import RATIO
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, Claim, Judged, in_words, judged
+from reports.statistics.verdicts import measure_of
 from reports.tables.number_texts import DASH, number
 
 HEAD = ["Claim", "Measure", "First", "Claimed", "Second", "Effect", "Interval", "p", "Verdict", "Run"]
@@ -77,4 +78,4 @@ def _row(claim: Claim, claims: JudgedClaims) -> list[str]:
         interval = " to ".join(number(end) for end in far.interval or ()) or DASH
     p = DASH if line.p is None else number(line.p, 2)
     outcome = [effect, interval, p, line.verdict + line.remark, name]
-    return [claim.says, line.compared.metric.heading, *methods, *outcome]
+    return [claim.says, measure_of(line.compared).heading, *methods, *outcome]

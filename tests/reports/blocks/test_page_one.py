@@ -48,7 +48,8 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
         "where the energy of the reference simulation is 0 % and that of skinning alone 100 %. Whether"
         in said
     )
-    assert said.endswith("the arithmetic mean of SNUG is 12 %, and its worst motion, jump, has 20 %.")
+    assert "geometric means over motions. The arithmetic mean of SNUG over motions is 12 %" in said
+    assert said.endswith("and its worst motion, jump, has 20 %.")
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
     assert "PBNS has 15 %. Which of SNUG and PBNS has less is inconclusive. These" in near(rows)
     # A member of the reference's ensemble is no rival, however near it is.
@@ -60,7 +61,7 @@ def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
     assert "What does not hold" not in dict(headline(run_of(rows))).get("How certain", "")
     monkeypatch.setattr(paper_claims, "verdict", lambda claim, far, p: paper_claims.FAILS)
     said = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
-    assert "Of the paper's 1 primary claim 1 does not hold. What does not hold: Figure 7: close to" in said
+    assert "Of 1 primary claim taken from the paper 1 does not hold. What does not hold: Figure 7: cl" in said
     assert said.endswith("(relative excess: SNUG ≤ Simulation).")
 
 

@@ -296,8 +296,8 @@ def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays(
     run = run_of(all_rows())
     assert cost_sentence(run).endswith(
         " SNUG has an energy gap, the energy above the minimum of each time step, of 0.100 J; no other "
-        "method is as fast with a smaller gap. The fastest solver stopped early with as small an energy gap "
-        "is L-BFGS, 20 iterations, 16.0 ms a frame."
+        "method that is at least as fast has a smaller gap. The fastest solver stopped early whose gap is no "
+        "larger is L-BFGS, 20 iterations, 16.0 ms a frame."
     )
     (table,) = error_rivals(run)
     assert table.rows == (
@@ -332,7 +332,7 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
     run = run_of(rows)
     frame = run.cells("speed", "garments")
     (sentence,) = page_one_sentences._rivals(run, frame, ["a", "b"])
-    others = "of the methods measured in all of these scenes, none is as fast with a smaller gap"
+    others = "of the methods measured in all of these scenes, none that is at least as fast has a smaller gap"
     assert sentence.endswith(others)
     assert page_one_sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
 

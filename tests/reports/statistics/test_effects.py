@@ -256,6 +256,17 @@ def test_shares_of_excess_are_compared_by_logarithm_above_one_percent_and_by_dif
     assert less.shown == pytest.approx(0.5 * found.shown - found.shown, rel=0.1) and less.interval[1] < 0.0
 
 
+def test_points_between_two_shares_are_the_same_in_either_order():
+    motions = np.array([[2.0], [4.0], [8.0], [16.0]])
+    large = motions * np.array([[90.0], [150.0], [70.0], [120.0]])
+    there = effect(mean_over(motions), mean_over(large, "pbns"), EXCESS)
+    back = effect(mean_over(large), mean_over(motions, "pbns"), EXCESS)
+    assert there.shown == pytest.approx(-back.shown)
+    low, high = there.interval
+    assert (low, high) == pytest.approx((-back.interval[1], -back.interval[0]), rel=3 * NOISE)
+    assert high - low > 0.2 * abs(there.shown)  # the uncertainty of the larger one is seen
+
+
 def test_a_cost_has_the_range_of_what_was_measured_and_no_interval():
     own, other = np.array([[2.0, 2.2], [3.0, 3.3]]), np.array([[4.0, 4.0], [9.0, 9.0]])
     found = cost_effect(mean_over(own), mean_over(other, "pbns"))
