@@ -17,13 +17,20 @@ ROOT = Path(__file__).resolve().parents[1]
 def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
     """Yield (path, text, text with its generated parts made anew) of README, docs/ and the page of entries.
 
+    The CSV files of docs/ on the library are generated as a whole, where they exist.
+
     Raises:
         ValueError: for a part of no known form or without an end; names the document.
     """
     from reports.entries.page import ENTRIES, PAGE, page_of
     from reports.statistics.published import DEFAULT, PUBLISHED
     from reports.text.generated_parts import fill  # loads pandas
-    from reports.text.published_parts import published_part, read_published
+    from reports.text.published_parts import (
+        LIBRARY_FILES,
+        library_file,
+        published_part,
+        read_published,
+    )
 
     for path in sorted([root / "README.md", *(root / "docs").rglob("*.md")]):
         text = path.read_text(encoding="utf-8")
@@ -31,6 +38,9 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
             yield path, text, fill(text, published_part)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
+    for path in (root / "docs" / name for name in LIBRARY_FILES):
+        if path.is_file():
+            yield path, path.read_text(encoding="utf-8"), library_file(path.name)
     if (entries := root / ENTRIES).is_dir():
         path = entries / PAGE
         page, _ = page_of(

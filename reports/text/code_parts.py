@@ -12,6 +12,7 @@ from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS
+from reports.text.metric_families import family_rows
 from snug.recipes.named import RECIPES
 
 Rows = list[tuple[str, ...]]
@@ -105,7 +106,7 @@ def docstring_rows(module: str) -> Rows:
 
 
 def recipe_rows(names: str) -> Rows:
-    """Return a heading and a row of each option in which recipes differ: its values, and its meaning.
+    """Return a heading and a row of each option in which recipes differ: values, first sentence on it.
 
     Args:
         names: of the recipes, as "default, paper".
@@ -123,7 +124,7 @@ def recipe_rows(names: str) -> Rows:
     for option, meaning in attribute_rows("snug.recipes.recipe.Recipe")[2:]:
         values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
         if len(set(values)) > 1:
-            rows.append((option, *(_setting(value) for value in values), meaning))
+            rows.append((option, *(_setting(value) for value in values), meaning.partition(". ")[0]))
     return [("Option", *(f"Recipe `{name}`" for name in chosen), "Meaning"), *rows]
 
 
@@ -132,9 +133,8 @@ def _setting(value: object) -> str:
 
 
 def metric_rows() -> Rows:
-    """Return a heading and a row of each declared metric: name, unit, definition."""
-    rows = [(f"`{metric.name}`", metric.unit, metric.definition) for metric in declared().values()]
-    return [("Metric", "Unit", "Definition"), *rows]
+    """Return a heading and a row of each declared metric or family of metrics: name, unit, definition."""
+    return [("Metric", "Unit", "Definition"), *family_rows(declared().values())]
 
 
 def preset_rows() -> Rows:

@@ -3,16 +3,20 @@
 `headline of RUN`, `excess METHOD of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
 `claims exploratory of RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of
 reports/published, and the first run that has both methods of a claim judges it. `attributes of MODULE.CLASS`,
-`docstring of MODULE` (its table), `recipes of NAME, ...`, `clips of the library`, `distances of the library`
-and the parts that `code_parts.PARTS` names come from the code; `attributes` and `options of benchmarks.run`
-take names after a semicolon, whose rows alone are shown, in their order.
+`docstring of MODULE` (its table), `recipes of NAME, ...`, `sources of the library` and the parts that
+`code_parts.PARTS` names come from the code, `evaluations of published runs` from the run.json of each run;
+`attributes` and `options of benchmarks.run` take names after a semicolon, whose rows alone are shown, in that
+order.
 """
 
 from __future__ import annotations
 
+import csv
 from functools import cache
+from io import StringIO
 from pathlib import Path
 
+from benchmarks.results.protocol import BEFORE
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks.page_one_sentences import headline
 from reports.run.finished_run import Run
@@ -25,16 +29,16 @@ from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstrin
 from reports.text.excess_terms import excess_terms
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
-from snug.motion.composition import clip_rows, distance_rows
+from snug.motion.composition import clip_rows, distance_rows, source_rows
 
 FORMS = (
     "headline of RUN; excess METHOD of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
     "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; "
     "attributes of MODULE.CLASS; NAME, ...; docstring of MODULE; recipes of "
-    f"NAME, ...; clips of the library; distances of the library; {'; '.join(PARTS)}"
+    f"NAME, ...; sources of the library; evaluations of published runs; {'; '.join(PARTS)}"
 )
 
-LIBRARY_TABLES = {"clips": clip_rows, "distances": distance_rows}
+LIBRARY_FILES = {"library_clips.csv": clip_rows, "library_distances.csv": distance_rows}  # in docs/
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
 
@@ -54,8 +58,10 @@ def published_part(words: str) -> str:
         return markdown_table(recipe_rows(source))
     if kind == "attributes":
         return markdown_table(chosen_rows(attribute_rows(runs), wanted))
-    if source == "the library" and kind in LIBRARY_TABLES:
-        return markdown_table(list(LIBRARY_TABLES[kind]()))
+    if words == "sources of the library":
+        return markdown_table(list(source_rows()))
+    if words == "evaluations of published runs":
+        return markdown_table(evaluation_rows(PUBLISHED))
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
     if kind == "excess":
@@ -73,6 +79,29 @@ def published_part(words: str) -> str:
         lines = dict.fromkeys((folder.name, *part[:3]) for folder, part in parts)
         return markdown_table([ORIGIN, *lines])
     raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
+
+
+def library_file(name: str) -> str:
+    """Return the text of a CSV file of LIBRARY_FILES."""
+    text = StringIO()
+    rows = ([cell.strip("`") for cell in row] for row in LIBRARY_FILES[name]())
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def evaluation_rows(published: Path) -> list[tuple[str, ...]]:
+    """Return a heading and rows of the runs in a folder: how often each evaluated test motions.
+
+    Runs of one protocol and split with the same number of test-set evaluations share a row.
+    """
+    runs: dict[tuple[str, str, str], list[str]] = {}
+    for path in sorted(published.glob("*/run.json")):
+        config = RunFolder(path.parent).read_config()
+        number = (config.get("protocol") or {}).get("number", BEFORE)
+        group = number, str(config["split"]), str(len(config["test_looks"]))
+        runs.setdefault(group, []).append(f"`{path.parent.name}`")
+    lines = [(*group, ", ".join(runs[group])) for group in sorted(runs)]
+    return [("Protocol", "Split", "Test-set evaluations", "Runs"), *lines]
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Composition of the library, for docs/protocol.md.
+"""Composition of the library, for docs/protocol.md and the CSV files next to it.
 
 The recorded clips have roles and digests. A validation or test motion has a distance to the training poses
 (`snug.motion.motion.nearest_pose`).
@@ -7,6 +7,7 @@ The recorded clips have roles and digests. A validation or test motion has a dis
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 
@@ -32,11 +33,40 @@ def clip_rows() -> Iterator[tuple[str, ...]]:
 def distance_rows() -> Iterator[tuple[str, ...]]:
     """Yield a heading and a row of each test or validation motion: its distance [deg] to training poses."""
     yield "Motion", "Role", "Content", "Frames", "Mean distance [deg]", "Largest distance [deg]"
-    known = np.concatenate([make_motion(name).poses for name in TRAIN])
     for role in ("test", "validation"):
         for name in ROLES[role]:
-            motion = make_motion(name)
-            degrees = np.rad2deg(nearest_pose(motion.poses, known))
-            content = motion.kind if clip_of(name) in CLIPS else f"{motion.kind}, by code"
+            degrees = _distances(name)
             mean, largest = f"{degrees.mean():.1f}", f"{degrees.max():.1f}"
-            yield f"`{name}`", role, content, str(motion.frames), mean, largest
+            yield f"`{name}`", role, _content(name), str(len(degrees)), mean, largest
+
+
+def source_rows() -> Iterator[tuple[str, ...]]:
+    """Yield a heading and a row of each independent source of test motions: a recording or one made by code.
+
+    The distances [deg] to training poses are over the frames of all test motions of the source.
+    """
+    yield "Test motions", "Content", "Frames", "Mean distance [deg]", "Largest distance [deg]"
+    motions: dict[str, list[str]] = {}
+    for name in sorted(ROLES["test"], key=lambda name: (clip_of(name) not in CLIPS, name)):
+        motions.setdefault(clip_of(name), []).append(name)
+    for names in motions.values():
+        degrees = np.concatenate([_distances(name) for name in names])
+        listed = f"`{names[0]}` to `{names[-1]}`" if len(names) > 1 else f"`{names[0]}`"
+        mean, largest = f"{degrees.mean():.1f}", f"{degrees.max():.1f}"
+        yield listed, _content(names[0]), str(len(degrees)), mean, largest
+
+
+def _content(name: str) -> str:
+    motion = make_motion(name)
+    return motion.kind if clip_of(name) in CLIPS else f"{motion.kind}, by code"
+
+
+@cache
+def _training_poses() -> np.ndarray:
+    return np.concatenate([make_motion(name).poses for name in TRAIN])
+
+
+@cache
+def _distances(name: str) -> np.ndarray:
+    """Return the distance of each frame of a motion to the nearest training pose, (T,) [deg]."""
+    return np.rad2deg(nearest_pose(make_motion(name).poses, _training_poses()))

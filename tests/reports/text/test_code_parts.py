@@ -66,6 +66,8 @@ def test_recipes_are_compared_in_the_options_that_differ():
     }
     assert rows.keys() == {field.name for field in fields(DEFAULT)} - same - {"name"}
     assert rows["contact_margin"] == ("None", "0.002") and rows["schedule"] == ("cosine", "epochs")
+    meanings = {row[0].strip("`"): row[3] for row in recipe_rows("default, paper")[1:]}
+    assert meanings["remembered"].endswith("instead of to zero")  # the first of two sentences
     with pytest.raises(ValueError, match="no recipe 'text'; choose from default, paper"):
         recipe_rows("default, text")
 

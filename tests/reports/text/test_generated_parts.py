@@ -12,7 +12,14 @@ from reports.docs import ROOT, documents, main
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY
 from reports.statistics.published import PUBLISHED
 from reports.text.generated_parts import BEGIN, END, fill
-from reports.text.published_parts import published_part
+from reports.text.published_parts import (
+    LIBRARY_FILES,
+    evaluation_rows,
+    library_file,
+    published_part,
+)
+from snug.motion.library import TEST
+from snug.motion.recorded.table import CLIPS, clip_of
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +119,37 @@ def test_a_later_run_judges_what_those_before_it_cannot_and_nothing_else():
     ]  # names of methods are not
     assert len(judged) > 3
     assert all(before[-2] == "not measured" and after[-1] == "ablations |" for before, after in judged)
+
+
+def test_files_of_the_library_are_documents_and_have_every_clip_and_motion(project):
+    assert {path.name for path, *_ in project if path.suffix == ".csv"} == set(LIBRARY_FILES)
+    lines = library_file("library_clips.csv").splitlines()
+    assert lines[0] == "Clip,Content,Frames,Role,Digest" and len(lines) == len(CLIPS) + 1
+    assert '07_02,"walk, 1.5 m/s",82,test,da604aa37de1' in lines
+    names = [line.split(",")[0] for line in library_file("library_distances.csv").splitlines()[1:]]
+    assert names[: len(TEST)] == list(TEST)
+
+
+def test_segments_of_a_recording_are_one_source_of_test_motions():
+    lines = published_part("sources of the library").splitlines()[2:]
+    assert len(lines) == len({clip_of(name) for name in TEST})
+    frames = [int(line.split(" | ")[2]) for line in lines]
+    assert lines[0].startswith("| `01_01_a` to `01_01_g` | forward jumps") and frames[0] == 689
+
+
+def test_runs_alike_in_protocol_split_and_test_set_evaluations_share_a_row(tmp_path):
+    number = {"protocol": {"number": "1.0"}}
+    for name, config in {
+        "b": {"split": "test", "test_looks": [{}]} | number,
+        "a": {"split": "test", "test_looks": [{}]} | number,
+        "old": {"split": "test", "test_looks": [{}, {}]},
+        "c": {"split": "validation", "test_looks": []} | number,
+    }.items():
+        (tmp_path / name).mkdir()
+        RunFolder(tmp_path / name).write_config(config)
+    (tmp_path / "pictures").mkdir()
+    assert evaluation_rows(tmp_path)[1:] == [
+        ("1.0", "test", "1", "`a`, `b`"),
+        ("1.0", "validation", "0", "`c`"),
+        ("before 1.0", "test", "2", "`old`"),
+    ]
