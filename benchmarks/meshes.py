@@ -38,8 +38,7 @@ def right_grid(rows: int, columns: int, height: float, width: float) -> tuple[np
     ((6, 2), 4)
     """
     y, x = np.meshgrid(np.linspace(0, height, rows + 1), np.linspace(0, width, columns + 1), indexing="ij")
-    a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
-    b, c, d = a + 1, a + columns + 2, a + columns + 1
+    a, b, c, d = _corners(rows, columns)
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     return np.stack([x.ravel(), y.ravel()], 1), faces
 
@@ -148,20 +147,26 @@ def _column(i: int, rows: int) -> np.ndarray:
 
 
 def _corners(rows: int, columns: int) -> tuple[np.ndarray, ...]:
-    a = np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)
+    """Return the corners of each cell of a grid, (rows * columns,) each, one after another around it."""
+    a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
     return a, a + 1, a + columns + 2, a + columns + 1
+
+
+def _even(rows: int, columns: int) -> np.ndarray:
+    """Return whether each cell of a grid is of one colour of a chessboard, (rows * columns, 1)."""
+    return ((np.arange(rows)[:, None] + np.arange(columns)) % 2 == 0).reshape(-1, 1)
 
 
 def _alternate(rows: int, columns: int) -> np.ndarray:
     a, b, c, d = _corners(rows, columns)
-    even = ((np.arange(rows)[:, None] + np.arange(columns)) % 2 == 0)[..., None]
-    first = np.where(even, np.stack([a, b, c], -1), np.stack([a, b, d], -1))
-    second = np.where(even, np.stack([a, c, d], -1), np.stack([b, c, d], -1))
-    return np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
+    even = _even(rows, columns)
+    first = np.where(even, np.stack([a, b, c], 1), np.stack([a, b, d], 1))
+    second = np.where(even, np.stack([a, c, d], 1), np.stack([b, c, d], 1))
+    return np.concatenate([first, second])
 
 
 def _crossed(points: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    corners = [corner.ravel() for corner in _corners(rows, columns)]
+    corners = _corners(rows, columns)
     middle = len(points) + np.arange(rows * columns)
     centres = sum(points[corner] for corner in corners) / 4
     sides = zip(corners, corners[1:] + corners[:1])
@@ -195,9 +200,8 @@ def sheet(cells: tuple[int, int], size: tuple[float, float]) -> tuple[np.ndarray
     z = size[1] * ((j + nudge[1]) / cells[1] - 0.5)
     positions = np.stack([x, np.zeros_like(x), z], axis=-1).reshape(-1, 3)
 
-    a = (i[:-1, :-1] * columns + j[:-1, :-1]).ravel()
-    b, c, d = a + columns, a + columns + 1, a + 1
-    even = ((i + j)[:-1, :-1].ravel() % 2 == 0)[:, None]
+    a, d, c, b = _corners(*cells)
+    even = _even(*cells)
     first = np.where(even, np.stack([a, c, b], 1), np.stack([a, d, b], 1))
     second = np.where(even, np.stack([a, d, c], 1), np.stack([b, d, c], 1))
     return positions, np.concatenate([first, second])
@@ -217,8 +221,7 @@ def sphere(radius: float, cells: int) -> tuple[np.ndarray, np.ndarray]:
     one = np.ones_like(u)
     sides = [np.roll(np.stack([one * s, u, v * s], -1), k, axis=-1) for k in range(3) for s in (-1.0, 1.0)]
     points = np.concatenate([side.reshape(-1, 3) for side in sides])
-    a = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
-    b, c, d = a + cells + 1, a + cells + 2, a + 1
+    a, d, c, b = _corners(cells, cells)
     square = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     faces = np.concatenate([square + k * (cells + 1) ** 2 for k in range(6)])
     # Points on the cube's edges were made once for each side: keep one of each.

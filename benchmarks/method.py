@@ -98,7 +98,8 @@ class MethodEntry:
             declares the entry.
         declared_in: that file, or module of an installed package; empty for the project's own. Filled in
             where it is read.
-        files: paths beside that file of what it reads, such as weights; a change makes its results stale.
+        files: what it reads, such as weights, as paths relative to that file; a change makes its results
+            stale.
         options: what make() gets besides models and seed.
         needs_body: whether it works on dressed bodies alone: `scene.dressed` has body, garment and motion.
         trained: name of the network that it needs, if any.

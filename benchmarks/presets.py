@@ -70,7 +70,7 @@ PRESETS = (
     Preset(
         name="smoke",
         smallest=True,
-        description="everything once, tiny: about 3 minutes on 2 cores; its numbers mean nothing",
+        description="everything once, tiny: about 2 minutes on 2 cores; its numbers mean nothing",
         garment_vertices=350,
         train_motions=1,
         test_motions=1,

@@ -10,14 +10,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
-
-if TYPE_CHECKING:
-    from reports.figures.figure import Picture
 
 
 @dataclass(frozen=True)
@@ -66,20 +62,6 @@ def build_report(run_dir: str | Path) -> Built:
     return Built(write_pdf(folder, report), run.problems, answer(run, tables))
 
 
-def draw_axes(folder: RunFolder, x: str, y: str, scenes: str | None) -> Picture:
-    """Draw any metric against any other into figures/. Raises ResultsError for a name that no row has."""
-    from reports.figures.figure import save_drawing
-    from reports.figures.metric_against_metric import metric_against_metric
-    from reports.run.reading import read_run
-
-    run = read_run(folder)
-    try:
-        drawing = metric_against_metric(run, x, y, scenes.split(",") if scenes else ())
-    except ResultsError as error:
-        raise ResultsError(f"{folder.rows_path}: {error}") from None
-    return save_drawing(folder.figures, drawing)
-
-
 @command("reports.build", goes_on="the same command begins again", bad_input=(ResultsError,))
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
@@ -90,24 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "names it), 2 when RUN_DIR is no run folder.",
     )
     parser.add_argument("run_dir", metavar="RUN_DIR", help="folder with run.json and results.csv")
-    parser.add_argument(
-        "--axes",
-        nargs=2,
-        metavar=("X", "Y"),
-        help="draw only metric Y against metric X (names as in results.csv, say cost/whole gap/energy), "
-        "means over --scenes, into figures/",
-    )
-    parser.add_argument(
-        "--scenes",
-        metavar="NAME,...",
-        help="scenes of --axes (default: those in which most methods have both)",
-    )
     options = parser.parse_args(arguments)
-    if options.axes:
-        x, y = options.axes
-        picture = draw_axes(RunFolder(options.run_dir), x, y, options.scenes)
-        print(picture.caption, picture.path, sep="\n")
-        return 0
     built = build_report(options.run_dir)
     for problem in built.problems:
         print(f"reports.build: left out: {problem}", file=sys.stderr)

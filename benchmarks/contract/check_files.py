@@ -22,7 +22,7 @@ from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.local_executor import LocalExecutor
-from benchmarks.runner.loop import NoLog, Runner
+from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scene import Scene
 from benchmarks.scenes import SCENES, find_scene, of_garment
@@ -106,7 +106,7 @@ def check_files(
     of_methods = dataclasses.replace(plan, cells=tuple(c for c in plan.cells if c.entry.declared_in))
     before = [t for t in Schedule(of_methods).tasks() if t.stage in ("ground truth", "training")]
     runner = Runner(before, Cache(run))
-    runner.run(LocalExecutor(run, assets, 1), NoLog())
+    runner.run(LocalExecutor(run, assets, 1))
     executor = LocalExecutor(run, assets, 1)
     try:
         hung = set[str]()

@@ -34,13 +34,13 @@ class CheckMethod(CellTask):
         """Check, and return the findings as the result."""
         entry = self.cell.entry
         findings, watched = Findings(entry.declared_in or entry.module), Connections()
-        findings.look(lambda: self._check(findings, context))
+        outcome = findings.look(lambda: self._check(findings, context))
         if watched.hosts:
             findings.wrong.append(
                 f"connects to {watched.hosts[0]}: fetch what it needs beforehand, keep it beside the file "
                 "and name it in files="
             )
-        return Outcome(result={"wrong": findings.wrong, "notes": findings.notes})
+        return outcome
 
     def _check(self, findings: Findings, context: Context) -> None:
         scene = self.scene(context)

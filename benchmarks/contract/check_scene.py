@@ -41,8 +41,7 @@ class CheckScene(Task):
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Check, and return the findings as the result."""
         findings = Findings(self.scene.declared_in or self.scene.module)
-        findings.look(lambda: self._check(findings, context))
-        return Outcome(result={"wrong": findings.wrong, "notes": findings.notes})
+        return findings.look(lambda: self._check(findings, context))
 
     def _check(self, findings: Findings, context: Context) -> None:
         with findings.call("build()", ": it is called as build(scene, assets, **sizes and options)"):

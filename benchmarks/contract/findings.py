@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.process.errors import one_line
+from benchmarks.tasks.task import Outcome
 
 if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
@@ -44,12 +45,13 @@ class Findings:
             where = raised_at(error, self.home)
             raise Broken(f"{what} raises {one_line(error)}{f' ({where})' if where else ''}{remedy}") from None
 
-    def look(self, check: Callable[[], None]) -> None:
-        """Run a check, until the user's code raises."""
+    def look(self, check: Callable[[], None]) -> Outcome:
+        """Run a check, until the user's code raises; return the findings as the result."""
         try:
             check()
         except Broken as broken:
             self.wrong.append(str(broken))
+        return Outcome(result={"wrong": self.wrong, "notes": self.notes})
 
 
 def raised_at(error: BaseException, home: str) -> str:

@@ -24,7 +24,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.execute_plan import executor_of
 from benchmarks.runner.lock import held
-from benchmarks.runner.loop import NoLog, Runner
+from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.sequence import SimulateSequence
@@ -62,7 +62,7 @@ def build_data_set(options: argparse.Namespace, command_line: Sequence[str]) -> 
         kept = before.sequences if before else ()
         DataSet(plan.folder, settings, _lines(tasks, {}, kept), commands).write()
         try:
-            runner.run(executor_of(plan, folder, assets), NoLog())
+            runner.run(executor_of(plan, folder, assets))
         finally:
             data = DataSet(plan.folder, settings, _lines(tasks, runner.known(), kept), commands)
             data.write()

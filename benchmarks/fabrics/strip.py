@@ -93,8 +93,7 @@ class Strip:
 
 
 def clamped_strip(
-    family: str, columns: int, length: float, material: Material, *, rows: int = ROWS,
-    scaling: str = "length_area",
+    family: str, columns: int, length: float, material: Material, *, scaling: str = "length_area"
 ) -> Strip:  # fmt: skip
     """Make a strip with two pinned columns, half a cell to each side of x = 0, and calibrate it.
 
@@ -103,12 +102,11 @@ def clamped_strip(
         columns: cells along the strip.
         length: from x = 0 to the free end [m].
         material: of the cloth.
-        rows: cells across.
         scaling: of the hinges.
     """
     cell = length / (columns - 0.5)
-    width = rows * cell * (ROW if family == "equilateral" else 1.0)
-    points, faces = rectangle(family, columns, rows, columns * cell, width)
+    width = ROWS * cell * (ROW if family == "equilateral" else 1.0)
+    points, faces = rectangle(family, columns, ROWS, columns * cell, width)
     points[:, 0] -= cell / 2
     x = in_space(points)[:, [0, 2, 1]]  # the strip lies in the plane y = 0
     cloth = Cloth(x, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.51 * cell))

@@ -8,7 +8,6 @@ baselines and networks. Curves of all else lie beside their trajectories; they a
 from __future__ import annotations
 
 import csv
-import io
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -30,44 +29,38 @@ ENERGY = "energy/"
 
 def write(folder: RunFolder, rows: Iterable[Row]) -> None:
     """Write the file, whole or not at all, of all cells that take part; none where none does."""
+    import pandas as pd
+
     cells = dict.fromkeys(
         (row.scene, row.method, row.seed)
         for row in rows
         if row.suite == "garments" and row.part == "whole" and row.role in ROLES
         if row.metric == "energy/total" and row.value is not None
     )
-    curves = {cell: _curves(folder.curves_path(*cell)) for cell in cells}
+    curves = {cell: made for cell in cells if SECONDS in (made := _curves(folder.curves_path(*cell)))}
     terms = list(dict.fromkeys(name for energies in curves.values() for name in energies if name != SECONDS))
     if not terms:
         folder.frame_energies_path.unlink(missing_ok=True)
         return
-    text = io.StringIO()
-    lines = csv.writer(text, lineterminator="\n")
-    lines.writerow([*CELL, *terms])
-    for cell, energies in curves.items():
-        for frame, seconds in enumerate(energies.get(SECONDS, ())):
-            if math.isfinite(seconds):
-                values = [energies[term][frame] if term in energies else math.nan for term in terms]
-                texts = [f"{value:.5g}" if math.isfinite(value) else "" for value in values]
-                lines.writerow([*cell, f"{seconds:.4f}", *texts])
+    table = pd.concat([pd.DataFrame(dict(zip(CELL, cell)) | curves[cell]) for cell in curves])
+    table = table.replace([math.inf, -math.inf], math.nan).dropna(subset=SECONDS)
+    table["seconds"] = table[SECONDS].map("{:.4f}".format)
     with replacing(folder.frame_energies_path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+        lines = table[[*CELL, *terms]]
+        lines.to_csv(temporary, index=False, float_format="%.5g", lineterminator="\n")
 
 
 def join(paths: Iterable[Path], out: Path) -> None:
     """Join the files that exist into one: every term, and each frame once. Raises ResultsError."""
-    terms, joined = dict[str, None](), dict[tuple[str, ...], dict[str, str]]()
+    import pandas as pd
+
+    parts = []
     for path in filter(Path.is_file, paths):
         read(path)  # refuses what is none
-        with path.open(newline="", encoding="utf-8") as stream:
-            for line in csv.DictReader(stream):
-                terms |= dict.fromkeys(name for name in line if name not in CELL)
-                joined.setdefault(tuple(line[name] for name in CELL), line)
-    if joined:
-        with replacing(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-            lines = csv.DictWriter(stream, [*CELL, *terms], restval="", lineterminator="\n")
-            lines.writeheader()
-            lines.writerows(joined.values())
+        parts.append(pd.read_csv(path, dtype=str, keep_default_na=False))
+    if any(map(len, parts)):
+        with replacing(out) as temporary:
+            pd.concat(parts).drop_duplicates([*CELL]).to_csv(temporary, index=False, lineterminator="\n")
 
 
 def _curves(path: Path) -> dict[str, np.ndarray]:

@@ -24,12 +24,13 @@ from benchmarks.process.cluster_address import connect
 from benchmarks.process.errors import one_line
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster_worker
-from benchmarks.runner.local_executor import POLL, Bar, Done, LocalExecutor, Ready
+from benchmarks.runner.local_executor import POLL, Done, LocalExecutor, Ready
 from benchmarks.runner.task_process import Needed
 from benchmarks.tasks.task import Outcome, RunStopped, Task
 
 if TYPE_CHECKING:
     from distributed import Future
+    from tqdm import tqdm
 
 LOOK = 2.0  # [s] between looks at which workers there are and how far they are
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
@@ -68,7 +69,7 @@ class ClusterExecutor(LocalExecutor):
         self._looked = 0.0
         self._opened = self._said_alone = False
 
-    def together(self, ready: Ready, bar: Bar) -> Iterator[Done]:
+    def together(self, ready: Ready, bar: tqdm) -> Iterator[Done]:
         """Yield tasks with their outcomes until none is at work and none is ready."""
         self._open()
         try:
@@ -116,7 +117,7 @@ class ClusterExecutor(LocalExecutor):
             with suppress(OSError):  # no scheduler: its workers end by themselves
                 self._client.run(cluster_worker.end_processes, self._path, on_error="ignore")
 
-    def _look(self, bar: Bar) -> None:
+    def _look(self, bar: tqdm) -> None:
         """Learn which workers there are and what they tell. Raises RunStopped where nothing can go on."""
         if time.monotonic() < self._looked + LOOK:
             return

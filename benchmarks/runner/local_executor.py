@@ -1,4 +1,4 @@
-"""Executor of tasks on this machine. cluster_executor has the same five calls.
+"""Executor of tasks on this machine. cluster_executor extends it.
 
 A task that raises, hangs, or whose process dies is an outcome, not an end of the run.
 """
@@ -9,13 +9,16 @@ import multiprocessing
 import queue
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets.assets import Assets
 from benchmarks.process.isolated_process import IsolatedProcess
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task_process import Needed, TaskProcess, begin_task, begin_tasks, call, perform
 from benchmarks.tasks.task import Context, Outcome, Task
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 POLL = 0.2  # [s] between looks at the progress
 
@@ -24,44 +27,10 @@ Done = tuple[Task, Outcome]
 Ready = Callable[[], Batch | None]
 
 
-class Bar(Protocol):
-    """A progress bar, as tqdm's."""
-
-    total: float
-    n: float
-
-    def update(self, n: float = 1) -> object:
-        """Add progress."""
-
-
-class Executor(Protocol):
-    """Executes tasks whose needs are there; gives outcomes, in any order. workers: at most, side by side."""
-
-    workers: int
-
-    def together(self, ready: Ready, bar: Bar) -> Iterator[Done]:
-        """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
-
-        ready: the next batch that can begin, None where there is none before further outcomes are known.
-        bar: is told of progress.
-        """
-
-    def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
-        """Prepare timed tasks, some side by side, each in the process that it names."""
-
-    def alone(self, task: Task, needed: Needed) -> Outcome:
-        """Do a timed task, nothing at work beside it, in the process that it names."""
-
-    def release(self, process: str) -> None:
-        """End a process that no other task wants."""
-
-    def close(self) -> None:
-        """End everything."""
-
-
 class LocalExecutor:
-    """Single-threaded processes of this machine, at most `workers` side by side.
+    """Executes tasks whose needs are there, in single-threaded processes of this machine.
 
+    At most `workers` are at work side by side; outcomes come in any order.
     Workers stay for the next batch, which then loads and compiles nothing again; none is there beside a timed
     task.
     """
@@ -72,8 +41,12 @@ class LocalExecutor:
         self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
         self._crew: list[TaskProcess] = []
 
-    def together(self, ready: Ready, bar: Bar) -> Iterator[Done]:
-        """Yield tasks with their outcomes until none is at work and none is ready."""
+    def together(self, ready: Ready, bar: tqdm) -> Iterator[Done]:
+        """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
+
+        ready: the next batch that can begin, None where there is none before further outcomes are known.
+        bar: is told of progress.
+        """
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
 
         def do(worker: TaskProcess, batch: Batch) -> None:
@@ -113,7 +86,10 @@ class LocalExecutor:
         return self._crew[-1]
 
     def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
-        """Prepare timed tasks side by side; one that dies of it has that outcome at its turn."""
+        """Prepare timed tasks side by side, each in the process that it names.
+
+        One that dies of it has that outcome at its turn.
+        """
         self._dismiss()
         with ThreadPoolExecutor(self.workers) as threads:
             begun = {
@@ -129,7 +105,7 @@ class LocalExecutor:
                 raise
 
     def alone(self, task: Task, needed: Needed) -> Outcome:
-        """Return the outcome of a timed task."""
+        """Return the outcome of a timed task, done with nothing at work beside it."""
         self._dismiss()
         if trouble := self._troubles.pop(task.process, None):
             return trouble
@@ -143,7 +119,7 @@ class LocalExecutor:
         return self._named[task.process]
 
     def release(self, process: str) -> None:
-        """End the process of this name."""
+        """End the process of this name, which no other task wants."""
         if process in self._named:
             self._named.pop(process).close()
 

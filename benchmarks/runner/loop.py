@@ -8,13 +8,13 @@ from __future__ import annotations
 import dataclasses
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence, Set
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from itertools import groupby
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from benchmarks.cell import TaskId
 from benchmarks.runner.cache import Cache, Cached
-from benchmarks.runner.local_executor import Batch, Executor
+from benchmarks.runner.local_executor import Batch, LocalExecutor
 from benchmarks.tasks.task import Outcome, Task, failure
 
 if TYPE_CHECKING:
@@ -22,24 +22,11 @@ if TYPE_CHECKING:
 
     from tqdm import tqdm
 
+    from benchmarks.runner.run_json import RunLog
+
 BLOCKED = "blocked"  # in the result of a task whose needs had failed
 AHEAD = 8  # timed tasks that begin together: each holds its scene in memory until its turn
 LEFT_OUT = "not asked for: --only names other states"
-
-
-class Log(Protocol):
-    """Follows the stages of a run."""
-
-    def stage(self, name: str) -> AbstractContextManager[None]:
-        """Return a context around all tasks of a stage."""
-
-
-class NoLog:
-    """Log where nobody follows the stages."""
-
-    def stage(self, name: str) -> AbstractContextManager[None]:
-        """Return a context that does nothing."""
-        return nullcontext()
 
 
 class Runner:
@@ -65,14 +52,17 @@ class Runner:
 
     # --- running -------------------------------------------------------------------------------------------
 
-    def run(self, executor: Executor, log: Log) -> None:
-        """Do all tasks: the timed ones one by one, the others side by side before, between and after them."""
+    def run(self, executor: LocalExecutor, log: RunLog | None = None) -> None:
+        """Do all tasks: the timed ones one by one, the others side by side before, between and after them.
+
+        log: follows the stages.
+        """
         left = self.tasks
         try:
             while left:
                 _, group = next(groupby(left, key=lambda task: task.stage if task.process else ""))
                 tasks = tuple(group)
-                with log.stage(_titles(tasks)):
+                with log.stage(_titles(tasks)) if log else nullcontext():
                     if tasks[0].process:
                         self._alone(tasks, executor)
                     else:
@@ -82,7 +72,7 @@ class Runner:
         finally:
             executor.close()
 
-    def _side_by_side(self, tasks: Sequence[Task], later: Sequence[Task], executor: Executor) -> None:
+    def _side_by_side(self, tasks: Sequence[Task], later: Sequence[Task], executor: LocalExecutor) -> None:
         """Do tasks, each as soon as its needs have outcomes; a worker that would wait begins later ones."""
         for task in tasks:
             if self._is_ready([task]):
@@ -119,7 +109,7 @@ class Runner:
         ids = (id for task in batch for id in (*task.needs, *task.reads))
         return all(id in self.outcomes or id not in self.titles for id in ids)
 
-    def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
+    def _alone(self, tasks: Sequence[Task], executor: LocalExecutor) -> None:
         """Do timed tasks one by one; the next few begin together, each in its process."""
         begun: set[str] = set()  # processes
         with _bar(tasks, sum(task.expected_seconds for task in tasks)) as bar:

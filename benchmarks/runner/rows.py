@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
@@ -14,27 +14,24 @@ from benchmarks.plan.plan import Plan
 from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
 from benchmarks.results.ensemble import is_member, spread
 from benchmarks.results.protocol import BEFORE, OWN
-from benchmarks.results.row import DECLARED, PRETRAINED, REFERENCE_TOLERANCE, Row
+from benchmarks.results.row import DECLARED, PRETRAINED, Row
 from benchmarks.tasks.pretrained_network import NAME
 from benchmarks.tasks.task import Outcome, Task
 from benchmarks.tasks.training import TrainNetwork
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
-GAP = "gap/energy"
 MOST_NAMED = 3  # names of what differs in a remark
-NOT_FALLING = "the error does not fall here"  # how the reason of a gap above that of a coarser method begins
-ROUND_OFF = 1e-6  # [J] a gap below it counts as none: who is called lower there is chance
 
 Outcomes = Mapping[TaskId, Outcome]
 
 
 def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
-    """Return the rows of all outcomes; cells first, with remarks where a gap does not fall."""
+    """Return the rows of all outcomes; cells first."""
     by_id = {task.id: task for task in tasks}
     cells = [row for cell in plan.cells for row in rows_of_cell(cell, plan, by_id, outcomes)]
     others = [row for task in tasks for row in _rows_of_task(task, outcomes)]
-    return [*remarked(with_uncertainty(cells, plan.metrics)), *others]
+    return [*with_uncertainty(cells, plan.metrics), *others]
 
 
 def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes: Outcomes) -> Iterator[Row]:
@@ -265,60 +262,3 @@ def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list
         return dataclasses.replace(row, uncertainty=spread(change for _, change in moved), moved=moved)
 
     return [with_ensemble(row) for row in rows]
-
-
-def remarked(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows, with a reason at each gap above that of a coarser method of its family.
-
-    More iterations or sweeps, or a smaller tolerance, need not lower it: a step's gap is judged from the
-    method's own past, and cloth that folds otherwise has other minima. So a rise is no failure, but whoever
-    reads the curve has to know of it.
-    """
-    rows = list(rows)
-    groups: dict[tuple[str, str, int], list[Row]] = {}
-    for row in rows:
-        if row.metric == GAP and row.value is not None:
-            for family in _curves(row):
-                groups.setdefault((row.scene, family, row.seed), []).append(row)
-    remarks: dict[tuple[str, str, int, str], str] = {}
-    for (scene, _, seed), members in groups.items():
-        for method, remark in rises(members).items():
-            remarks.setdefault((scene, method, seed, GAP), remark)
-    return [
-        dataclasses.replace(row, reason=row.reason or remarks.get(place, ""))
-        if (place := (row.scene, row.method, row.seed, row.metric)) in remarks
-        else row
-        for row in rows
-    ]
-
-
-def _curves(row: Row) -> tuple[str, ...]:
-    """Return the families along which the gap should fall: by level, or by tolerance of the reference."""
-    if row.role == "reference":
-        return ("simulation-tolerance",)
-    other = ("simulation-dt", "simulation-perturbed")  # another problem, another start
-    return (row.family,) if row.level is not None and row.family not in other else ()
-
-
-def rises(gaps: Iterable[Row]) -> dict[str, str]:
-    """Return method -> remark where its gap is above that of a coarser one of its family.
-
-    By more than two standard errors of both, where gaps are known from some of the frames.
-    """
-    remarks: dict[str, str] = {}
-    lowest = ("", math.inf, 0.0)
-    for row in sorted(gaps, key=_fineness):
-        assert row.value is not None
-        error = row.uncertainty or 0.0
-        if row.value > max(lowest[1] + 2.0 * math.hypot(error, lowest[2]), ROUND_OFF):
-            remarks[row.method] = f"{NOT_FALLING}: {lowest[0]}, the coarser one, has a gap of {lowest[1]:.2g}"
-        if row.value < lowest[1]:
-            lowest = row.method, row.value, error
-    return remarks
-
-
-def _fineness(row: Row) -> float:
-    """Return a key that grows with the effort: with iterations, and as a tolerance falls."""
-    if row.role in ("reference", "reference-variant"):
-        return -(REFERENCE_TOLERANCE if row.level is None else row.level)
-    return row.level or 0.0

@@ -28,12 +28,10 @@ TOLERANCE = 1e-4  # mean vertex weights: the hem is measured in millimetres
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SettleStart(Task):
-    """The garment settled in the first pose of a scene, or what settled in its `start_of`; the posed body."""
+class _OfScene(Task):
+    """What is simulated once for each scene."""
 
-    kind = "start"
     silent = True
-    stage = "ground truth"
     unit_seconds = 0.07
     scene: Scene
 
@@ -41,6 +39,14 @@ class SettleStart(Task):
     def id_of(cls, scene: Scene) -> TaskId:
         """Return the id of the task of a scene."""
         return cls.kind, flat(scene.name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SettleStart(_OfScene):
+    """The garment settled in the first pose of a scene, or what settled in its `start_of`; the posed body."""
+
+    kind = "start"
+    stage = "ground truth"
 
     def clear(self, folder: RunFolder) -> None:
         """Remove the files of an earlier run of it."""
@@ -201,19 +207,11 @@ def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Traje
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SimulateQuasiStatic(Task):
+class SimulateQuasiStatic(_OfScene):
     """Quasi-static solution of each frame of a scene: dynamics are measured against it."""
 
     kind = "quasi-static"
-    silent = True
     stage = "quasi-static answers"
-    unit_seconds = 0.07
-    scene: Scene
-
-    @classmethod
-    def id_of(cls, scene: Scene) -> TaskId:
-        """Return the id of the task of a scene."""
-        return cls.kind, flat(scene.name)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Simulate each frame held still and write the trajectory."""

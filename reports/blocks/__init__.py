@@ -70,5 +70,4 @@ BLOCKS: tuple[Block, ...] = (
     TableBlock("endings"),
     TableBlock("unfinished", printed=with_labels),
     SentenceBlock(unread_files),
-    FigureBlock("spare_strip", fills_last_page=True),
 )

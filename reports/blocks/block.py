@@ -48,14 +48,10 @@ class SentenceBlock:
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """Pictures of a figure; of several figures the first of each, side by side.
-
-    fills_last_page: shown only where the last page of the PDF has room.
-    """
+    """Pictures of a figure; of several figures the first of each, side by side."""
 
     name: str
     beside: str = ""
-    fills_last_page: bool = False
 
     def pictures(self, report: Report) -> list[Picture]:
         """Return the pictures that were drawn."""

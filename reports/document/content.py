@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.blocks import BLOCKS
-from reports.blocks.block import FigureBlock, Heading, Report
+from reports.blocks.block import Heading, Report
 from reports.blocks.printed_tables import cut
 from reports.document.configuration import configuration
 from reports.document.layout import lay_out
@@ -33,12 +33,6 @@ def content(report: Report) -> dict[str, Any]:
         "configuration": configuration(run.config, run.frame),
         "sections": [section for section in sections[1:] if section["blocks"]],
         "definitions": _definitions(report),
-        "spare": [
-            values
-            for block in BLOCKS
-            if isinstance(block, FigureBlock) and block.fills_last_page
-            for values in lay_out(report, block)
-        ],
         "elsewhere": [
             [f"tables/{table.name}.csv", cut(table.caption)]
             for table in report.tables.values()
@@ -53,7 +47,7 @@ def _sections(report: Report) -> list[dict[str, Any]]:
     for block in BLOCKS:
         if isinstance(block, Heading):
             sections.append({"title": block.title, "blocks": []})
-        elif not (isinstance(block, FigureBlock) and block.fills_last_page):
+        else:
             sections[-1]["blocks"] += lay_out(report, block)
     return sections
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import string
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.entries.tables import Scored, entries_tables, of_entry
 from reports.page.page_data import table_data
-from reports.page.write_page import HERE, policy_hash
+from reports.page.write_page import filled
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
 from reports.tables.table import Table
@@ -35,18 +34,9 @@ def entries_page(path: Path, tables: Sequence[tuple[Table, Sequence[Scored]]]) -
             if link := entry.link(path):
                 row[0] = [row[0], row[0], "", "", link]
         content.append(data)
-    style = (HERE / "page.css").read_text(encoding="utf-8")
-    code = "".join((HERE / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
-    script = f"'use strict';(() => {{\n{code}}})();"
-    template = string.Template((HERE / "entries.html").read_text(encoding="utf-8"))
     text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return template.substitute(
-        style=style,
-        script=script,
-        style_hash=policy_hash(style),
-        script_hash=policy_hash(script),
-        content=text.replace("<", "\\u003c"),  # no text of an entry ends the element
-    )
+    # No text of an entry ends the element.
+    return filled("entries.html", SCRIPTS, content=text.replace("<", "\\u003c"))
 
 
 def entries_in(folder: Path) -> list[Path]:

@@ -17,7 +17,6 @@ from reports.statistics.pareto import compared_cells
 
 INERTIA = "energy/inertia"
 FEW = 3  # methods side by side at many frames
-SPARE = 2  # further motions that may fill the last page
 
 
 @dataclass(frozen=True)
@@ -81,25 +80,17 @@ def page_one_roll_outs(run: Run) -> PageOne | None:
 
 
 @lru_cache(maxsize=1)
-def whole_motions(run: Run) -> tuple[Motion, ...]:
-    """Return the first whole motions that kept roll-outs: one to show at length, SPARE to fill a page."""
+def long_motion(run: Run) -> Motion | None:
+    """Return the first whole motion that kept roll-outs, shown at length; None where the run kept none."""
     page_one = page_one_roll_outs(run)
     rows = run.garment_rows[run.garment_rows["metric"] == "energy/total"]
-    motions: list[Motion] = []
     for scene in [scene for scenes in run.garments(rows).values() for scene in scenes]:
         of_scene = rows[rows["scene"] == scene]
         roll_outs = read_scene(run, of_scene, leading(run, of_scene["method"]))
         if roll_outs.series:
             few = [m for m in (page_one[1] if page_one else ()) if m in roll_outs.series]
-            motions.append(Motion(roll_outs, tuple(few or leads(run, of_scene, roll_outs.series))))
-        if len(motions) > SPARE:
-            break
-    return tuple(motions)
-
-
-def long_motion(run: Run) -> Motion | None:
-    """Return the motion that is shown at length, None where the run kept no roll-out of one."""
-    return next(iter(whole_motions(run)), None)
+            return Motion(roll_outs, tuple(few or leads(run, of_scene, roll_outs.series)))
+    return None
 
 
 def read_scene(run: Run, rows: pd.DataFrame, methods: Iterable[str]) -> SceneRollOuts:

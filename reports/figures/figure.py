@@ -78,7 +78,7 @@ def save_drawing(folder: Path, drawing: Drawing) -> Picture:
 
 
 def remove_figures(folder: Path, figures: Iterable[Figure]) -> None:
-    """Remove the files of these figures; what --axes drew stays."""
+    """Remove the files of these figures."""
     for figure in figures:
         for pattern in figure.patterns():
             for path in folder.glob(pattern):

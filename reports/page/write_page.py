@@ -47,17 +47,11 @@ def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> Pa
 
 
 def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
-    style = (HERE / "page.css").read_text(encoding="utf-8")
-    code = "".join((HERE / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
-    script = f"'use strict';(() => {{\n{code}}})();"
     data = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     blobs = {"content": deflated(data.encode()), **embedded.texts}
-    template = string.Template((HERE / "page.html").read_text(encoding="utf-8"))
-    return template.substitute(
-        style=style,
-        script=script,
-        style_hash=policy_hash(style),
-        script_hash=policy_hash(script),
+    return filled(
+        "page.html",
+        SCRIPTS,
         subtitle=html.escape(report.subtitle),
         sentences=_sentences(report),
         trouble=_trouble(report),
@@ -90,6 +84,20 @@ def _details(summary: str, lines: Sequence[str], kind: str) -> str:
     )
 
 
-def policy_hash(text: str) -> str:
+def filled(name: str, scripts: Sequence[str], **values: str) -> str:
+    """Return a template of this folder with its style, these scripts in their order, and values."""
+    style = (HERE / "page.css").read_text(encoding="utf-8")
+    code = "".join((HERE / f"{script}.js").read_text(encoding="utf-8") for script in scripts)
+    script = f"'use strict';(() => {{\n{code}}})();"
+    return string.Template((HERE / name).read_text(encoding="utf-8")).substitute(
+        style=style,
+        script=script,
+        style_hash=_policy_hash(style),
+        script_hash=_policy_hash(script),
+        **values,
+    )
+
+
+def _policy_hash(text: str) -> str:
     """Return the hash for the policy that lets a browser run this text and no other."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")

@@ -8,13 +8,12 @@ from reports.pictures.colour_maps import ColourMaps
 from reports.pictures.failures import Failures
 from reports.pictures.lead_row import LeadRow
 from reports.pictures.side_by_side import SideBySide
-from reports.pictures.strip import SpareStrips, Strip
+from reports.pictures.strip import Strip
 
 PICTURES: tuple[Figure, ...] = (
     LeadRow(),
     ColourMaps(),
     SideBySide(),
     Strip(),
-    SpareStrips(),
     Failures(),
 )

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from reports.figures.chosen_roll_outs import FEW, Motion, SceneRollOuts, long_motion, whole_motions
+from reports.figures.chosen_roll_outs import FEW, Motion, SceneRollOuts, long_motion
 from reports.figures.figure import Drawing, Figure
 from reports.figures.plotting import PAGE_WIDTH, file_name, wrapped
 from reports.pictures.sheets import FRONT, SIDE, count_lines, sheet, shots
@@ -31,21 +31,6 @@ class Strip(Figure[Motion]):
     def draw(self, run: Run, data: Motion) -> Iterator[Drawing]:
         """Draw that motion."""
         yield draw_strip(run, data.roll_outs, data.few)
-
-
-class SpareStrips(Figure[list[Motion]]):
-    """Further motions, which may fill the last page."""
-
-    name, files = "spare_strip", ("strip_*",)
-
-    def needs(self, run: Run) -> list[Motion]:
-        """Return the motions behind the first."""
-        return [motion for motion in whole_motions(run)[1:] if motion.few]
-
-    def draw(self, run: Run, data: list[Motion]) -> Iterator[Drawing]:
-        """Draw each of them."""
-        for motion in data:
-            yield draw_strip(run, motion.roll_outs, motion.few[:FEW])
 
 
 def draw_strip(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]) -> Drawing:

@@ -1,19 +1,18 @@
-"""Tables of a document whose texts the code has: options, attributes, recipes, presets, suites, kernels."""
+"""Tables of a document whose texts the code has: options, attributes, recipes, presets, suites."""
 
 from __future__ import annotations
 
 import inspect
 import re
 from argparse import SUPPRESS, ArgumentParser
+from collections.abc import Sequence
 from importlib import import_module
 
 from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS
-from reference_sim.kernels.fast_kernels import USES
 from reports.text.metric_families import family_rows
-from snug.garments.templates import GARMENT_TEMPLATES
 from snug.recipes.named import RECIPES
 
 Rows = list[tuple[str, ...]]
@@ -36,6 +35,27 @@ def option_rows(parser: ArgumentParser) -> Rows:
         for action in shown
     ]
     return [("Option", "Meaning"), *(row for row in rows if "--help" not in row[0])]
+
+
+def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
+    """Return the heading and the rows that are asked for, in the order of their names.
+
+    Args:
+        rows: a heading, then rows whose first cells have the names.
+        names: as "--seed" or "dtype"; none for all rows.
+
+    Raises:
+        ValueError: a name that no row has.
+
+    >>> chosen_rows([("Field", "Content"), ("`dt`", "[s]"), ("`frames`", "number")], ["frames"])
+    [('Field', 'Content'), ('`frames`', 'number')]
+    """
+    if not names:
+        return rows
+    row_of_name = {name: row for row in rows[1:] for name in re.findall(r"[\w-]+", row[0])}
+    if unknown := [name for name in names if name not in row_of_name]:
+        raise ValueError(f"no row has the name '{unknown[0]}'")
+    return [rows[0], *(row_of_name[name] for name in names)]
 
 
 def attribute_rows(path: str) -> Rows:
@@ -134,29 +154,9 @@ def suite_rows() -> Rows:
     return [("Suite", "Question"), *((f"`{suite.name}`", suite.description) for suite in SUITES)]
 
 
-def garment_rows() -> Rows:
-    """Return a heading and a row of each kind of tailored garment, with the defaults of its function."""
-    rows = []
-    for kind in GARMENT_TEMPLATES:
-        cut = [
-            f"{name}={parameter.default:g}"
-            for name, parameter in inspect.signature(kind.tailor).parameters.items()
-            if name not in ("body", "vertices")
-        ]
-        rows.append((f"`{kind.name}`", f"`{kind.tailor.__name__}`", f"`{', '.join(cut)}`"))
-    return [("Kind", "Function", "Cut"), *rows]
-
-
-def kernel_rows() -> Rows:
-    """Return a heading and a row of each use of a fast kernel."""
-    return [("Use", "The function returns: asked by"), *((f"`{use}`", text) for use, text in USES.items())]
-
-
 PARTS = {
     "metrics": metric_rows,
     "presets": preset_rows,
     "suites": suite_rows,
-    "kinds of garments": garment_rows,
-    "uses of kernels": kernel_rows,
     "options of benchmarks.run": lambda: option_rows(make_parser()),
 }

@@ -2,10 +2,11 @@
 
 `headline of RUN`, `excess METHOD of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`,
 `claims exploratory of RUN, ...`, `counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of
-reports/published, and the first run that has both methods of a claim judges it. `rooms of PACKAGE`,
-`attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of NAME, ...`, `sources of the
-library` and the parts that `code_parts.PARTS` names come from the code, `evaluations of published runs` from
-the run.json of each run.
+reports/published, and the first run that has both methods of a claim judges it. `attributes of MODULE.CLASS`,
+`docstring of MODULE` (its table), `recipes of NAME, ...`, `sources of the library` and the parts that
+`code_parts.PARTS` names come from the code, `evaluations of published runs` from the run.json of each run;
+`attributes` and `options of benchmarks.run` take names after a semicolon, whose rows alone are shown, in that
+order.
 """
 
 from __future__ import annotations
@@ -24,23 +25,22 @@ from reports.statistics.published import PUBLISHED
 from reports.tables import TABLES
 from reports.tables.table import Table
 from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
-from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, recipe_rows
+from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows
 from reports.text.excess_terms import excess_terms
-from reports.text.rooms import room_rows
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.motion.composition import clip_rows, distance_rows, source_rows
 
 FORMS = (
     "headline of RUN; excess METHOD of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; "
-    "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; rooms of PACKAGE; "
-    "attributes of MODULE.CLASS; docstring of MODULE; recipes of "
+    "claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; "
+    "attributes of MODULE.CLASS; NAME, ...; docstring of MODULE; recipes of "
     f"NAME, ...; sources of the library; evaluations of published runs; {'; '.join(PARTS)}"
 )
 
 LIBRARY_FILES = {"library_clips.csv": clip_rows, "library_distances.csv": distance_rows}  # in docs/
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
-ORIGIN = ("Run", "Day", "Commit", "Processor (2 cores)", "Command")  # heads
+ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
 
 
 def published_part(words: str) -> str:
@@ -48,17 +48,16 @@ def published_part(words: str) -> str:
     what, _, source = words.partition(" of ")
     runs, _, columns = source.partition(";")
     folders = [PUBLISHED / name.strip() for name in runs.split(",")]
+    wanted = [column.strip() for column in columns.split(",") if column.strip()]
     kind, _, name = what.partition(" ")
-    if words in PARTS:
-        return markdown_table(PARTS[words]())
-    if kind == "rooms":
-        return markdown_table(room_rows(source))
+    if (part := words.partition(";")[0]) in PARTS:
+        return markdown_table(chosen_rows(PARTS[part](), wanted))
     if kind == "docstring":
         return markdown_table(docstring_rows(source))
     if kind == "recipes":
         return markdown_table(recipe_rows(source))
     if kind == "attributes":
-        return markdown_table(attribute_rows(source))
+        return markdown_table(chosen_rows(attribute_rows(runs), wanted))
     if words == "sources of the library":
         return markdown_table(list(source_rows()))
     if words == "evaluations of published runs":
@@ -68,7 +67,6 @@ def published_part(words: str) -> str:
     if kind == "excess":
         return excess_terms(read_published(folders[0]), name)
     if kind == "table":
-        wanted = [column.strip() for column in columns.split(",") if column.strip()]
         table = _table(folders[0], name)
         rows = text_rows(read_published(folders[0]), table, wanted)
         return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
@@ -78,7 +76,7 @@ def published_part(words: str) -> str:
         return claim_counts(_claims(*folders))
     if kind == "runs":
         parts = [(folder, part) for folder in folders for part in origins(RunFolder(folder).read_config())]
-        lines = [(folder.name, *part[:3], f"`{part[-1]}`") for folder, part in parts]
+        lines = dict.fromkeys((folder.name, *part[:3]) for folder, part in parts)
         return markdown_table([ORIGIN, *lines])
     raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
 

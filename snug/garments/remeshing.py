@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from reference_sim.geometry.surface import vertex_normals
 from reference_sim.geometry.topology import boundary_loops, half_edges, triangle_areas
 
 Array = NDArray[np.float64]
@@ -23,15 +24,6 @@ Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
 EVENNESS = 3
 RELAXATION_STEP = 0.2
 RELAXATIONS = 40  # rounds of relax
-
-
-def _vertex_normals(points: Array, faces: Index) -> Array:
-    """Return unit normals (V,3), area-weighted."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    normals = np.zeros_like(points)
-    for k in range(3):
-        np.add.at(normals, faces[:, k], np.cross(b - a, c - a))
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
 def along(curve: Array, shares: Array) -> Array:
@@ -130,9 +122,8 @@ def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
     # pyacvd winds each triangle by a guess at its normal, wrong near creases: make it the sheet's.
     coarse_faces = igl.bfs_orient(coarse_faces)[0].astype(np.int64)
     nearest = cKDTree(np.asarray(sheet.points)).query(coarse_points[coarse_faces].mean(axis=1))[1]
-    outward = _vertex_normals(np.asarray(sheet.points, dtype=np.float64), np.asarray(sheet.regular_faces))[
-        nearest
-    ]
+    normals = vertex_normals(np.asarray(sheet.points, dtype=np.float64), np.asarray(sheet.regular_faces))
+    outward = normals[nearest]
     a, b, c = (coarse_points[coarse_faces[:, k]] for k in range(3))
     if np.sum(np.cross(b - a, c - a) * outward) < 0:
         coarse_faces = coarse_faces[:, ::-1]

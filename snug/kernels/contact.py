@@ -1,4 +1,4 @@
-"""Kernels of the contact cache: normals of the skin, planes at anchors, energy of all samples."""
+"""Kernels of the contact cache: normals of the skin, energy of all samples."""
 
 from __future__ import annotations
 
@@ -52,44 +52,6 @@ def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
                 for axis in range(3):
                     out[size * (start + n) + 3 * v + axis] = rounded[axis * L + n]
     return normals
-
-
-@njit(cache=True, inline="always", error_model="numpy")
-def _interpolated(
-    faces: np.ndarray, face: np.integer, parts: np.ndarray, vectors: np.ndarray, c: int
-) -> np.float32:
-    """Interpolate component c of vectors (P, 3) of the body's vertices at an anchor."""
-    v, w = np.float32(parts[0]) / np.float32(PARTS), np.float32(parts[1]) / np.float32(PARTS)
-    u = np.float32(1.0) - v - w
-    return u * vectors[faces[face, 0], c] + v * vectors[faces[face, 1], c] + w * vectors[faces[face, 2], c]
-
-
-@njit(cache=True, error_model="numpy")
-def interpolated_planes(
-    frames: np.ndarray,
-    rows: np.ndarray,
-    positions: np.ndarray,
-    normals: np.ndarray,
-    faces: np.ndarray,
-    anchor_faces: np.ndarray,
-    barycentric: np.ndarray,
-    out_points: np.ndarray,
-    out_normals: np.ndarray,
-) -> None:
-    """Compute points and unit normals (N, S, 3) at the anchors of frames (N,), see ContactCache.planes."""
-    for n in range(len(frames)):
-        x, m = positions[rows[n]], normals[rows[n]]
-        anchors, parts = anchor_faces[frames[n]], barycentric[frames[n]]
-        for s in range(anchors.shape[0]):
-            length = np.float32(0.0)
-            for c in range(3):
-                out_points[n, s, c] = _interpolated(faces, anchors[s], parts[s], x, c)
-                direction = _interpolated(faces, anchors[s], parts[s], m, c)
-                out_normals[n, s, c] = direction
-                length += direction * direction
-            length = np.sqrt(length) + np.float32(1e-30)
-            for c in range(3):
-                out_normals[n, s, c] /= length
 
 
 @njit(cache=True, inline="always", error_model="numpy")

@@ -1,17 +1,13 @@
 """Network and skinning of one frame as one compiled call, laid out by snug.networks.frame_layout.
 
 A frame alone is one pass over all weights, matrix after matrix: its time is that of fetching them. So each
-matrix lies in one piece, in the order of use, float32, bf16 (the upper halves of float32, as uint16) or int8
-(a factor for each row). tests/snug/networks/test_frame_layout.py compares them with torch.
+matrix lies in one piece, in the order of use, float32. tests/snug/networks/test_frame_layout.py compares them
+with torch.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import types
-from numba.extending import overload
 
 from reference_sim.kernels.kernel_cache import njit
 
@@ -88,11 +84,11 @@ def run_frame(
 
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
     begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where its
-    recurrent part begins; of SUM rows is its size; of NEAREST the terms begin with the number of rows that
-    share, and what is added to each distance; of HANDLE rows is how far apart two coordinates of a vertex are
-    written, and columns how far apart their numbers are read. terms: mean and spread of the features (D,),
-    which are normalised into work[:D], then factors and biases of each matrix. The offsets are the last of
-    `work`. The others are those of skin_frame.
+    recurrent part begins; of SUM rows is its size; of NEAREST the terms are the number of rows that share,
+    what is added to each distance, and a factor; of HANDLE rows is how far apart two coordinates of a vertex
+    are written, and columns how far apart their numbers are read. terms: mean and spread of the features
+    (D,), which are normalised into work[:D], then factors and biases of each matrix. The offsets are the last
+    of `work`. The others are those of skin_frame.
     """
     inputs = len(features)
     for i in range(inputs):
@@ -106,7 +102,7 @@ def run_frame(
             for j in range(rows):
                 y[j] += source[j]
         elif kind == DISTANCES:
-            _distances(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
+            _distances(weights[operations[i, 3] :], source, y, rows, columns)
         elif kind == NEAREST:
             _nearest(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
         elif kind in (HANDLE, HANDLE_ADDED):
@@ -115,25 +111,6 @@ def run_frame(
             matrix, affine = weights[operations[i, 3] :], terms[operations[i, 4] :]
             _multiply(kind, matrix, affine, source, y, rows, columns)
     skin_frame(work[len(work) - rest.size :], rest, first, joints, shares, order, transforms, pelvis, out)
-
-
-def _value(weight: Any) -> Any:
-    """Return a stored weight as float32, without its row's factor."""
-
-
-def _expanded(weight: Any) -> Any:  # bf16 is the upper half of a float32
-    return np.uint32(np.uint32(weight) << np.uint32(16)).view(np.float32)
-
-
-def _converted(weight: Any) -> Any:
-    return np.float32(weight)
-
-
-@overload(_value, inline="always")
-def _value_of(weight: Any) -> Any:
-    if weight == types.uint16:
-        return _expanded
-    return _converted
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -147,10 +124,10 @@ def _multiply(
         w2, w3 = weights[(2 * part + i) * columns :], weights[(3 * part + i) * columns :]
         s0, s1, s2, s3 = _ZERO, _ZERO, _ZERO, _ZERO
         for k in range(columns):
-            s0 += _value(w0[k]) * x[k]
-            s1 += _value(w1[k]) * x[k]
-            s2 += _value(w2[k]) * x[k]
-            s3 += _value(w3[k]) * x[k]
+            s0 += w0[k] * x[k]
+            s1 += w1[k] * x[k]
+            s2 += w2[k] * x[k]
+            s3 += w3[k] * x[k]
         for r, s in enumerate((s0, s1, s2, s3)):
             j = r * part + i
             value = terms[j] * s + terms[rows + j]
@@ -164,13 +141,11 @@ def _multiply(
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def _distances(
-    weights: np.ndarray, factors: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int
-) -> None:
+def _distances(weights: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int) -> None:
     for j in range(rows):
         w, squared = weights[j * columns :], _ZERO
         for k in range(columns):
-            difference = factors[j] * _value(w[k]) - x[k]
+            difference = w[k] - x[k]
             squared += difference * difference
         y[j] = squared
 
@@ -185,9 +160,9 @@ def _nearest(
     for _ in range(int(terms[0])):
         j = np.argmin(distances[:rows])
         share = _ONE / (distances[j] + terms[1])
-        w, factor = weights[j * columns :], share * terms[2 + j]
+        w, factor = weights[j * columns :], share * terms[2]
         for k in range(columns):
-            y[k] += factor * _value(w[k])
+            y[k] += factor * w[k]
         total += share
         distances[j] = np.inf
     for k in range(columns):

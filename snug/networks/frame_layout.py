@@ -7,8 +7,6 @@ compares every kind with its `forward`.
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -33,7 +31,6 @@ from snug.kernels.one_frame import (
 from snug.networks.garment_network import GarmentNetwork
 
 ACTIVATIONS = {nn.Identity: PRODUCT, nn.ReLU: RECTIFIED, nn.SiLU: SMOOTH}
-PRECISIONS = ("float32", "bf16", "int8")  # in which matrices are stored; all else is float32
 
 
 class CompiledFrame:
@@ -43,7 +40,6 @@ class CompiledFrame:
         rest: unposed garment (V, 3) [m].
         weights: skinning weights (V, J).
         network: gives the offsets; None skins alone.
-        precision: of the network's matrices in memory, one of PRECISIONS.
     """
 
     def __init__(
@@ -51,13 +47,11 @@ class CompiledFrame:
         rest: Tensor,
         weights: Tensor,
         network: GarmentNetwork | None = None,
-        *,
-        precision: str = "float32",
     ) -> None:
         order, *joints = _blocks(weights.numpy())
         unposed = np.zeros((3, VERTEX_BLOCK * (len(joints[0]) - 1)), np.float32)
         unposed[:, : len(order)] = rest.numpy()[order].T
-        plan = FramePlan(order, unposed.shape[1], precision)
+        plan = FramePlan(order, unposed.shape[1])
         if network is not None:
             network.lay_out(plan)
         self._operations = None if network is None else plan.operations()
@@ -99,11 +93,10 @@ class FramePlan:
     Args:
         order: vertices (V,) as they are skinned.
         padded: number of vertices, filled up to whole blocks.
-        precision: of the matrices, one of PRECISIONS.
     """
 
-    def __init__(self, order: np.ndarray, padded: int, precision: str) -> None:
-        self._precision, self._used = precision, 0
+    def __init__(self, order: np.ndarray, padded: int) -> None:
+        self._used = 0
         self._places = np.full(padded, len(order))
         self._places[: len(order)] = order
         self._operations: list[tuple[int, ...]] = []
@@ -170,14 +163,13 @@ class FramePlan:
         matrix = np.pad(frames.detach().numpy(), ((0, 0), (0, 3)))[:, self._rows(network)]
         first = sum(map(len, self._matrices)), sum(map(len, self._terms))
         self._operations.append((NEAREST, *matrix.shape, *first, distances.start, self._used))
-        weights, factors = store_matrix(matrix, self._precision)
-        self._matrices.append(weights.ravel())
-        self._terms += [np.array([neighbours, near], np.float32), np.float32(network.output_scale) * factors]
+        self._matrices.append(matrix.ravel())
+        self._terms.append(np.array([neighbours, near, network.output_scale], np.float32))
 
     def add_handles(self, network: GarmentNetwork, functions: Tensor, x: slice) -> None:
         """Add the offsets of handles whose numbers lie at x, with shape functions (V, B, 4); called last.
 
-        Each block of vertices reads the handles that reach it. The functions stay in float32.
+        Each block of vertices reads the handles that reach it.
         """
         count, padded = functions.shape[1], len(self._places)
         values = np.concatenate([functions.detach().numpy(), np.zeros((1, count, 4), np.float32)])
@@ -216,38 +208,8 @@ class FramePlan:
         matrix = np.pad(matrix, ((0, more), (0, _up(columns, COLUMNS) - columns)))
         first = sum(map(len, self._matrices)), sum(map(len, self._terms))
         self._operations.append((kind, *matrix.shape, *first, x.start, target))
-        weights, factors = store_matrix(matrix, self._precision)
-        self._matrices.append(weights.ravel())
-        self._terms += [np.float32(scale) * factors, np.float32(scale) * np.pad(bias, (0, more))]
-
-
-def store_matrix(matrix: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return a float32 matrix (m, n) in its stored form, and the factor of each row (m,).
-
-    Raises ValueError for an unknown precision.
-    """
-    if precision not in PRECISIONS:
-        raise ValueError(f"unknown precision {precision!r}: use one of {', '.join(PRECISIONS)}")
-    ones = np.ones(len(matrix), np.float32)
-    if precision == "float32":
-        return matrix, ones
-    if precision == "bf16":
-        return torch.from_numpy(matrix).bfloat16().view(torch.uint16).numpy(), ones
-    largest = np.abs(matrix).max(axis=1)
-    factors = np.where(largest > 0.0, largest / np.float32(127.0), ones)
-    return np.rint(matrix / factors[:, None]).astype(np.int8), factors
-
-
-def round_matrices(network: GarmentNetwork, precision: str) -> GarmentNetwork:
-    """Return a copy of the network with its matrices rounded to a precision."""
-    network = copy.deepcopy(network)
-    for parameter in network.parameters():
-        if parameter.ndim == 2 and precision != "float32":
-            values, factors = store_matrix(parameter.detach().numpy(), precision)
-            if precision == "bf16":
-                values = (values.astype(np.uint32) << 16).view(np.float32)
-            parameter.data = torch.from_numpy(values * factors[:, None])
-    return network
+        self._matrices.append(matrix.ravel())
+        self._terms += [np.full(len(matrix), scale, np.float32), np.float32(scale) * np.pad(bias, (0, more))]
 
 
 def _numbers_of(layer: nn.Linear) -> tuple[np.ndarray, np.ndarray]:

@@ -193,9 +193,7 @@ def prepare_frames(
         RollOutError: if the model does not fit.
     """
     features = _features(model, dressed, _joined(earlier, motion), betas).numpy()
-    frame = CompiledFrame(
-        dressed.rest(betas), dressed.weights(model.recipe.smoothing), model.network, precision=model.precision
-    )
+    frame = CompiledFrame(dressed.rest(betas), dressed.weights(model.recipe.smoothing), model.network)
     return _one_by_one(frame, features, dressed, motion, betas)
 
 

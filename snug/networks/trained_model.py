@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from torch import Tensor
 
 from snug.networks.architectures import make_network
-from snug.networks.frame_layout import round_matrices
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.recipes.recipe import Recipe
@@ -46,7 +45,6 @@ class TrainedModel:
         unit: of the loss: joules, or a distance from the simulated vertices.
         origin: what is known of its training: data, commit, versions, processor, and digests of all that it
             depends on, see benchmarks.tasks.training; empty where nobody noted it.
-        precision: of the matrices in roll-outs, one of frame_layout.PRECISIONS; not in its file.
 
     Example:
         >>> from snug.recipes.recipe import DEFAULT
@@ -68,7 +66,6 @@ class TrainedModel:
     summary: dict[str, Any] = field(default_factory=dict)
     unit: str = "J"
     origin: dict[str, Any] = field(default_factory=dict)
-    precision: str = "float32"
 
     @property
     def megabytes(self) -> float:
@@ -79,10 +76,6 @@ class TrainedModel:
     def vertices(self) -> int:
         """Number of vertices of the garment."""
         return int(self.network.vertices)
-
-    def rounded(self, precision: str) -> TrainedModel:
-        """Return the model with matrices rounded to that precision. Raises ValueError for an unknown one."""
-        return replace(self, network=round_matrices(self.network, precision), precision=precision)
 
     def save(self, path: str | Path) -> Path:
         """Write weights and metadata to one safetensors file, whole or not at all; return its path."""

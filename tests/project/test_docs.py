@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
-EXTEND = ROOT / "docs" / "extend.md"
+EXTEND, EXAMPLES = ROOT / "docs" / "extend.md", ROOT / "docs" / "examples"
 FILE = re.compile(r"File `([^`]+)`:$")
 SHORT = ("A method", "An energy", "A scene", "A metric")
 LONG = (
@@ -42,8 +42,10 @@ SECTIONS = sections(EXTEND.read_text(encoding="utf-8"))
 
 @pytest.fixture(scope="module")
 def user(tmp_path_factory) -> Path:
-    """A user's folder with every file of the document."""
+    """A user's folder with every file of the document and every example."""
     folder = tmp_path_factory.mktemp("user")
+    for path in EXAMPLES.glob("*.py"):
+        (folder / path.name).write_bytes(path.read_bytes())
     for section in SECTIONS.values():
         for before, _, content in blocks(section):
             if found := FILE.search(before):
@@ -83,6 +85,7 @@ def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
         total = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/total"}
         # In n frames backward Euler falls (n + 1) / n times as far.
         assert total["explicit-200"] == pytest.approx(total["simulation"], rel=0.2)
+        assert total["held"] > total["simulation"]  # it keeps its height
     if title == "A network from elsewhere":
         skinned = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/strain"}
         assert skinned["pose-network"] > skinned["skinning"] > 0.0  # the same but for smoothed weights

@@ -89,7 +89,7 @@ def test_every_file_of_the_report_is_there(made):
     pictures = {path.name for path in made.figures.iterdir()}
     for stem in ("energy_series_tshirt-walk", "error_against_time", "training", "dots", "histograms"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
-    assert {"lead.png", "frames_tshirt-walk.png", "strip_tshirt-jump.png", "failures.png"} <= pictures
+    assert {"lead.png", "frames_tshirt-walk.png", "strip_tshirt-walk.png", "failures.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
 
 

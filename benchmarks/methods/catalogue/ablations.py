@@ -1,10 +1,7 @@
-"""Ablations of SNUG: one choice of its recipe changed, one deviation from the paper, coarser weights."""
+"""Ablations of SNUG: one choice of its recipe changed, one deviation from the paper."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.networks import network
 from snug.recipes.deviations import DEVIATIONS
 from snug.recipes.named import ABLATIONS
@@ -21,15 +18,6 @@ _LABELS = {
 }
 
 
-def _rounded(precision: str) -> MethodEntry:
-    label = f"SNUG, its weights in {precision}"
-    entry = network(
-        "snug", label, f"{label}: less memory to read in a frame, rounded answers", role="ablation",
-        options={"kind": "snug", "precision": precision}, batched=False, base="snug",
-    )  # fmt: skip
-    return replace(entry, name=f"snug-{precision}")
-
-
 RECIPES = tuple(
     network(
         f"snug-{recipe.name}", f"SNUG, {_LABELS.get(recipe.name, recipe.name.replace('-', ' '))}",
@@ -37,8 +25,6 @@ RECIPES = tuple(
     )
     for recipe in ABLATIONS
 )  # fmt: skip
-
-PRECISIONS = tuple(map(_rounded, ("bf16", "int8")))
 
 # Each a training of its own, of equal steps: their times stand beside them.
 RECIPE_DEVIATIONS = tuple(

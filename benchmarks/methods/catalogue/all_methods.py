@@ -19,7 +19,6 @@ FURTHER_METHODS = (
     *networks.HANDLES,
     *networks.FLOORS,
     *ablations.RECIPES,
-    *ablations.PRECISIONS,
     *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
     *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs", trained="snug-dynamic",
                   pairing_group="snug"),

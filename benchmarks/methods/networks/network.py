@@ -21,18 +21,16 @@ from snug.networks.trained_model import TrainedModel
 class Network(Method):
     """Network read from its file. Features are made and the network is warmed up before run().
 
-    precision: of its matrices, one of snug.networks.frame_layout.PRECISIONS.
     then: applied to each frame, as post-processing.
     """
 
     path: Path
-    precision: str = "float32"
     then: Callable[[np.ndarray, int], np.ndarray] | None = field(default=None, init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
         """Read the model, make the features and warm up. Not timed."""
         assert scene.dressed is not None
-        self.model = TrainedModel.load(self.path).rounded(self.precision)
+        self.model = TrainedModel.load(self.path)
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         self.frames = prepare_roll_out(
@@ -60,6 +58,6 @@ class Network(Method):
         return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
 
 
-def make(*, models: Path, seed: int, kind: str, precision: str = "float32") -> Network:
+def make(*, models: Path, seed: int, kind: str) -> Network:
     """Make the network of that name and seed: "untrained" or a key of TRAININGS in catalogue/trainings.py."""
-    return Network(model_path(models, kind, seed), precision)
+    return Network(model_path(models, kind, seed))

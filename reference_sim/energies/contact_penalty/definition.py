@@ -133,14 +133,11 @@ class ContactPenalty(Energy):
         depth = torch.clamp(self.margin - (n * (sample - c)).sum(-1), min=0.0)
         return torch.as_tensor(self.stiffness).to(u) * depth**3
 
-    def value_and_gradient(
-        self, x: np.ndarray, points: np.ndarray | None = None, normals: np.ndarray | None = None
-    ) -> tuple[float, np.ndarray]:
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
-        c = self.points if points is None else points
-        n = self.normals if normals is None else normals
-        value = _gradient(x, self.stencils, self.weights, self.stiffness, self.margin, c, n, gradient)
+        planes = self.points, self.normals
+        value = _gradient(x, self.stencils, self.weights, self.stiffness, self.margin, *planes, gradient)
         return value, gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from reference_sim.contact.closest_point import FaceSearch, Listed
 from reference_sim.energies import ContactPenalty
 from reference_sim.kernels.training_lanes import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
-from snug.kernels.contact import PARTS, byte_normals, contact_energy, interpolated_planes
+from snug.kernels.contact import PARTS, byte_normals, contact_energy
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
@@ -144,28 +144,6 @@ class ContactCache:
         self.barycentric = np.repeat(barycentric[None], frames, axis=0)
         self.age = np.zeros(frames, np.int64)
 
-    def planes(
-        self, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return points and unit normals (N, S, 3) float32 of the planes of frames (N,).
-
-        Patch positions and normals of the frames are rows (N,) of (R, P, 3) arrays.
-        """
-        shape = (len(frames), self.faces.shape[1], 3)
-        points, directions = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        interpolated_planes(
-            frames,
-            rows,
-            positions,
-            normals,
-            self.patch.faces,
-            self.faces,
-            self.barycentric,
-            points,
-            directions,
-        )
-        return points, directions
-
     def energy(
         self,
         contact: ContactPenalty,
@@ -188,7 +166,7 @@ class ContactCache:
             x: (C, V, 3, TRAINING_LANES) float32 [m], see snug.kernels.lanes.
             gradients: like x [N].
             frames: (N, T).
-            rows: (N, T), see `planes`.
+            rows: (N, T), the row of each frame in the two arrays that follow.
             positions: (R, P, 3), of the patch [m].
             normals: (R, P, 3).
             walk: whether anchors near the skin first walk to where their samples are, and stay there.

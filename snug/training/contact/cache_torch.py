@@ -55,7 +55,10 @@ class TensorContactCache:
     def planes(
         self, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Return the planes of frames, see ContactCache.planes; all but frames and rows are tensors."""
+        """Return points and unit normals (N, S, 3) of the planes of frames (N,).
+
+        Patch positions and normals of the frames are rows (N,) of (R, P, 3) tensors.
+        """
         device = positions.device
         chosen = torch.as_tensor(frames, device=device)
         corners = self.corners[self.faces[chosen].long()]  # (N, S, 3)

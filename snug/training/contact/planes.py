@@ -21,7 +21,7 @@ from snug.body.skinning import add_pose_correctives, skin
 from snug.kernels.skinning import FastSkin
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.cache_torch import TensorContactCache
-from snug.training.losses.physics_loss import FrameData, Planes
+from snug.training.losses.physics_loss import Planes
 from snug.training.process_group import ALONE, Group
 from snug.training.training_set import Batch, TrainingSet
 
@@ -81,7 +81,7 @@ class TrainingContact:
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
         self._kept = self._posed_everywhere() if kept and kernels else None
         self._changed = np.zeros(frames, bool)
-        self._before: tuple[FrameData, ...] | None = None
+        self._before: tuple[np.ndarray | Tensor, ...] | None = None
         self._credit = 0.0
 
     def _corrected(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:

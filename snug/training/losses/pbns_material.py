@@ -43,9 +43,10 @@ def spring_terms(cloth: Cloth) -> tuple[Energy, Energy, Energy]:
 class SquaredContact(ContactPenalty):
     """Contact energy k max(eps - d, 0)^2 [J] of each vertex, with the planes and samples of ContactPenalty.
 
-    For training alone: its second derivatives are those of automatic differentiation.
+    For training alone: its derivatives are those of automatic differentiation.
     """
 
+    value_and_gradient = Energy.value_and_gradient
     hessian_blocks = Energy.hessian_blocks
     active_hessian_blocks = Energy.active_hessian_blocks
     scalar_stiffness = Energy.scalar_stiffness
@@ -64,13 +65,3 @@ class SquaredContact(ContactPenalty):
         n = torch.as_tensor(self.normals).to(u) if normals is None else normals
         depth = torch.clamp(self.margin - (n * (u[..., 0, :] - c)).sum(-1), min=0.0)
         return torch.as_tensor(self.stiffness).to(u) * depth**2
-
-    def value_and_gradient(
-        self, x: np.ndarray, points: np.ndarray | None = None, normals: np.ndarray | None = None
-    ) -> tuple[float, np.ndarray]:
-        """Return the energy [J] and its gradient (V, 3) [N]."""
-        c = self.points if points is None else points
-        n = self.normals if normals is None else normals
-        depth = np.maximum(self.margin - np.einsum("vi,vi->v", n, x - c), 0.0)
-        gradient = (-2.0 * self.stiffness * depth)[:, None] * n
-        return float(self.stiffness @ depth**2), gradient.astype(x.dtype)

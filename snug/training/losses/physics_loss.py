@@ -49,8 +49,7 @@ from snug.training.device import CPU
 from snug.training.losses.pbns_material import SquaredContact, spring_terms
 
 STATIC = ("strain", "bending", "gravity")
-FrameData = np.ndarray | Tensor
-Planes = tuple[FrameData, FrameData] | BatchKernel
+Planes = tuple[Tensor, Tensor] | BatchKernel
 EnergyType = TypeVar("EnergyType", bound=Energy)
 
 MEMBRANES = {"stvk": StretchStVK, "springs": StretchSpring}
@@ -114,35 +113,28 @@ class ClosedForms(torch.autograd.Function):
 class ClosedForm(torch.autograd.Function):
     """An energy of each configuration of a batch by its own closed form, one configuration after the other.
 
-    apply(x (..., V, 3), energy, *frame data (..., S, 3) numpy) -> (...) [J]. Differentiable once, by x alone.
+    apply(x (..., V, 3), energy) -> (...) [J]. Differentiable once, by x alone.
     """
 
     @staticmethod
-    def forward(ctx: Any, x: Tensor, energy: Energy, *frame_data: np.ndarray) -> Tensor:
+    def forward(ctx: Any, x: Tensor, energy: Energy) -> Tensor:
         """Evaluate value and gradient of each configuration."""
         flat = x.detach().reshape(-1, *x.shape[-2:]).numpy()
-        rows = [data.reshape(-1, *data.shape[-2:]) for data in frame_data]
         values, gradients = np.empty(len(flat), flat.dtype), np.empty_like(flat)
         for n in range(len(flat)):
-            values[n], gradients[n] = energy.value_and_gradient(flat[n], *(row[n] for row in rows))
+            values[n], gradients[n] = energy.value_and_gradient(flat[n])
         ctx.gradients = torch.from_numpy(gradients).reshape(x.shape)
-        ctx.extra = len(frame_data)
         return torch.from_numpy(values).reshape(x.shape[:-2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> tuple[Tensor | None, ...]:
         """Return the gradients, times their factors."""
-        return above[0][..., None, None] * ctx.gradients, None, *([None] * ctx.extra)
+        return above[0][..., None, None] * ctx.gradients, None
 
 
-def evaluate(energy: Energy, x: Tensor, *frame_data: FrameData, kernels: bool = True) -> Tensor:
-    """Return the energy (...) [J] of each configuration (..., V, 3) [m].
-
-    By its kernel from frame data in numpy, or by its definition from tensors.
-    """
-    if kernels:
-        return ClosedForm.apply(x, energy, *frame_data)
-    return energy.energy(x, *frame_data).sum(-1)
+def evaluate(energy: Energy, x: Tensor, *, kernels: bool = True) -> Tensor:
+    """Return the energy (...) [J] of each configuration (..., V, 3) [m] by its closed form or definition."""
+    return ClosedForm.apply(x, energy) if kernels else energy.energy(x).sum(-1)
 
 
 def has_closed_form(energy: Energy) -> bool:
@@ -206,8 +198,8 @@ class PhysicsLoss:
             ahead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m]: where the pelvis would be if it kept its
                 velocity, relative to where it is.
             behind: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs it.
-            planes: points and normals (N, T, S, 3) of the contact samples, numpy for kernels, else tensors;
-                or a kernel in lanes that knows its planes; None leaves contact out.
+            planes: points and normals (N, T, S, 3) of the contact samples, or a kernel in lanes that knows
+                its planes; None leaves contact out.
         """
         closed: dict[str, Tensor] = {}
         if self.kernels and x.dtype == torch.float32:
@@ -224,7 +216,7 @@ class PhysicsLoss:
                 terms["collision"] = closed["collision"]
             else:
                 assert isinstance(planes, tuple)
-                terms["collision"] = evaluate(self._contact, x, *planes, kernels=self.kernels)
+                terms["collision"] = self._contact.energy(x, *planes).sum(-1)
         return terms
 
     def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:

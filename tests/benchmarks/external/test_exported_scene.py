@@ -150,16 +150,15 @@ def test_what_is_exported_is_the_scene(home):
 
 
 def exported(folder: Path):
-    """The class of docs/scene-files.md, as it stands there, opened on an exported folder."""
-    page = (Path(__file__).parents[3] / "docs" / "scene-files.md").read_text()
+    """The class of docs/examples, as it stands there, opened on an exported folder."""
     names: dict = {}
-    exec(page[page.index("import json") :].partition("```")[0], names)
+    exec((Path(__file__).parents[3] / "docs" / "examples" / "exported_energies.py").read_text(), names)
     return names["Exported"](folder)
 
 
 @pytest.mark.parametrize("name", ["skinning", "simulation", "sunk"])
 def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name):
-    """In numpy, by the code of the documents, which shares nothing with that of the project."""
+    """In numpy, by the example of the documents, which shares nothing with the project's code."""
     folder, scene = home
     if name == "sunk":  # vertices of all depths, some of them below skin that they must not meet
         positions = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))

@@ -32,7 +32,7 @@ from reference_sim.files.array_file import read_arrays
 from snug.recipes.named import RECIPES
 from snug.training.losses.physics_loss import static_terms
 from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, small_scene
-from tests.benchmarks.tasks.test_cell_tasks import NoLog, plan_of
+from tests.benchmarks.tasks.test_cell_tasks import plan_of
 
 SIZES = {"frames": 16, "settle_frames": 4, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01
@@ -79,7 +79,7 @@ def run(tmp_path_factory):
         patch.setattr(timing, "AFTER", 0.005)  # [s] that each run is watched after its end
         # Before each timed run; outcomes of so many cells make it a tenth of a second.
         patch.setattr(timing, "gc", SimpleNamespace(collect=lambda: 0))
-        runner.run(executor, NoLog())
+        runner.run(executor)
     return plan, runner, executor
 
 

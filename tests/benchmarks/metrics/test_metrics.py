@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import icosphere, right_grid
-from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.metric import RollOut
 from benchmarks.metrics import declared, find_metric
 from benchmarks.metrics.cost import training_distance
@@ -29,8 +29,6 @@ from benchmarks.metrics.surface.penetration_and_distances import (
 )
 from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
 from benchmarks.metrics.surface.self_intersections import self_intersections, share_and_contours
-from benchmarks.results.row import Row
-from benchmarks.runner.rows import remarked
 from reference_sim import Obstacle, Trajectory, simulate
 from snug.body.skeleton import JOINT
 from tests.benchmarks.runner.tasks_by_hand import small_scene
@@ -282,28 +280,6 @@ def test_what_shows_no_first_order_has_no_limit(of_halvings, order):
     assert found == pytest.approx({f"time_error/{name}": value for name, value in expected.items()}, abs=1e-9)
     assert {find_metric(name).unit for name in found if name.endswith("curvature")} == {"1/m"}
     assert find_metric("time_error/eighth/strain").unit == "J"
-
-
-def test_a_gap_that_rises_along_its_solvers_curve_has_a_remark():
-    def row(method: str, gap: float, metric: str = "gap/energy", scene: str = "flag", seed: int = 0) -> Row:
-        entry = find_method(method)
-        return Row(
-            "speed", scene, method, seed, metric, "1", gap, role=entry.role,
-            family=entry.reporting.family or method, level=entry.reporting.level,
-        )  # fmt: skip
-
-    falling = [row("newton-1", 0.5), row("newton-4", 0.1), row("newton-8", 0.1), row("simulation", 0.0)]
-    assert remarked(falling) == falling
-    rising = [row("newton-8", 0.2), row("vbd-5", 0.2), row("snug+lbfgs-1", 0.3, seed=1)]
-    rising.append(row("simulation-1e-8", 1e-9))
-    elsewhere = [row("newton-1", 0.01, "curvature/error"), row("newton-4", 0.01, scene="sheet")]
-    elsewhere += [row("simulation-perturbed-1e-4", 1e-5), row("simulation-perturbed-1e-9", 1e-2)]  # no curve
-    found = remarked([*falling[:2], *rising, *elsewhere])
-    assert [r.method for r in found if r.reason] == ["newton-8"]
-    assert found[2].reason == "the error does not fall here: newton-4, the coarser one, has a gap of 0.1"
-    assert remarked([dataclasses.replace(rising[0], reason="kept"), *falling])[0].reason == "kept"
-    known_roughly = [dataclasses.replace(r, uncertainty=0.04) for r in (falling[1], rising[0])]
-    assert remarked(known_roughly) == known_roughly  # 0.1, 0.2: by less than two standard errors of both
 
 
 def test_families_hold_every_level_from_coarse_to_fine():

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.cluster_executor import ClusterExecutor
-from benchmarks.runner.local_executor import Executor, LocalExecutor
+from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.tasks.task import Outcome, Task
 
@@ -152,17 +152,12 @@ def chain(**fields) -> list[Write]:
     ]
 
 
-class NoLog:
-    def stage(self, name):
-        return nullcontext()
-
-
-def finish(folder: Path, executor: Executor, **fields) -> Runner:
+def finish(folder: Path, executor: LocalExecutor, **fields) -> Runner:
     """The chain, run or reused; what has failed is tried again."""
     RunFolder(folder).remove_parts()
     cache = Cache(RunFolder(folder), only=(*DEFAULT_ONLY, "failed"), origin={"commit": "c", "hardware": "h"})
     runner = Runner(chain(**fields), cache)
-    runner.run(executor, NoLog())
+    runner.run(executor)
     return runner
 
 

@@ -20,7 +20,7 @@ from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.task import Outcome, Task
 from tests.benchmarks.runner.tasks_by_hand import InProcess
-from tests.benchmarks.tasks.test_cell_tasks import NoLog, outcome_of, plan_of
+from tests.benchmarks.tasks.test_cell_tasks import outcome_of, plan_of
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,7 +54,7 @@ def task(name: str, *, dies: bool = False, value: int = 0, **ties) -> Written:
 
 def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
     runner = Runner(tasks, Cache(RunFolder(folder), only=only))
-    runner.run(LocalExecutor(RunFolder(folder), None, 1), NoLog())
+    runner.run(LocalExecutor(RunFolder(folder), None, 1))
     return runner
 
 
@@ -96,7 +96,7 @@ def test_workers_that_would_wait_begin_what_comes_later_and_nothing_is_beside_a_
     )  # fmt: skip
     folder = RunFolder(tmp_path)
     runner, executor = Runner(tasks, Cache(folder)), TwoAtOnce(folder)
-    runner.run(executor, NoLog())
+    runner.run(executor)
     assert executor.at_work == [
         ["long", "short"], ["short"], ["next", "one", "two"], ["one", "two"], ["timed"],
         ["after", "three"], ["three"],
@@ -111,7 +111,7 @@ def test_the_last_batch_is_shared_by_workers_that_would_wait(tmp_path):
         (tmp_path / str(workers)).mkdir()
         executor = TwoAtOnce(folder := RunFolder(tmp_path / str(workers)))
         executor.workers = workers
-        Runner(tasks, Cache(folder)).run(executor, NoLog())
+        Runner(tasks, Cache(folder)).run(executor)
         at_work[workers] = executor.at_work
     assert at_work == {1: [["one", "two", "three"]], 2: [["one", "two", "three"], ["three"]]}
 

@@ -20,7 +20,7 @@ from benchmarks.runner.schedule import tasks_of
 from benchmarks.tasks.task import Context, Outcome, RunStopped
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.benchmarks.runner.test_failed_tasks import task
-from tests.benchmarks.tasks.test_cell_tasks import TINY, NoLog, plan_of
+from tests.benchmarks.tasks.test_cell_tasks import TINY, plan_of
 
 QUICK = dataclasses.replace(TINY, least_seconds=0.0)
 METHODS = ("simulation", "newton-1")
@@ -33,7 +33,7 @@ def done(folder: Path) -> tuple[Runner, dict]:
     """All tasks of a small run there, and what does not come from the clock of its rows."""
     plan = plan_of(folder, *METHODS, scene="hanging_sheet", preset=QUICK)
     runner = Runner(tasks_of(plan), Cache(RunFolder(folder)))
-    runner.run(InProcess(RunFolder(folder)), NoLog())
+    runner.run(InProcess(RunFolder(folder)))
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     return runner, {
         (r.method, r.metric): (r.value, r.status, r.reason) for r in rows if not r.metric.startswith("cost/")
@@ -148,7 +148,7 @@ def test_a_file_that_comes_back_as_it_was_does_nothing_else_again(tmp_path):
 
     def run() -> Runner:
         runner = Runner(tasks, Cache(RunFolder(tmp_path)))
-        runner.run(InProcess(RunFolder(tmp_path)), NoLog())
+        runner.run(InProcess(RunFolder(tmp_path)))
         return runner
 
     run()

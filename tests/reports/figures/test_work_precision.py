@@ -7,8 +7,6 @@ import dataclasses
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from benchmarks.results.run_folder import RunFolder
-from reports import build
 from reports.figures.break_even import BreakEven
 from reports.figures.error_against_time import ErrorOfPageOne, ErrorsOfScene, ErrorsOfScenes
 from reports.figures.figure import Drawing, save_drawing
@@ -18,7 +16,7 @@ from reports.statistics.pareto import (
     points_of,
     run_time,
 )
-from tests.reports.report_folder import declaration, run_of
+from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, row
 
 # method: ms a frame, relative energy gap, curvature error
@@ -96,38 +94,3 @@ def test_no_axis_is_labelled_in_markup(drawings):
             for label in (*axes.get_xticklabels(), *axes.get_yticklabels())
         ]
         assert any(labels) and not [label for label in labels if "$" in label]
-
-
-def test_any_metric_against_any_other(tmp_path, capsys):
-    run = RunFolder(tmp_path)
-    run.write_config(declaration(all_rows()))
-    run.write_rows(all_rows())
-    assert build.main([str(tmp_path), "--axes", "distance/rms", "gap/energy"]) == 0
-    assert (tmp_path / "figures/gap-energy_against_distance-rms.svg").is_file()
-    capsys.readouterr()
-    # Curvature exists on the dressed scenes alone, where most methods have it; zero has no place there.
-    assert build.main([str(tmp_path), "--axes", "cost/frame", "curvature/error"]) == 0
-    assert (tmp_path / "figures/curvature-error_against_cost-frame.svg").is_file()
-    # Suites other than garments and speed have their metrics too. A single zero is left out, not the figure.
-    far = [
-        row("fast", method, metric, value, suite="extremes")
-        for method, value in (("simulation", 1.0), ("snug", 2.0), ("skinning", 0.0))
-        for metric in ("motion/strain", "motion/offset")
-    ]
-    run.write_rows([*all_rows(), *far])
-    assert build.main([str(tmp_path), "--axes", "motion/strain", "motion/offset"]) == 0
-    assert (tmp_path / "figures/motion-offset_against_motion-strain.svg").is_file()
-    assert "Left out, for motion/strain is zero: Skinning alone." in capsys.readouterr().out
-    run.write_rows([*all_rows(), row("sheet", "newton-1", "curvature/error", 1.0)])
-    assert build.main([str(tmp_path), "--axes", "cost/frame", "curvature/error"]) == 0
-    run.write_rows([*all_rows(), row(SCENES[0], "newton-1", "lag", -1.0), row(SCENES[0], "snug", "lag", 1.0)])
-    capsys.readouterr()
-    for axes in (("lag", "gap/energy"), ("cost/frame", "lag")):
-        assert build.main([str(tmp_path), "--axes", *axes]) == 2
-        said = capsys.readouterr().err
-        assert (
-            said.count("\n") == 1 and "lag of newton-1 is -1: it has no place on a logarithmic axis" in said
-        )
-    assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/nothing"]) == 2
-    assert "no row has the metric 'gap/nothing'" in capsys.readouterr().err
-    assert build.main([str(tmp_path), "--axes", "cost/frame", "gap/energy", "--scenes", "moon"]) == 2

@@ -10,6 +10,7 @@ from benchmarks.metrics import find_metric
 from benchmarks.results.run_folder import RunFolder
 from reports.docs import ROOT, documents, main
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY
+from reports.statistics.published import PUBLISHED
 from reports.text.generated_parts import BEGIN, END, fill
 from reports.text.published_parts import (
     LIBRARY_FILES,
@@ -64,12 +65,22 @@ def test_every_claim_has_a_row_whether_or_not_a_run_judges_it(kind, claims):
     assert any(cells[8] != "not measured" for cells in said)
 
 
-def test_each_part_of_a_merged_run_has_its_command_and_a_metric_its_definition():
+def test_each_run_has_a_row_with_its_commit_and_a_metric_its_definition():
     lines = published_part("runs of quick, shapes").splitlines()[2:]
-    assert [line.split(" | ")[0] for line in lines] == ["| quick", "| quick", "| shapes"]
-    assert "--suite garments" in lines[0] and "--suite speed" in lines[1]
+    assert [line.split(" | ")[0] for line in lines] == ["| quick", "| shapes"]  # quick was merged of two
+    commits = [RunFolder(PUBLISHED / name).read_config()["commit"] for name in ("quick", "shapes")]
+    assert [line.split(" | ")[2] for line in lines] == commits
     assert "| `energy/wind` |" not in published_part("metrics")
     assert f"| `distance/rms` | mm | {find_metric('distance/rms').definition} |" in published_part("metrics")
+
+
+def test_rows_of_options_and_attributes_can_be_chosen():
+    lines = published_part("options of benchmarks.run; --seeds, --out").splitlines()[2:]
+    assert [line.split(" | ")[0] for line in lines] == ["| `--seeds N,...`", "| `-o DIR, --out DIR`"]
+    lines = published_part("attributes of benchmarks.method.Reporting; level").splitlines()[2:]
+    assert [line.split(" | ")[0] for line in lines] == ["| `level`"]
+    with pytest.raises(ValueError, match="no row has the name '--seed'"):
+        published_part("options of benchmarks.run; --seed")
 
 
 def test_the_command_checks_and_says_so(project, monkeypatch, capsys):

@@ -134,10 +134,8 @@ def test_a_fit_has_no_seed_and_needs_simulations(kind):
         train_network(kind, tube_dress(), [motion], steps=1, seed=0, recipe=RECIPE_OF_KIND[kind])
 
 
-@pytest.mark.parametrize("precision", ["float32", "int8"])
-def test_the_compiled_frame_finds_the_nearest_of_many(precision):
+def test_the_compiled_frame_finds_the_nearest_of_many():
     model, _ = fitted("nearest-poses", 43)
-    model = model.rounded(precision)
     other = swaying(9, degrees=31.0)
     features = tube_dress().features(other, model.recipe, feature_set="pose")
     with torch.no_grad():

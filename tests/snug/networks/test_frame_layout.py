@@ -1,4 +1,4 @@
-"""The compiled frame against torch's own modules, for every kind of network and every precision."""
+"""The compiled frame against torch's own modules, for every kind of network."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import torch
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
 from snug.networks.architectures import ARCHITECTURES, make_network
-from snug.networks.frame_layout import PRECISIONS, CompiledFrame, FramePlan, round_matrices, store_matrix
+from snug.networks.frame_layout import CompiledFrame, FramePlan
 from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
 from snug.networks.tailornet import FrequencyMixture
 from snug.networks.trained_model import TrainedModel
@@ -43,10 +43,8 @@ def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("kind", ARCHITECTURES)
-@pytest.mark.parametrize("precision", PRECISIONS)
-def test_a_compiled_frame_is_the_modules_own(kind, precision):
+def test_a_compiled_frame_is_the_modules_own(kind):
     model, motion = random_model(kind), swaying(8)
-    model = model.rounded(precision)
     expected, offsets = by_torch(model, motion)
     found = roll_out(model, tube_dress(), motion).positions
     size = np.abs(offsets).max()
@@ -54,32 +52,10 @@ def test_a_compiled_frame_is_the_modules_own(kind, precision):
     assert np.abs(found - expected).max() < 3e-6 * max(size, 1.0)
 
 
-@pytest.mark.parametrize(("precision", "step"), [("bf16", 2.0**-7), ("int8", 1 / 127)])
-def test_stored_weights_are_the_nearest_of_their_precision(precision, step):
-    matrix = np.random.default_rng(0).normal(size=(40, 64)).astype(np.float32)
-    matrix[7], matrix[8, 3] = 0.0, 30.0
-    values, factors = store_matrix(matrix, precision)
-    assert values.itemsize == {"bf16": 2, "int8": 1}[precision]
-    layer = torch.nn.Linear(64, 40)
-    layer.weight.data, before = torch.from_numpy(matrix.copy()), layer.bias.clone()
-    nearest = round_matrices(layer, precision)
-    assert torch.equal(nearest.bias, before) and torch.equal(layer.weight.data, torch.from_numpy(matrix))
-    size = np.abs(matrix) if precision == "bf16" else np.abs(matrix).max(axis=1)[:, None]
-    error = np.abs(nearest.weight.detach().numpy() - matrix)
-    assert (error <= 0.501 * step * size).all() and error.max() > 0.4 * step * size.mean()
-    again, same = store_matrix(nearest.weight.detach().numpy(), precision)
-    assert np.array_equal(again, values) and np.allclose(same, factors, rtol=1e-6, atol=0.0)
-
-
-def test_an_unknown_precision_is_refused():
-    with pytest.raises(ValueError, match=r"'fp8'.*float32, bf16, int8"):
-        random_model("pbns").rounded("fp8")
-
-
 def test_several_pivots_are_refused():
     network = FrequencyMixture(15, 5, pivots=np.zeros((2, 10)))
     with pytest.raises(ValueError, match="2 pivots"):
-        network.lay_out(FramePlan(np.arange(5), 64, "float32"))
+        network.lay_out(FramePlan(np.arange(5), 64))
 
 
 @pytest.mark.parametrize(("vertices", "joints"), [(1, 2), (63, 5), (64, 24), (200, 24)])

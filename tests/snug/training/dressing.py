@@ -11,6 +11,7 @@ from snug.garments.assembly import nearest_body_vertices
 from snug.garments.garment import Garment
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
+from snug.training.contact.cache import PARTS
 
 AROUND, RINGS = 15, 10
 
@@ -58,3 +59,13 @@ def leaning(motion: Motion) -> Motion:
     poses = motion.poses.copy()
     poses[:, 0] += [0.3, 0.0, 0.2]
     return Motion(motion.name, poses, motion.translations, fps=motion.fps)
+
+
+def planes_of(anchors, frames, rows, positions, normals) -> tuple[np.ndarray, np.ndarray]:
+    """Points and unit normals (N, S, 3) at the anchors of frames, float64; bodies are rows of (R, P, 3)."""
+    corners = anchors.patch.faces[np.asarray(anchors.faces)[frames]]
+    last = np.asarray(anchors.barycentric)[frames] / PARTS
+    weights = np.concatenate([1 - last.sum(-1, keepdims=True), last], -1)
+    every = np.asarray(rows)[:, None, None]
+    points, directions = ((weights[..., None] * a[every, corners]).sum(-2) for a in (positions, normals))
+    return points, directions / np.linalg.norm(directions, axis=-1, keepdims=True)

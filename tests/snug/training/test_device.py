@@ -21,7 +21,7 @@ from snug.training.device import CPU, DeviceError, find_device
 from snug.training.losses.physics_loss import STATIC, on_device
 from snug.training.optimisation_step import Trainer
 from snug.training.training_set import TrainingSet
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import planes_of, swaying, tube_dress
 
 PLAIN = replace(DEFAULT, mixed=0.0)
 
@@ -123,7 +123,7 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
         searched.requery(int(frame), samples[row].numpy(), positions[row].numpy(), exact=True)
 
     def distance(anchors):
-        points, _ = ContactCache.planes(anchors, frames, rows, positions.numpy(), normals)
+        points, _ = planes_of(anchors, frames, rows, positions.numpy(), normals)
         return np.linalg.norm(points - samples.numpy(), axis=-1)
 
     moved = fast.faces[frames] != still.faces[frames]
@@ -139,7 +139,7 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
         assert (home[anchors.faces != still.faces] < region).all()
 
 
-def test_torch_planes_are_the_kernels_planes():
+def test_torch_planes_are_those_of_numpy():
     dressed, motion = tube_dress(), swaying()
     contact = ContactPenalty(dressed.cloth)
     patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
@@ -147,7 +147,7 @@ def test_torch_planes_are_the_kernels_planes():
     positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3]))
     numbers, torches = ContactCache(patch, 3), TensorContactCache(patch, 3, CPU)
     frames = np.array([2, 0])
-    points, normals = numbers.planes(frames, frames, positions.numpy(), patch.normals(positions.numpy()))
+    points, normals = planes_of(numbers, frames, frames, positions.numpy(), patch.normals(positions.numpy()))
     theirs = torches.planes(frames, frames, positions, torches.normals(positions))
     assert np.abs(points - theirs[0].numpy()).max() < 1e-6
     # A normal on the border of two of its 127 steps may fall on either side.

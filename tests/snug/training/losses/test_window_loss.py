@@ -100,11 +100,10 @@ def loss_of(recipe: Recipe, *, copies: int, kernels: bool, frames: int) -> tuple
     behind = -np.diff(pelvis, axis=1, prepend=pelvis[:, :1])
     ahead = np.zeros_like(behind)
     ahead[:, 2:] = behind[:, 2:] - behind[:, 1:-1]
-    planes = [np.repeat(array, copies, 0) for array in (points, direction)]
+    planes = tuple(torch.as_tensor(np.repeat(array, copies, 0)) for array in (points, direction))
     given = torch.as_tensor(x).repeat_interleave(copies, 0).requires_grad_()
     steps = (torch.as_tensor(np.repeat(a, copies, 0)).float() for a in (ahead, behind))
     loss = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels)
-    planes = tuple(planes if kernels else map(torch.as_tensor, planes))
     terms = loss(given, next(steps), planes, behind=next(steps))
     total = sum(energy.mean() for energy in terms.values())
     total.backward()
