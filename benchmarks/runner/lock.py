@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 
@@ -17,9 +17,11 @@ class HeldError(ValueError):
 def held(folder: Path) -> Iterator[None]:
     """Hold a folder, made where it is not there. Raises HeldError where another run, or a file, has it.
 
+    A folder made here that stayed empty, because the request was refused, is removed.
     The lock lies on the folder itself and leaves no file. The system releases it with the process, however
     that ended. Where the system or its file system has no such locks nothing is held, and that is said.
     """
+    made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
@@ -39,4 +41,9 @@ def held(folder: Path) -> Iterator[None]:
             ) from None
         except (ImportError, OSError):
             print(f"{folder}: cannot be locked here; let no other run use it", file=sys.stderr)
-        yield
+        try:
+            yield
+        finally:
+            if made:
+                with suppress(OSError):  # not empty
+                    folder.rmdir()

@@ -86,5 +86,4 @@ def test_the_command_says_it_in_one_line_and_leaves_nothing(more, tmp_path, monk
     wrong = dataclasses.replace(scenes.SCENES[0], name="kite", module="benchmarks.scenes.kite")
     monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, wrong))
     words = ["--preset", "smoke", "--scenes", "kite", "--methods", "simulation", "-o", str(tmp_path / "run")]
-    (tmp_path / "run").mkdir()  # held before the scene is found out
     refused("no module benchmarks.scenes.kite", run.main, [*words, *more])

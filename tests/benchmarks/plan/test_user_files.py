@@ -204,7 +204,6 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
     worn = SCENE_FILE.replace('"lift", d', '"worn", garment="toga", motion="kick", d')
     (tmp_path / "worn.py").write_text(worn)
     (tmp_path / "random.py").write_text("METHODS = ()\n")
-    (tmp_path / "out").mkdir()  # garments are looked for when the folder is held
     with monkeypatch.context() as patch:
         case = dataclasses.replace(choosing.MEASURED[0], name="membrane/uniaxial")
         patch.setattr("benchmarks.plan.choose_cells.MEASURED", (case,))
