@@ -25,7 +25,7 @@ from reports.statistics.pareto import (
 )
 from reports.statistics.published import published_beside
 from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_relative_excess
-from reports.statistics.verdicts import LESS, MORE, TIED, compare_methods, measure_of, standing
+from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, measure_of, standing
 from reports.tables.number_texts import duration, number
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
@@ -49,8 +49,17 @@ def headline(run: Run) -> list[tuple[str, str]]:
 
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
-    """Say which relative excess each network of page one has, and which of the first two has less energy."""
-    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
+    """Say which relative excess each network of page one has, and whether the first has less energy.
+
+    Networks that the paper's primary claims compare with it by energy are among them.
+    """
+    chosen = leads(run, worn, by=(TOTAL,))
+    claimed = [
+        claim.higher for claim in paper_claims.PRIMARY
+        if claim.lower in chosen and claim.metric.startswith("energy/")
+    ]  # fmt: skip
+    learned = [name for name, method in run.methods.items() if method.role in (*LEARNED, EXTERNAL)]
+    names = [name for name in dict.fromkeys((*chosen, *claimed)) if name in learned]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not known:
@@ -68,7 +77,7 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
         "reference simulation is 0 % and that of skinning alone 100 %",
         _against_reference(excess),
         *(f"{run.label(name)} has {_share(known[name])}" for name in others),
-        *(_less_of(run, worn, first, name) for name in others[:1]),
+        *_paired(run, worn, first, others),
     ]
     if count > 1:
         scene, worst = excess.worst
@@ -121,20 +130,25 @@ def _against_reference(excess: Excess) -> str:
     }.get(stands, "whether this differs from the reference is inconclusive")
 
 
-def _less_of(run: Run, rows: pd.DataFrame, one: str, other: str) -> str:
-    """Say which of two methods has less total energy; empty where they cannot be compared."""
-    compared = compare_methods(run, rows, run.metrics[TOTAL], one, other)
-    if compared.effect is None:
-        return ""
-    first, second = run.label(one), run.label(other)
-    return {
-        TIED: f"in a paired comparison {first} and {second} tie",
-        MORE: f"in a paired comparison {second} has less than {first}",
-        LESS: f"in a paired comparison {first} has less than {second}",
-    }.get(
-        standing(compared.effect, compared.effect.p_value()),
-        f"which of {first} and {second} has less is inconclusive",
-    )
+def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> list[str]:
+    """Say which of these have more total energy than a method, paired by motion, and which less."""
+    standings: dict[str, list[str]] = {}
+    for other in others:
+        if effect := compare_methods(run, rows, run.metrics[TOTAL], one, other).effect:
+            standings.setdefault(standing(effect, effect.p_value()), []).append(run.label(other))
+    first = run.label(one)
+    says = {
+        LESS: f"paired by motion, {first} has less energy than {{}}",
+        MORE: f"paired by motion, {first} has more energy than {{}}",
+        TIED: f"paired by motion, {first} has as much energy as {{}}",
+        OPEN: f"whether {first} or {{}} has less is inconclusive",
+    }
+    return [text.format(_listed(standings[stands])) for stands, text in says.items() if stands in standings]
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Return "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
 def _moves(run: Run, worn: pd.DataFrame) -> str:

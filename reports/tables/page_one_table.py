@@ -14,7 +14,7 @@ from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, metric_column, table
 
-ROWS = 8
+ROWS = 10
 NAMED = 4  # scenes that a caption names
 ANSWERS = ("penetration/surface", "dynamics/amplitude", "dynamics/correlation")
 GAP = "gap/energy"
@@ -34,11 +34,12 @@ def overview(run: Run) -> list[Table]:
     rows_of_garment = timed if rows_of_garment.empty else rows_of_garment  # of a run of suite speed alone
     plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(rows_of_garment)
     chosen = leads(run, rows_of_garment)
-    chosen += [
-        m
-        for m in run.ordered(plain)
-        if m not in chosen and run.methods[m].role in ("network", "bound", "baseline", EXTERNAL)
+    others = [
+        m for m in run.ordered(plain) if run.methods[m].role in ("network", "bound", "baseline", EXTERNAL)
     ]
+    # Of a family of networks the last one: that of the highest level.
+    last = {run.methods[m].family or m: m for m in others}
+    chosen += [m for m in last.values() if m not in chosen]
     why = rivals(run, cells, scenes) if scenes else {}
     solvers = [m for m in why if m not in chosen]
     chosen = run.ordered([*chosen[: ROWS - len(solvers)], *solvers])

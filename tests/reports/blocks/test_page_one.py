@@ -51,7 +51,7 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     assert "geometric means over motions. The arithmetic mean of SNUG over motions is 12 %" in said
     assert said.endswith("and its worst motion, jump, has 20 %.")
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
-    assert "PBNS has 15 %. Which of SNUG and PBNS has less is inconclusive. These" in near(rows)
+    assert "PBNS has 15 %. Whether SNUG or PBNS has less is inconclusive. These" in near(rows)
     # A member of the reference's ensemble is no rival, however near it is.
     assert near(rows + on_two_scenes("simulation-perturbed-1e-4", 0.5, 7.0)) == near(rows)
 
