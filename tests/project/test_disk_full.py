@@ -19,6 +19,7 @@ import pytest
 import torch
 
 from benchmarks import run
+from benchmarks.process.isolated_process import start_loading
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from reference_sim import Trajectory
@@ -39,7 +40,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @contextmanager
 def files_up_to(size: int) -> Iterator[None]:
-    """No file of this process grows beyond that size [bytes]."""
+    """No file of this process grows beyond that size [bytes].
+
+    The server of worker processes, which would keep the limit, is started before.
+    """
+    start_loading()
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
