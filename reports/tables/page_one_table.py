@@ -14,7 +14,7 @@ from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, metric_column, table
 
-ROWS = 10
+ROWS = 8
 NAMED = 4  # scenes that a caption names
 ANSWERS = ("penetration/surface", "dynamics/amplitude", "dynamics/correlation")
 GAP = "gap/energy"
