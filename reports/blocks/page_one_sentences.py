@@ -49,17 +49,8 @@ def headline(run: Run) -> list[tuple[str, str]]:
 
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
-    """Say which relative excess each network of page one has, and whether the first has less energy.
-
-    Networks that the paper's primary claims compare with it by energy are among them.
-    """
-    chosen = leads(run, worn, by=(TOTAL,))
-    claimed = [
-        claim.higher for claim in paper_claims.PRIMARY
-        if claim.lower in chosen and claim.metric.startswith("energy/")
-    ]  # fmt: skip
-    learned = [name for name, method in run.methods.items() if method.role in (*LEARNED, EXTERNAL)]
-    names = [name for name in dict.fromkeys((*chosen, *claimed)) if name in learned]
+    """Say which relative excess each network of page one has, and whether the first has less energy."""
+    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not known:
