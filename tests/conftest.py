@@ -37,5 +37,5 @@ def refused(capsys, tmp_path) -> Callable[..., str]:
 
 
 def _files(folder: Path) -> dict[Path, int]:
-    """What lies in a folder, and when each file was last written."""
+    """Return each path in a folder, with the time of a file's last change."""
     return {path: path.stat().st_mtime_ns if path.is_file() else 0 for path in folder.rglob("*")}

@@ -29,7 +29,7 @@ TOLERANCE = 1e-4  # mean vertex weights: the hem is measured in millimetres
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _OfScene(Task):
-    """What is simulated once for each scene."""
+    """Base of a task that simulates once for each scene."""
 
     silent = True
     unit_seconds = 0.07

@@ -134,12 +134,21 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
         TIED: f"paired by motion, {first} has as much energy as {{}}",
         OPEN: f"whether {first} or {{}} has less is inconclusive",
     }
-    return [text.format(_listed(standings[stands])) for stands, text in says.items() if stands in standings]
+    return [text.format(listed(standings[stands])) for stands, text in says.items() if stands in standings]
 
 
-def _listed(words: Sequence[str]) -> str:
-    """Return "a, b and c"."""
-    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+def listed(words: Sequence[str]) -> str:
+    """Return the words as "a, b and c".
+
+    >>> listed(["a", "b", "c"]), listed(["a"]), listed([])
+    ('a, b and c', 'a', '')
+    """
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+
+
+def _in_scenes(count: int) -> str:
+    """Return "in 1 scene" or "in 2 scenes"."""
+    return f"in {count} scene{'' if count == 1 else 's'}"
 
 
 def _moves(run: Run, worn: pd.DataFrame) -> str:
@@ -184,7 +193,7 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     own = number(compared.other.value)
     training = value_of(run.garment_rows, network, "cost/train")
     whole = " end to end" if compared.metric.name == "cost/whole" else ""
-    where = f" in {len(scenes)} scene{'' if len(scenes) == 1 else 's'}" if scenes else ""
+    where = f" {_in_scenes(len(scenes))}" if scenes else ""
     return _joined([
         f"{run.label(network)} takes {own} ms a frame{whole} on one core{where}, the simulation {times} "
         "times as long",
@@ -196,8 +205,7 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
 def _trust(run: Run, timed: pd.DataFrame) -> str:
     """Say how uncertain the reference itself is, what its time step leaves out, and how claims came out."""
     sentences = []
-    count = timed["scene"].nunique()
-    where = f"in {count} scene{'' if count == 1 else 's'}"
+    where = _in_scenes(timed["scene"].nunique())
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(

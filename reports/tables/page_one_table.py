@@ -38,7 +38,7 @@ def overview(run: Run) -> list[Table]:
         m for m in run.ordered(plain) if run.methods[m].role in ("network", "bound", "baseline", EXTERNAL)
     ]
     # Of a family of networks the last one: that of the highest level.
-    last = {run.methods[m].family or m: m for m in others}
+    last = {run.methods[m].family: m for m in others}
     chosen += [m for m in last.values() if m not in chosen]
     why = rivals(run, cells, scenes) if scenes else {}
     solvers = [m for m in why if m not in chosen]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from reports.blocks.page_one_sentences import listed
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import pair
 from reports.statistics.relative_excess import TOTAL
@@ -32,5 +33,5 @@ def excess_terms(run: Run, method: str) -> str:
     shares = {name: 100.0 * value / total for name, value in excess.items()}
     largest = sorted((name for name in shares if abs(shares[name]) >= LEAST), key=lambda name: -shares[name])
     parts = [f"{number(shares[name], 2)} % {run.metrics[name].title.lower()}" for name in largest]
-    listed = " and ".join(filter(None, [", ".join(parts[:-1]), *parts[-1:]]))
-    return f"The mean energy of {run.label(method)} above the reference's, {number(total)} J, is {listed}."
+    above = f"The mean energy of {run.label(method)} above the reference's, {number(total)} J"
+    return f"{above}, is {listed(parts)}."
