@@ -25,7 +25,7 @@ from snug.trained import FOLDER
 PROGRAM = "benchmarks.run"
 LEAST_FRAMES = 3  # inertia needs two frames before
 EXAMPLES = """examples:
-  python -m benchmarks.run                                    the quick run: every suite's quick subset
+  python -m benchmarks.run                                    garments, and a part of three other suites
   python -m benchmarks.run --trained                          the same without training
   python -m benchmarks.run --preset smoke                     everything once, tiny, about 3 minutes
   python -m benchmarks.run --suite garments -o reports/runs/mine
@@ -75,8 +75,8 @@ def make_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--suite", action="append", default=[], metavar="NAME",
         help="garments, speed, validation, extremes, shapes, fabric, engines, performance or all, in full; "
-        "repeat or separate by commas (default: the quick subset of each but shapes, fabric, engines, "
-        "performance)")  # fmt: skip
+        "repeat or separate by commas (default: garments, and a part of speed, validation and "
+        "extremes)")  # fmt: skip
     file = "; a file (mine.py) means all that it declares"
     add(
         "--scenes",

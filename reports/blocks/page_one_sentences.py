@@ -92,11 +92,12 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
 
 
 def _repeated(excess: Excess) -> str:
-    """Return what the means are taken over: "motions", or "11 sources" and what these are."""
+    """Return what the means are taken over: "motions", or "11 independent sources" and what these are."""
     count = excess.effect.motions
     if count == len(excess.by_motion):
         return "motions"
-    return f"{count} sources: recordings, whose segments are averaged first, and motions made by code"
+    sources = "recordings, whose segments are averaged first, and motions made by code"
+    return f"{count} independent sources: {sources}"
 
 
 def _joined(sentences: Sequence[str]) -> str:
@@ -209,9 +210,8 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(
-            f"simulations that are equally valid lie {number(apart[0], 2)} mm and "
-            f"{number(apart[1], 2)} 1/m of mean curvature from the reference, {where}: a smaller error "
-            "shows no difference from it"
+            f"equally valid simulations lie {number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean "
+            f"curvature from the reference, {where}: a smaller error shows no difference from it"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -222,9 +222,11 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
             for what, (one, other) in (("its strain is", strain), ("its hem amplitude", amplitude))
             if one and other and other.value
         ]
+        away = value_of(timed, finest, DISTANCE)
+        distance = "" if away is None else f", and its cloth is {number(away, 2)} mm away"
         sentences.append(
             "The reference is converged in each time step of 1/30 s, but not in the step size: with "
-            f"{steps} steps a frame {' and '.join(words)} as large, {where}"
+            f"{steps} steps a frame {' and '.join(words)} as large{distance}, {where}"
         )
     lines = paper_claims.judged(run)
     counted = paper_claims.counts(lines)
@@ -264,12 +266,10 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
-        others = (
-            "of the methods measured in all of these scenes, none" if partly_measured else "no other method"
-        )
+        others = f"of the methods measured {'in all of these scenes' if partly_measured else 'here'}"
         sentences = [
             f"{snug} has an energy gap, the energy above the minimum of each time step, of "
-            f"{number(network.error)} J{network.fewer}; {others} that is at least as fast has a smaller gap"
+            f"{number(network.error)} J{network.fewer}; {others} none is as fast and has a smaller gap"
         ]
     else:
         within = " within repeats" if best.time > network.time else ""

@@ -27,6 +27,7 @@ from reports.statistics.verdicts import (
     compare_methods,
     holm,
     standing,
+    untested,
 )
 
 HOLDS, FAILS = "holds", "does not hold"  # or TIED, or OPEN
@@ -206,7 +207,7 @@ def judged(run: Run) -> list[Judged]:
     for claim, found, p in zip(asked, compared, p_values):
         if found.effect is not None and found.one is not None and found.other is not None:
             outcome = verdict(claim, found.effect, p)
-            remark = ": one seed" if outcome == OPEN and found.effect.one_seed else ""
+            remark = untested(found.effect) if outcome == OPEN else ""
             remark += found.one.fewer or found.other.fewer
         else:
             outcome, remark = verdict_of_diverged(claim, found, diverged)

@@ -83,13 +83,26 @@ def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:
     """
     if far.covers == RANGE:
         return _standing_of_range(far, factor)
-    if far.one_seed or far.motions < LEAST_MOTIONS:
+    if untested(far):
         return OPEN
     if far.equal(factor):
         return TIED
     if p is None or p >= LEVEL or abs(far.above(factor)) <= far.uncertainty:
         return OPEN
     return LESS if far.above(factor) < 0.0 else MORE
+
+
+def untested(far: Effect) -> str:
+    """Return why an effect is not tested, as a remark behind the verdict; empty where it is.
+
+    >>> untested(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3))
+    ': fewer than 4 motions'
+    """
+    if far.covers == RANGE:
+        return ""
+    if far.one_seed:
+        return ": one seed"
+    return f": fewer than {LEAST_MOTIONS} motions" if far.motions < LEAST_MOTIONS else ""
 
 
 def _standing_of_range(far: Effect, factor: float) -> str:

@@ -6,7 +6,7 @@ from reports.run.finished_run import Run
 from reports.statistics.paper_claims import judged
 from reports.statistics.relative_excess import Excess, excess_of, with_relative_excess
 from reports.statistics.spreads import AT_REFERENCE, in_spreads
-from reports.statistics.verdicts import measure_of, standing
+from reports.statistics.verdicts import measure_of, standing, untested
 from reports.tables.table import GARMENT, METHOD, SCENE, Cell, Column, Table, table
 
 CLAIMS_NOTE = (
@@ -55,7 +55,6 @@ EXCESS_NOTE = (
     "spread over the reference's ensemble. Energy against the reference: more or less where p < 0.05 and the "
     "difference exceeds that spread."
 )
-ONE_SEED = "not tested: one seed"
 
 
 def relative_excess(run: Run) -> list[Table]:
@@ -64,9 +63,7 @@ def relative_excess(run: Run) -> list[Table]:
     for garment, method, excess in _measured(run):
         low, high = excess.without_each_recording
         worst, most = excess.worst
-        stands = standing(excess.effect, excess.effect.p_value())
-        if excess.effect.one_seed:
-            stands = ONE_SEED
+        stands = standing(excess.effect, excess.effect.p_value()) + untested(excess.effect)
         lines.append((
             garment, method, excess.effect, excess.mean, most, worst.partition("/")[2] or worst, low, high,
             excess.uncertainty or None, len(excess.by_motion), stands,
