@@ -77,7 +77,8 @@ class Runner:
         for task in tasks:
             if self._is_ready([task]):
                 self.decide(task)
-        with _bar(tasks, sum(task.expected_seconds for task in tasks if task.id not in self.outcomes)) as bar:
+        expected = sum(task.expected_seconds for task in tasks if task.id not in self.outcomes)
+        with _bar(tasks, expected, executor.workers) as bar:
             waiting, left = [*_batches(tasks), *_batches(later)], deque(tasks)
 
             def ready() -> Batch | None:
@@ -112,7 +113,7 @@ class Runner:
     def _alone(self, tasks: Sequence[Task], executor: LocalExecutor) -> None:
         """Do timed tasks one by one; the next few begin together, each in its process."""
         begun: set[str] = set()  # processes
-        with _bar(tasks, sum(task.expected_seconds for task in tasks)) as bar:
+        with _bar(tasks, sum(task.expected_seconds for task in tasks), 1) as bar:
             for place, task in enumerate(tasks):
                 if self.decide(task):
                     if task.process not in begun:
@@ -249,8 +250,8 @@ def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
     )
 
 
-def _bar(tasks: Sequence[Task], total: float) -> tqdm[Never]:
+def _bar(tasks: Sequence[Task], total: float, workers: int) -> tqdm[Never]:
     from reference_sim.progress import progress_bar
 
     shown = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
-    return progress_bar(total=total, desc=_titles(tasks), bar_format=shown, smoothing=0.05)
+    return progress_bar(total=total, desc=_titles(tasks), bar_format=shown, expected_rate=workers)
