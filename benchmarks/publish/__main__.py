@@ -28,7 +28,7 @@ EXAMPLES = """examples:
   python -m benchmarks.publish --scheduler tcp://HOST:8786 --workers 40      untimed tasks on a cluster
 
 Each run goes on where it was stopped, in a folder of its own below --out. When it has ended well, its
-  rows, tables, PDF and the pictures that the documents show replace those in --into. Times want a machine
+  rows, tables, PDF, pictures and films that the documents show replace those in --into. Times want a machine
   with nothing beside.
 Then: python -m reports.docs writes the tables of README and docs from them.
 exit status: 0 all are published; 1 a run failed and is left as it was; 2 the request cannot be met: one line
@@ -116,18 +116,23 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
         shutil.rmtree(whole, ignore_errors=True)  # what it was merged from stays
         merge(list(parts), whole, command=shlex.join(["python", "-m", PROGRAM, name]))
         subprocess.run([sys.executable, "-m", "reports.build", str(whole)], check=False)
-    keep(whole, into / name, run.pictures)
+    for film, wanted in run.films.items():
+        path = whole / "figures" / film
+        path.unlink(missing_ok=True)
+        line = [sys.executable, "-m", "reports.film", str(whole), *shlex.split(wanted), "-o", str(path)]
+        subprocess.run(line, check=False)
+    keep(whole, into / name, run.shown)
     print(f"{name}: published in {into / name}", flush=True)
     return True
 
 
-def keep(whole: Path, target: Path, pictures: Sequence[str]) -> None:
+def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:
     """Replace the folder `target` by what is published of the run in `whole`.
 
     Raises:
-        PublishError: a picture is not there.
+        PublishError: a picture or film of these names is not there.
     """
-    kept = list(_kept(whole, pictures))
+    kept = list(_kept(whole, shown))
     if missing := [path for path in kept if not path.exists()]:
         raise PublishError(f"{missing[0]}: not there, and the documents show it")
     fresh = target.with_name(f"{target.name}.new")
@@ -139,10 +144,10 @@ def keep(whole: Path, target: Path, pictures: Sequence[str]) -> None:
     fresh.rename(target)
 
 
-def _kept(whole: Path, pictures: Sequence[str]) -> Iterator[Path]:
+def _kept(whole: Path, shown: Sequence[str]) -> Iterator[Path]:
     yield from (whole / name for name in KEPT if name != "frame_energies.csv" or (whole / name).exists())
     yield whole / "tables"
-    yield from (whole / "figures" / f"{name}.png" for name in pictures)
+    yield from (whole / "figures" / name for name in shown)
 
 
 if __name__ == "__main__":

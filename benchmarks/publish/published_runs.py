@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 RECORDED = (
     "01_01_a,01_01_b,01_01_c,01_01_d,01_01_e,01_01_f,01_01_g,02_07_a,02_07_b,02_07_c,02_07_d,02_07_e,02_07_f,"
@@ -24,11 +24,18 @@ class PublishedRun:
         parts: name -> options of `benchmarks.run`; several parts are merged into one folder. They are apart
             where a part has other scenes or times. Later parts begin with what the first has trained.
         pictures: figures that the documents show, by their names in the folder `figures` of the report.
+        films: file -> options of `reports.film`, of films that the documents show.
     """
 
     question: str
     parts: dict[str, str]
     pictures: tuple[str, ...] = ()
+    films: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Return the files of pictures and films, which lie in the folder `figures`."""
+        return (*(f"{name}.png" for name in self.pictures), *self.films)
 
 
 def _validation(methods: str, more: str = THREE) -> dict[str, str]:
@@ -48,7 +55,11 @@ RUNS = {
             "fast-lbfgs-*,lbfgs-*,newton-[1248],vbd-20,xpbd-40,gradient-descent-10,skinning+lbfgs-4,"
             f"snug+fast-lbfgs-*,snug+lbfgs-2,snug+newton-2,{OTHERS}'",
         },
-        ("energy_series_tshirt-01_01_a", "error_against_time", "frames_tshirt-01_01_a", "training"),
+        ("energy_series_tshirt-01_01_a", "error_against_time"),
+        {
+            "push_recovery.gif": "--scene tshirt/push_recovery --methods simulation,snug,pbns,skinning "
+            "--width 200"
+        },
     ),
     "paper_text": PublishedRun(
         "the recipe of the paper's text and PBNS by it, 136,000 steps at 4378 vertices, on 22 test motions",

@@ -44,9 +44,9 @@ def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     (target / "tables").mkdir(parents=True)
     (target / "tables" / "old.csv").write_text("old")
     with pytest.raises(PublishError, match=r"figures/none\.png: not there"):
-        keep(whole, target, ["none"])
+        keep(whole, target, ["none.png"])
     assert [path.name for path in target.rglob("*.*")] == ["old.csv"]
-    keep(whole, target, ["lead"])
+    keep(whole, target, ["lead.png"])
     kept = ["energies.csv", "lead.png", "report.pdf", "results.csv", "run.json"]
     assert sorted(path.name for path in target.rglob("*.*")) == kept
     assert [path.name for path in target.parent.iterdir()] == ["run"]
@@ -75,10 +75,12 @@ def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, c
 @pytest.mark.slow
 def test_parts_are_merged_reported_and_kept(tmp_path):
     parts = {"one": FALL + "simulation,newton-1", "two": FALL + "newton-2"}
-    run = PublishedRun("?", parts, ("error_against_time_free_fall",))
+    films = {"fall.gif": "--scene free_fall --methods simulation,newton-1 --width 100"}
+    run = PublishedRun("?", parts, ("error_against_time_free_fall",), films)
     assert publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
     rows = RunFolder(tmp_path / "kept" / "fall").read_rows()
     assert {row.method for row in rows} == {"simulation", "newton-1", "newton-2"}
+    assert (tmp_path / "kept" / "fall" / "fall.gif").stat().st_size > 1000
     line = RunFolder(tmp_path / "kept" / "fall").read_config()["command"]
     assert shlex.split(line) == ["python", "-m", "benchmarks.publish", "fall"]
     assert publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
