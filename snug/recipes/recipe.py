@@ -49,7 +49,8 @@ class Recipe:
             `window_stride` is no divisor of `window`, for then few frames before a window ever end one.
         window: frames of a sub-sequence.
         batch: sub-sequences of a step.
-        window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap).
+        window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap); a
+            network of single frames learns from each frame whatever it is.
         even: parts of an epoch, each of which passes over all motions and takes one sub-sequence of so many.
             With 1 the order is random, and a hard pose may first appear after the network has settled,
             with a loss of joules.

@@ -89,9 +89,10 @@ class TrainingSet:
         self.rest = dressed.rest().to(device)
         self._rest_directions: Tensor | None = None
         self.window = recipe.window if sequences else 1
+        stride = recipe.window_stride if sequences else 1
         self.starts = np.concatenate(
             [
-                np.arange(first, first + len(motion.poses) - self.window + 1, recipe.window_stride)
+                np.arange(first, first + len(motion.poses) - self.window + 1, stride)
                 for first, motion in zip(self.first, motions)
             ]
         )

@@ -28,6 +28,10 @@ def test_windows_stay_within_a_motion_and_all_come_by():
         tube_dress(), clips, replace(PLAIN, window_stride=3), features="motion", sequences=True
     )
     assert disjoint.starts.tolist() == [0, 3, 6, 9, 12]
+    single = TrainingSet(
+        tube_dress(), clips, replace(PLAIN, window_stride=3), features="pose", sequences=False
+    )
+    assert single.starts.tolist() == list(range(16))  # a network of one frame learns from every frame
 
 
 def test_a_neck_that_hardly_moved_in_training_does_not_drown_the_other_inputs_when_it_bends():
