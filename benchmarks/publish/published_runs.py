@@ -38,9 +38,9 @@ class PublishedRun:
         return (*(f"{name}.png" for name in self.pictures), *self.films)
 
 
-def _validation(methods: str, more: str = THREE) -> dict[str, str]:
+def _validation(methods: str) -> dict[str, str]:
     """Return the one part of a run on the validation motions."""
-    return {"": f"--suite garments --split validation {more} --methods '{REFERENCES},{methods}'"}
+    return {"": f"--suite garments --split validation {THREE} --methods '{REFERENCES},{methods}'"}
 
 
 RUNS = {
@@ -105,12 +105,11 @@ RUNS = {
         "networks with the same frames and numbers of steps",
         _validation("snug-data-[01]*,pbns-data-[01]*,supervised-data-[01]*,tailornet-data-[01]*,*-data-3,"
                     "santesteban2019-data-[01]*,nearest-poses-data-*,pose-regression-data-*"),
-        ("equal_data",),
     ),
     "equal_data_converged": PublishedRun(
         "the same until a held-out motion no longer improves",
         _validation("snug-data-converged-*,supervised-data-converged-*,pbns-data-converged-*"),
-        ("held_out",),
+        ("training",),
     ),
     "garments": PublishedRun(
         "tank top, trousers, shorts, long sleeves",
@@ -125,7 +124,6 @@ RUNS = {
             "": f"--suite shapes {THREE} --methods {REFERENCES},snug,snug-shapes,snug-paper,pbns,"
             "fast-lbfgs-10,snug+fast-lbfgs-1"
         },
-        ("against_shape",),
     ),
     "dynamics": PublishedRun(
         "garments that swing; networks that learn dynamics",

@@ -28,7 +28,6 @@ EXACT: tuple[Case, ...] = (
 ORDERS: tuple[Case, ...] = (
     *membrane.ORDERS, *dynamics.PENDULUM_ORDER, *contact.SPHERE_ORDER, *dynamics.SHEET_ORDERS,
     *curvature.ORDERS, *membrane.STRINGS, *curvature.VALUES, *curvature.IRREGULAR, *dynamics.UNDAMPED,
-    *dynamics.DEPENDENCE,
 )  # fmt: skip
 # Answers by a reference that is solved independently, by scipy or scikit-fem, in the case itself.
 REFERENCES: tuple[Case, ...] = (

@@ -31,7 +31,7 @@ BLOCKS: tuple[Block, ...] = (
     FigureBlock("error_against_time_of_scene"),
     FigureBlock("error_against_time_scenes"),
     TableBlock("error_rivals"),
-    FigureBlock("break_even", "against_vertices"),
+    FigureBlock("break_even"),
     TableBlock("crossings"),
     Heading("Garments in motion"),
     FigureBlock("frames"),

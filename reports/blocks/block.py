@@ -48,16 +48,13 @@ class SentenceBlock:
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """Pictures of a figure; of several figures the first of each, side by side."""
+    """Pictures of a figure."""
 
     name: str
-    beside: str = ""
 
     def pictures(self, report: Report) -> list[Picture]:
         """Return the pictures that were drawn."""
-        if not self.beside:
-            return list(report.pictures.get(self.name, ()))
-        return [picture for name in (self.name, self.beside) for picture in report.pictures.get(name, ())[:1]]
+        return list(report.pictures.get(self.name, ()))
 
 
 @dataclass(frozen=True)

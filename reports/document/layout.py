@@ -26,10 +26,7 @@ def lay_out(report: Report, block: Block) -> list[Values]:
         sentences = [list(pair) for pair in block.make(report.run)]
         return [{"kind": "sentences", "pairs": sentences, "small": block.small}] if sentences else []
     if isinstance(block, FigureBlock):
-        pictures = block.pictures(report)
-        if block.beside and len(pictures) > 1:
-            return [{"kind": "row", "items": [_figure(picture) for picture in pictures]}]
-        return [_figure(picture) for picture in pictures]
+        return [_figure(picture) for picture in block.pictures(report)]
     if isinstance(block, TableBlock | TablesOfSuite):
         tables = [block.printed(report.run, table) for table in block.tables(report)]
         tables = [shortened(table, block.most) for table in tables if table.rows]

@@ -3,7 +3,6 @@
 A new figure is such a file, a line in FIGURES and its place in reports.blocks.BLOCKS.
 """
 
-from reports.figures.against_vertices import AgainstVertices
 from reports.figures.break_even import BreakEven
 from reports.figures.dots import Dots
 from reports.figures.energy_series import EnergySeries
@@ -21,7 +20,6 @@ FIGURES: tuple[Figure, ...] = (
     ErrorsOfScene(),
     ErrorsOfScenes(),
     BreakEven(),
-    AgainstVertices(),
     Dots(),
     Histograms(),
     Hem(),

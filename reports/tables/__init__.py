@@ -10,7 +10,7 @@ from pathlib import Path
 
 from reports.run.finished_run import Run
 from reports.tables.ablations import ablation_effects, ablations
-from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
+from reports.tables.body_shapes import shapes
 from reports.tables.dictionary import dictionary
 from reports.tables.engines.audit import engine_audit, engine_laws
 from reports.tables.equal_data import EQUAL_DATA
@@ -27,7 +27,7 @@ from reports.tables.findings import (
     relative_excess_by_motion,
 )
 from reports.tables.latex import write_latex
-from reports.tables.outcomes import endings, extremes, metrics, unfinished, validation
+from reports.tables.outcomes import endings, extremes, unfinished, validation
 from reports.tables.page_one_table import overview
 from reports.tables.pivot import metric_tables
 from reports.tables.speed import SPEED, crossings, error_rivals, reference_uncertainty
@@ -49,7 +49,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     reference_uncertainty,
     SPEED,
     shapes,
-    SHAPES_BY_SCENE,
     fabric_order,
     fabric_drape,
     fabric_bands,
@@ -60,7 +59,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     extremes,
     endings,
     unfinished,
-    metrics,
     trainings,
     training_curves,
 )

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import pandas as pd
-
 from reports.run.finished_run import Run
 from reports.statistics.body_shapes import (
-    SHAPE,
     TOTAL,
     excess_energy,
     rows_of_other_shapes,
     rows_of_shapes,
 )
 from reports.statistics.means_and_spreads import means
-from reports.tables.pivot import Pivot
 from reports.tables.table import METHOD, Cell, Column, Table, metric_column, table
 
 METRICS = (TOTAL, "energy/strain", "energy/collision", "penetration/vertices")
@@ -47,18 +43,3 @@ def shapes(run: Run) -> list[Table]:
         *map(metric_column, metrics),
     )  # fmt: skip
     return table("shapes", columns, lines, "Body shapes: means over the others, and the mean body.")
-
-
-def _lines(run: Run, rows: pd.DataFrame) -> set[tuple[str, ...]]:
-    methods = set(run.methods) - set(run.reference_ensemble)
-    return {(scene, method) for scene in set(rows["scene"]) for method in methods}
-
-
-SHAPES_BY_SCENE = Pivot(
-    "shapes_by_scene",
-    "Body shapes, body by body.",
-    metrics=(SHAPE, *METRICS),
-    select=lambda run: rows_of_shapes(run)[0],
-    lines=_lines,
-    grouped_by=("scene",),
-)

@@ -9,7 +9,6 @@ from typing import Any
 import pandas as pd
 
 from reports.run.finished_run import Run
-from reports.statistics.means_and_spreads import means
 from reports.statistics.outcomes import BAD, check_name, checks, counted, stress_tests, tolerances_away
 from reports.tables.table import METHOD, SCENE, SUITE, Cell, Column, Table, table
 
@@ -95,13 +94,3 @@ def merged(table: Table, names: Iterable[str]) -> Table:
             texts.setdefault((*row[:place], *row[place + 1 :]), []).append(str(row[place]))
         rows = [(*key[:place], ", ".join(every), *key[place:]) for key, every in texts.items()]
     return replace(table, rows=tuple(rows), grouped_by=(), references=(), note="")
-
-
-def metrics(run: Run) -> list[Table]:
-    """List everything measured, a line per suite, scene, method and metric: the file to plot from."""
-    cells = means(run.frame[run.frame["method"] != ""], "suite", "scene", "method", "metric")
-    lines: list[tuple[Cell, ...]] = [
-        (*key[:4], run.metrics[key[3]].unit, mean, mean.seeds) for key, mean in cells.items()
-    ]
-    names = ("suite", "scene", "method", "metric", "unit", "value", "seeds")
-    return table("metrics", [Column(name, name) for name in names], lines)

@@ -87,14 +87,3 @@ UNDAMPED = (
         "dynamics.time_steps", "chord_distance", unit="m",
         reason="reported: sub-steps converge to the motion along chords, not to the smooth one"),
 )  # fmt: skip
-
-DEPENDENCE = tuple(
-    known_answer(f"{kind}_dependence_{quantity}",
-        f"mean {title} of a hanging cloth with {change}, over that without",
-        "dynamics.mesh_and_time_step", f"{kind}_dependence", options={"quantity": quantity}, smoke=False,
-        reason="reported: nobody should compare across meshes or time steps unawares")
-    for kind, change in (("mesh", "cells half as wide"), ("time_step", "a quarter of the time step"))
-    for quantity, title in (
-        ("strain", "strain energy"), ("bending", "bending energy"), ("curvature", "mean curvature")
-    )
-)  # fmt: skip

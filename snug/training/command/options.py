@@ -73,7 +73,6 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     )
     add("--checkpoint-steps", metavar="N", type=int, default=0, help="a checkpoint every N steps as well")
     add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
-    add("--tensorboard", metavar="DIR", help="write curves for TensorBoard (extra: tensorboard)")
     add_garment_options(parser)
     options = parser.parse_args(arguments)
     options.out = options.out or f"{options.model}.safetensors"

@@ -18,7 +18,6 @@ from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import RECIPE_OF_KIND, find_recipe
 from snug.recipes.recipe import Recipe
 from snug.training.checkpoint import Checkpoint
-from snug.training.command.tensorboard_log import TensorBoardLog
 from snug.training.kinds import find_kind
 from snug.training.losses.vertex_targets import StoredVertices
 from snug.training.process_group import Group
@@ -78,7 +77,7 @@ class TrainingJob:
         frames = sum(motion.frames for motion in self.motions)
         say(f"{template.description}: {dressed.vertices} vertices, {len(self.motions)} motions, "
             f"{frames} frames, recipe {self.recipe.name}")  # fmt: skip
-        model = self._run(dressed, output.stem, checkpoint, trajectories)
+        model = self._run(dressed, checkpoint, trajectories)
         if self.group.writes:
             model.summary["learned_from"] = learned_from
             print_summary(model)
@@ -95,28 +94,20 @@ class TrainingJob:
     def _run(
         self,
         dressed: DressedBody,
-        name: str,
         checkpoint: Checkpoint,
         trajectories: Mapping[str, StoredVertices] | None,
     ) -> TrainedModel:
-        options, validation, curves = self.options, None, None
+        options, validation = self.options, None
         if self.held_out:
             validation = Validation(
                 motions=self.held_out, every=options.validate_every, patience=options.patience,
                 trajectories=trajectories,
             )  # fmt: skip
-        if options.tensorboard and self.group.writes:
-            curves = TensorBoardLog(Path(options.tensorboard) / name)
-        try:
-            return train_network(
-                options.model, dressed, self.motions, steps=options.steps, seed=options.seed,
-                recipe=self.recipe, trajectories=trajectories, log=curves.write if curves else None,
-                device=self.device, checkpoint=checkpoint, validation=validation, group=self.group,
-                stop=self.stop,
-            )  # fmt: skip
-        finally:
-            if curves:
-                curves.close()
+        return train_network(
+            options.model, dressed, self.motions, steps=options.steps, seed=options.seed,
+            recipe=self.recipe, trajectories=trajectories, device=self.device, checkpoint=checkpoint,
+            validation=validation, group=self.group, stop=self.stop,
+        )  # fmt: skip
 
     def _check_finished(self, output: Path, vertices: int, learned_from: str) -> None:
         """Raise ValueError unless the existing model is the one that this command trains."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import subprocess
+from fnmatch import fnmatch
 from types import SimpleNamespace
 
 import pytest
@@ -16,6 +17,8 @@ from benchmarks.publish import __main__ as command
 from benchmarks.publish.__main__ import PublishError, keep, publish
 from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.run_folder import RunFolder
+from reports.figures import FIGURES
+from reports.pictures import PICTURES
 
 FALL = "--preset smoke --suite speed --scenes free_fall --methods "
 
@@ -27,6 +30,13 @@ def test_every_published_command_can_be_planned(name, tmp_path):
         plan = make_plan(request_of_run(make_parser().parse_args(words), words))
         assert plan.folder == folder and (plan.scenes or plan.cases)
         assert {cell.scene.name for cell in plan.cells if runs(cell)} == {scene.name for scene in plan.scenes}
+
+
+def test_every_published_picture_is_one_that_reports_draw():
+    patterns = [pattern for figure in (*FIGURES, *PICTURES) for pattern in figure.patterns()]
+    for run in RUNS.values():
+        for name in run.pictures:
+            assert any(fnmatch(f"{name}.png", pattern) for pattern in patterns), name
 
 
 def test_what_is_published_is_replaced_whole_or_left(tmp_path):

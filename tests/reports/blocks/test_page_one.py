@@ -5,20 +5,17 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from reports.blocks import BLOCKS
-from reports.blocks.block import FigureBlock, Report
+from reports.blocks.block import FigureBlock
 from reports.blocks.page_one_sentences import headline
 from reports.blocks.printed_tables import shortened
 from reports.blocks.what_went_wrong import endings, failures
 from reports.document.content import content
-from reports.document.layout import lay_out
 from reports.figures import FIGURES
-from reports.figures.figure import Picture
 from reports.pictures import PICTURES
 from reports.statistics import paper_claims
 from reports.statistics.page_one_methods import leads
@@ -143,7 +140,7 @@ def test_sections_exist_only_for_what_ran():
     assert [section["title"] for section in made["sections"]] == ["Validation", endings_title]
     (worst,) = made["first"]
     assert made["definitions"] == [] and worst["small"] and worst["pairs"][0][0] == "What went worst"
-    assert set(report.tables) == {"validation", "metrics", "endings"}
+    assert set(report.tables) == {"validation", "endings"}
     (block,) = made["sections"][0]["blocks"]
     assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
 
@@ -247,22 +244,9 @@ def test_a_shortened_table_has_rows_of_each_garment():
     assert short.rows == (*lines[:6], *lines[8:14])
 
 
-def test_a_figure_alone_in_its_row_keeps_its_width():
-    run, picture = run_of(all_rows()), Picture(Path("half.svg"), "said", 0.5)
-    block = FigureBlock("break_even", "against_vertices")
-    assert lay_out(Report(run, {}, {"break_even": [picture]}), block) == [
-        {"kind": "figure", "path": "figures/half.svg", "caption": "said", "width": 0.5}
-    ]
-    both = {"break_even": [picture], "against_vertices": [picture]}
-    assert [values["kind"] for values in lay_out(Report(run, {}, both), block)] == ["row"]
-
-
 def test_every_block_names_a_figure_or_table_that_is_declared():
     figures = {figure.name for figure in (*FIGURES, *PICTURES)}
-    named = {
-        name for block in BLOCKS if isinstance(block, FigureBlock) for name in (block.name, block.beside)
-    }
-    assert named - {""} == figures
+    assert {block.name for block in BLOCKS if isinstance(block, FigureBlock)} == figures
 
 
 def test_no_number_of_the_report_is_infinite_or_nan():

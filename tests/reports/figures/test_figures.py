@@ -6,7 +6,6 @@ import numpy as np
 
 from benchmarks.results.run_folder import RunFolder
 from reports.figures import hem, histograms, known_answers, method_styles, stability_maps
-from reports.figures.against_vertices import AgainstVertices
 from reports.figures.chosen_roll_outs import SceneRollOuts
 from reports.figures.dots import Dots
 from reports.figures.plotting import file_name, printable
@@ -171,26 +170,6 @@ def test_dots_of_relative_excess_stand_on_a_logarithmic_axis_on_both_sides_of_ze
     assert np.isclose(bar, np.sinh((np.arcsinh(-10.0) + np.arcsinh(4000.0)) / 2.0))
     low, high = axes.get_xlim()
     assert low < -10.0 and high > 4000.0 and list(axes.get_xticks()) == [0.0, 10.0, 1000.0, -10.0]
-
-
-def test_errors_are_drawn_against_the_vertices_that_scenes_declare():
-    sizes = {"mesh/a": 500.0, "mesh/b": 2000.0}
-    rows = [row(s, "simulation", "mesh/vertices", n, suite="validation", unit="1") for s, n in sizes.items()]
-    rows += [row(s, "snug", "curvature/error", n / 100.0, unit="1/m") for s, n in sizes.items()]
-    (drawing,) = AgainstVertices().drawings(run_of(rows))
-    (line,) = drawing.canvas.axes[0].get_lines()
-    assert list(line.get_xdata()) == [500.0, 2000.0] and list(line.get_ydata()) == [5.0, 20.0]
-    assert AgainstVertices().drawings(run_of(rows[2:])) == []
-    # The same mesh with more steps, and a sheet, are other scenes.
-    rows += [
-        row("dt/b", "simulation", "mesh/vertices", 2000.0, unit="1"),
-        row("dt/b", metric="curvature/error"),
-    ]
-    rows += [row("dt/b", "simulation", "mesh/steps", 4.0, unit="1")]
-    rows += [row("drape", "simulation", "mesh/vertices", 900.0, unit="1")]
-    rows += [row("drape", metric="curvature/error")]
-    (drawing,) = AgainstVertices().drawings(run_of(rows))
-    assert list(drawing.canvas.axes[0].get_lines()[0].get_ydata()) == [5.0, 20.0]
 
 
 def test_names_in_any_letters_give_files_that_the_report_finds():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from reports.blocks.page_one_sentences import headline
-from reports.tables.body_shapes import SHAPES_BY_SCENE, shapes
+from reports.tables.body_shapes import shapes
 from tests.reports.report_folder import row, run_of
 
 
@@ -28,7 +28,7 @@ def test_energies_are_listed_by_body_shape():
         "snug", "energy/strain", (0.1, 0.4, 0.2)
     )
 
-    (together,), (each,) = shapes(run_of(rows)), SHAPES_BY_SCENE(run_of(rows))
+    (together,) = shapes(run_of(rows))
     names = [column.name for column in together.columns]
     assert names == ["scene", "method", "above", "energy/total", "energy/strain"]
     found = {(line[0], line[1]): (None, *line[1:]) for line in together.rows}
@@ -38,10 +38,6 @@ def test_energies_are_listed_by_body_shape():
     assert (
         found["mean shape", "snug"][2] == pytest.approx(0.05) and found["mean shape", "simulation"][2] is None
     )
-    assert [column.name for column in each.columns][:4] == ["scene", "method", "body/shape", "energy/total"]
-    alone = {(line[0], line[1]): line[2:] for line in each.rows}
-    assert len(alone) == 6 and alone["shapes/2", "simulation"][0].value == 4.0
-    assert alone["shapes/2", "simulation"][2] is None and alone["shapes/2", "snug"][1].value == 0.6
 
     said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.250."
     assert on_other_bodies(run_of(rows)) == said
@@ -52,4 +48,4 @@ def test_energies_are_listed_by_body_shape():
     assert on_other_bodies(run_of(kept + last)) == said
     one = [r for r in rows if r.scene == "shapes/0"]
     assert on_other_bodies(run_of(one)) == ""
-    assert shapes(run_of(one)) == SHAPES_BY_SCENE(run_of(one)) == []
+    assert shapes(run_of(one)) == []

@@ -1,9 +1,7 @@
-"""Early stop by motions held out of training, curves for TensorBoard, and seconds by part."""
+"""Early stop by motions held out of training, and seconds by part."""
 
-import sys
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import torch
 
@@ -12,7 +10,6 @@ from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, 
 from snug.networks.roll_out import roll_out
 from snug.recipes.named import SUPERVISED
 from snug.recipes.recipe import DEFAULT
-from snug.training.command.tensorboard_log import TensorBoardError, TensorBoardLog
 from snug.training.optimisation_step import Trainer
 from snug.training.stopwatch import PARTS
 from snug.training.train_network import train_network
@@ -152,40 +149,3 @@ def test_history_says_where_the_time_goes():
     assert 0.5 * model.seconds < 3 * sum(sum(v for k, v in row.items() if "/" in k) for row in model.history)
     assert 3 * sum(sum(v for k, v in row.items() if "/" in k) for row in model.history) < model.seconds
     assert model.setup_seconds > 0
-
-
-def test_curves_are_written(tmp_path):
-    pytest.importorskip("tensorboard")
-    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
-
-    logbook = TensorBoardLog(tmp_path / "run")
-    model = train_network(
-        "snug", tube_dress(), [swaying(30)], steps=6, seed=0, recipe=PLAIN, progress=False, every=2,
-        log=logbook.write,
-    )  # fmt: skip
-    logbook.close()
-    events = EventAccumulator(str(tmp_path / "run"))
-    events.Reload()
-    strain = events.Scalars("training/strain")
-    assert [event.step for event in strain] == [2, 4, 6]
-    assert np.allclose([event.value for event in strain], [row["strain"] for row in model.history], rtol=1e-6)
-    assert "seconds/forward" in events.Tags()["scalars"]
-
-
-def test_the_command_writes_curves_of_every_garment(tmp_path, monkeypatch):
-    pytest.importorskip("tensorboard")
-    from snug import train as module
-    from snug.training.command import choices
-
-    monkeypatch.setattr(choices, "choose_motions", lambda options, data: ([swaying(20)], []))
-    words = ["--vertices", "200", "--steps", "2", "-o", str(tmp_path / "mine.safetensors")]
-    words += ["--garment", "tshirt", "--garment", "tunic", "--tensorboard", str(tmp_path / "curves")]
-    assert module.main(words) == 0
-    written = {path.parent.name for path in (tmp_path / "curves").rglob("*tfevents*")}
-    assert written == {"mine-tshirt", "mine-tunic"}
-
-
-def test_missing_tensorboard_is_one_line(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
-    with pytest.raises(TensorBoardError, match=r"pip install 'neural-garment-benchmark\[tensorboard\]'"):
-        TensorBoardLog(tmp_path)
