@@ -119,7 +119,8 @@ def perform(task: Task, needed: Needed) -> Outcome:
     """Return the outcome of a task, done in this process."""
     for outcome in needed.values():
         _verify(outcome.digests)
-    context = dataclasses.replace(_context, tell=lambda units: _context.tell(units * task.unit_seconds))
+    each = task.expected_seconds / max(task.units, 1)
+    context = dataclasses.replace(_context, tell=lambda units: _context.tell(units * each))
     clock = time.perf_counter()
     try:
         outcome = task.run(context, needed)

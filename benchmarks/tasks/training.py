@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
+# Of a step, where a step of SNUG's network takes 1: the longest training begins first.
+COST = {"pbns": 0.4, "ncs": 2.5, "ncs-static": 2.5, "handles-20": 0.4, "handles-40": 0.4, "handles-80": 0.5}
 LOG_EVERY = 20  # training steps between two reports of progress
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
 
@@ -56,6 +58,11 @@ class TrainNetwork(Task):
     clips: tuple[TaskId, ...] = ()
     device: str
     parts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def expected_seconds(self) -> float:
+        """Expected duration [s]."""
+        return super().expected_seconds * (COST.get(self.chosen.kind, 1.0) if self.chosen else 1.0)
 
     @property
     def key(self) -> str:

@@ -15,16 +15,19 @@ import pytest
 from benchmarks import run
 from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.loop import Runner
+from benchmarks.runner.loop import Runner, _batches
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.task import Outcome
+from benchmarks.tasks.training import TrainNetwork
 from tests.benchmarks.runner.misbehaving import interrupt_at
 from tests.benchmarks.tasks.test_cell_tasks import TINY, found_of, of_session, plan_of
 
@@ -217,3 +220,10 @@ def measured(folder: Path) -> dict[tuple[str, str], tuple[float | None, str]]:
     """Return value and status of every row but the costs, which depend on clock and process."""
     rows = RunFolder(folder).read_rows()
     return {(r.method, r.metric): (r.value, r.status) for r in rows if not r.metric.startswith("cost/")}
+
+
+def test_the_longest_training_begins_first(tmp_path):
+    words = ["--suite", "garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path)]
+    plan = make_plan(request_of_run(make_parser().parse_args(words), words))
+    trainings = [task for task in tasks_of(plan) if isinstance(task, TrainNetwork)]
+    assert [batch[0].training for batch in _batches(trainings)] == ["ncs", "snug", "pbns", "handles-20"]
