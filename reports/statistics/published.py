@@ -15,7 +15,7 @@ from benchmarks.results.protocol import BEFORE, LEVEL
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
-from reports.statistics.effects import EXCESS, off_scale, on_scale
+from reports.statistics.effects import EXCESS, off_scale, on_scale, recording_of
 from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
 
 PUBLISHED = Path(__file__).resolve().parents[1] / "published"
@@ -26,9 +26,10 @@ def published_beside(run: Run, method: str) -> str:
     """Return "published 6.8 % on these motions: reproduced", empty for a run that has nothing beside it.
 
     It has where its preset is the default, its motions have the published frames (`--frames` cuts them), and
-    the checkout has the published run. A method is reproduced
-    where each of its seeds lies within the interval in which one more of the published seeds is expected:
-    their mean on the scale of relative excess, plus or minus Student's t times s sqrt(1 + 1/n).
+    the checkout has the published run. Segments of a recording count as one motion, as in the typical
+    relative excess. A method is reproduced where each of its seeds lies within the interval in which one more
+    of the published seeds is expected: their mean on the scale of relative excess, plus or minus Student's t
+    times s sqrt(1 + 1/n).
     """
     if run.config.get("preset") != DEFAULT or not (PUBLISHED / DEFAULT).is_dir():
         return ""
@@ -46,7 +47,9 @@ def published_beside(run: Run, method: str) -> str:
         return ""
     if not scenes or set(ours.index) - set(scenes):
         return ""
-    before, now = theirs.loc[scenes].mean().to_numpy(), ours.loc[scenes].mean().to_numpy()
+    before, now = (
+        values.loc[scenes].groupby(recording_of).mean().mean().to_numpy() for values in (theirs, ours)
+    )
     text = f"published {float(off_scale(before.mean(), EXCESS)):.2g} % on these motions"
     if len(before) < 2:
         return text
