@@ -34,9 +34,8 @@ def overview(run: Run) -> list[Table]:
     rows_of_garment = timed if rows_of_garment.empty else rows_of_garment  # of a run of suite speed alone
     plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(rows_of_garment)
     chosen = leads(run, rows_of_garment)
-    others = [
-        m for m in run.ordered(plain) if run.methods[m].role in ("network", "bound", "baseline", EXTERNAL)
-    ]
+    others = [m for m in run.ordered(plain) if run.methods[m].role in ("network", "bound", EXTERNAL)]
+    others += [m for m in run.ordered(plain) if run.methods[m].role == "baseline"]
     # Of a family of networks the last one: that of the highest level.
     last = {run.methods[m].family: m for m in others}
     chosen += [m for m in last.values() if m not in chosen]
