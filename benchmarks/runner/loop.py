@@ -122,9 +122,11 @@ class Runner:
                         begun |= {other.process for other in soon}
                     task.clear(self.cache.folder)
                     self._keep(task, executor.alone(task, self._needed(task)))
+                    bar.update(task.expected_seconds)
+                else:
+                    bar.total -= task.expected_seconds  # no time was spent on it: it says nothing of the rest
                 if not any(self._comes(other, task.process) for other in tasks[place + 1 :]):
                     executor.release(task.process)
-                bar.update(task.expected_seconds)
 
     def _soon(self, tasks: Sequence[Task], begun: Set[str]) -> list[Task]:
         """Return the next tasks to run whose needs have outcomes, each in another new process."""
