@@ -72,10 +72,8 @@ def make_motion(name: str) -> Motion:
         return recorded if name == clip else _segment(name, recorded)
     # Its curves need SciPy; names are listed without.
     from snug.motion.clips.make_clip import make_clip
-    from snug.motion.clips.posture import LIBRARY_FPS
 
-    made = make_clip(name)
-    return spread_arms(Motion(name, made.poses, made.translations, LIBRARY_FPS, made.kind, made.source))
+    return spread_arms(make_clip(name))
 
 
 def _read_clip(name: str) -> Motion:

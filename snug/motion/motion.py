@@ -180,10 +180,15 @@ def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarra
     """
     if frames < 2:
         raise MotionError(f"a transition needs at least 2 frames, not {frames}")
-    s = np.linspace(0.0, 1.0, frames)[:, None]
-    ease = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    ease = smoothstep(np.linspace(0.0, 1.0, frames)[:, None])
     shape = (frames, 24, 3)
     return slerp(np.broadcast_to(pose_a, shape), np.broadcast_to(pose_b, shape), ease)
+
+
+def smoothstep(s: np.ndarray) -> np.ndarray:
+    """Return 0 below 0, 1 above 1, between them a quintic with neither slope nor curvature at its ends."""
+    s = np.clip(s, 0.0, 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def place(motion: Motion) -> Motion:

@@ -24,6 +24,7 @@ class Action:
     flights: (take-off, landing) [s] within one cycle.
     """
 
+    kind: str
     seconds: float
     keys: dict[str, Keys]
     flights: tuple[tuple[float, float], ...] = ()
@@ -53,10 +54,11 @@ class Action:
 
 
 ARM = SIDED["arm_lowering"]  # hanging at ease
+ACTIONS: dict[str, Action] = {}
 
 # fmt: off
-JUMP = Action(
-    seconds=2.6,
+ACTIONS["jump"] = Action(
+    kind="jump", seconds=2.6,
     flights=((0.92, 1.40),),
     keys={
         "hip_flexion": ((0.2, 2), (0.62, 78), (0.70, 78), (0.92, 0), (1.12, 14), (1.36, 18), (1.62, 62),
@@ -73,8 +75,8 @@ JUMP = Action(
 )
 
 # Half a turn in the air; the arms wind up against it first.
-SPIN_JUMP = Action(
-    seconds=2.8,
+ACTIONS["spin_jump"] = Action(
+    kind="spin jump", seconds=2.8,
     flights=((0.95, 1.43),),
     keys={
         "pelvis_yaw": ((0.25, 0), (0.66, -16), (0.72, -16), (0.95, 22), (1.43, 172), (1.75, 180)),
@@ -96,8 +98,8 @@ SPIN_JUMP = Action(
     },
 )
 
-JUMPING_JACK = Action(
-    seconds=1.1,
+ACTIONS["jumping_jack"] = Action(
+    kind="jumping jack", seconds=1.1,
     cycles=3,
     flights=((0.22, 0.46), (0.74, 0.98)),
     keys={
@@ -113,8 +115,8 @@ JUMPING_JACK = Action(
     },
 )
 
-SQUAT = Action(
-    seconds=2.0,
+ACTIONS["squat"] = Action(
+    kind="squat", seconds=2.0,
     cycles=2,
     keys={
         "hip_flexion": ((0.1, 2), (0.85, 105), (1.05, 105), (1.7, 2)),
@@ -130,8 +132,8 @@ SQUAT = Action(
 )
 
 # Both to the side and up; then the left and the right to the front in turn.
-ARM_RAISE = Action(
-    seconds=4.0,
+ACTIONS["arm_raise"] = Action(
+    kind="arm raise", seconds=4.0,
     keys={
         "arm_lowering": ((0.1, ARM), (0.75, -36), (0.95, -36), (1.6, ARM)),
         "left_arm_flexion": ((1.7, 0), (2.3, 118), (2.5, 118), (2.95, 0)),
@@ -142,8 +144,8 @@ ARM_RAISE = Action(
 )
 
 # Upper arms level, forearms turning: small fast circles of the whole arm.
-ARM_CIRCLE = Action(
-    seconds=3.0,
+ACTIONS["arm_circle"] = Action(
+    kind="arm raise", seconds=3.0,
     keys={
         "arm_lowering": ((0.1, ARM), (0.5, 12), (0.75, -18), (1.0, 12), (1.25, 38), (1.5, 12), (1.75, -18),
                          (2.0, 12), (2.25, 38), (2.7, ARM)),
@@ -153,8 +155,8 @@ ARM_CIRCLE = Action(
     },
 )
 
-TORSO_TWIST = Action(
-    seconds=1.6,
+ACTIONS["torso_twist"] = Action(
+    kind="torso twist", seconds=1.6,
     cycles=2,
     keys={
         "trunk_twist": ((0, 0), (0.4, 42), (0.5, 42), (1.1, -42), (1.2, -42), (1.6, 0)),
@@ -169,8 +171,8 @@ TORSO_TWIST = Action(
     },
 )
 
-SIDE_BEND = Action(
-    seconds=3.4,
+ACTIONS["side_bend"] = Action(
+    kind="side bend", seconds=3.4,
     keys={
         "trunk_bend": ((0.1, 0), (0.85, 34), (1.0, 34), (2.1, -34), (2.3, -34), (3.1, 0)),
         "pelvis_roll": ((0.1, 0), (0.85, 7), (1.0, 7), (2.1, -7), (2.3, -7), (3.1, 0)),
@@ -183,8 +185,8 @@ SIDE_BEND = Action(
     },
 )
 
-BOW = Action(
-    seconds=3.0,
+ACTIONS["bow"] = Action(
+    kind="bow", seconds=3.0,
     keys={
         "pelvis_pitch": ((0.1, 0), (1.0, 48), (1.4, 48), (2.4, 0)),
         "hip_flexion": ((0.1, 2), (1.0, 58), (1.4, 58), (2.4, 2)),
@@ -195,8 +197,8 @@ BOW = Action(
     },
 )
 
-LUNGE = Action(
-    seconds=3.0,
+ACTIONS["lunge"] = Action(
+    kind="lunge", seconds=3.0,
     keys={
         "left_hip_flexion": ((0.1, 2), (0.45, 62), (0.9, 72), (1.5, 72), (1.95, 50), (2.5, 2)),
         "left_knee_flexion": ((0.1, 4), (0.45, 60), (0.9, 84), (1.5, 84), (1.95, 62), (2.5, 4)),

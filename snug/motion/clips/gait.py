@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from snug.motion.clips.posture import RATE, STANDING
+from snug.motion.clips.posture import RATE, STANDING, poses_from_angles, root_path
 
+START_SECONDS = 0.7  # from standing to the full stride
 Curve = tuple[tuple[float, float], ...]  # (percent of the stride from that foot's contact, degrees)
 
 
@@ -64,9 +66,28 @@ RUN = Stride(
 )  # fmt: skip
 
 
-def stride_phase(stride: Stride, pace: np.ndarray) -> np.ndarray:
-    """Return the strides done so far (T,) at a pace (T,), a share of the stride's normal rate."""
-    return np.cumsum(pace) / RATE / stride.seconds
+def gait_motion(
+    stride: Stride, pace: float, size: np.ndarray, added: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (T, 24, 3) [rad] and root translations (T, 3) [m] of a gait, at RATE.
+
+    Args:
+        stride: that is repeated.
+        pace: share of the stride's normal rate.
+        size: (T,), 0 standing to 1 the full curves; the pace is in proportion.
+        added: angles by name, (T,) [degrees], on top of those of the stride.
+    """
+    phase = np.cumsum(pace * size) / RATE / stride.seconds
+    angles = gait_angles(stride, phase, size)
+    for name, degrees in added.items():
+        angles[name] += degrees
+    poses = poses_from_angles(angles, len(size))
+    # The trunk's mass evens out what the curves of the legs alone would do to the pelvis at each contact.
+    path = root_path(
+        poses, gait_flights(stride, phase, size), support=gait_support(phase, size),
+        height_smoothing=0.045, speed_smoothing=0.08, rises=stride.rises,
+    )  # fmt: skip
+    return poses, path
 
 
 def gait_angles(stride: Stride, phase: np.ndarray, size: np.ndarray) -> dict[str, np.ndarray]:

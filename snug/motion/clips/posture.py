@@ -125,9 +125,3 @@ def root_path(
     path[1:, ::2] = np.cumsum(0.5 * (velocity[1:] + velocity[:-1]), axis=0) / RATE
     path[:, 1] = height
     return path
-
-
-def smoothstep(s: np.ndarray) -> np.ndarray:
-    """Return 0 below 0, 1 above 1, between them a quintic with neither slope nor curvature at its ends."""
-    s = np.clip(s, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from snug.motion.clips.actions import ARM, Action
 
+ACTIONS: dict[str, Action] = {}
+
 # fmt: off
 # A front kick with the right leg: chamber, extension, recoil; the arms keep the balance.
-KICK = Action(
-    seconds=2.6,
+ACTIONS["kick"] = Action(
+    kind="kick", seconds=2.6,
     keys={
         "right_hip_flexion": ((0.1, 2), (0.42, -14), (0.50, -14), (0.80, 82), (0.95, 96), (1.15, 70),
                               (1.6, 2)),
@@ -27,8 +29,8 @@ KICK = Action(
 )
 
 # From a guard: left jab, right cross with the hips behind it, left jab.
-PUNCH = Action(
-    seconds=2.8,
+ACTIONS["punch"] = Action(
+    kind="punch", seconds=2.8,
     keys={
         "arm_lowering": ((0, 56),),
         "left_arm_flexion": ((0.3, 32), (0.52, 88), (0.60, 88), (0.9, 32), (1.6, 32), (1.82, 88), (1.90, 88),
@@ -55,8 +57,8 @@ PUNCH = Action(
 )
 
 # Half a turn to the left in four quick steps on the spot.
-TURN = Action(
-    seconds=2.4,
+ACTIONS["turn"] = Action(
+    kind="turn", seconds=2.4,
     keys={
         "pelvis_yaw": ((0.25, 0), (0.55, 42), (0.85, 88), (1.15, 134), (1.5, 178), (1.7, 180)),
         "trunk_twist": ((0.1, 0), (0.4, 22), (1.1, 18), (1.6, -8), (2.0, 0)),
@@ -74,8 +76,8 @@ TURN = Action(
 )
 
 # Side steps to the left: the left leg opens, the right one closes.
-SIDESTEP = Action(
-    seconds=0.9,
+ACTIONS["sidestep"] = Action(
+    kind="sidestep", seconds=0.9,
     cycles=4,
     keys={
         "left_hip_abduction": ((0, 3), (0.20, 22), (0.38, 19), (0.80, 3), (0.9, 3)),

@@ -12,15 +12,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
-from snug.motion.clips.gait import WALK, gait_angles, gait_flights, gait_support, stride_phase
-from snug.motion.clips.posture import (
-    LIBRARY_FPS,
-    RATE,
-    SPINE_SHARES,
-    poses_from_angles,
-    root_path,
-    smoothstep,
-)
+from snug.motion.clips.gait import START_SECONDS, WALK, gait_motion
+from snug.motion.clips.posture import LIBRARY_FPS, RATE, SPINE_SHARES, poses_from_angles, root_path
+from snug.motion.motion import smoothstep
 
 FROZEN_FRAMES = 36  # frames after the stop: over a second, in which a hem comes to rest
 STANCE = {
@@ -71,17 +65,9 @@ class TurningWalk:
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at LIBRARY_FPS."""
         time = np.arange(round(self.stop * RATE) + 1) / RATE
-        size = smoothstep(time / 0.7)
-        phase = stride_phase(WALK, self.pace * size)
-        angles = gait_angles(WALK, phase, size)
-        angles["pelvis_yaw"] = angles["pelvis_yaw"] + self.degrees * size * np.sin(
-            2 * np.pi * self.hertz * time
-        )
-        poses = poses_from_angles(angles, len(time))
-        path = root_path(
-            poses, gait_flights(WALK, phase, size), support=gait_support(phase, size),
-            height_smoothing=0.045, speed_smoothing=0.08,
-        )  # fmt: skip
+        size = smoothstep(time / START_SECONDS)
+        yaw = self.degrees * size * np.sin(2 * np.pi * self.hertz * time)
+        poses, path = gait_motion(WALK, self.pace, size, {"pelvis_yaw": yaw})
         every = round(RATE / LIBRARY_FPS)
         poses, path = poses[::every], path[::every]
         frozen = np.minimum(np.arange(len(poses) + FROZEN_FRAMES), len(poses) - 1)

@@ -8,11 +8,13 @@ from __future__ import annotations
 from snug.motion.clips.actions import ARM, Action
 from snug.motion.clips.gait import Stride
 
+ACTIONS: dict[str, Action] = {}
+
 # fmt: off
 # Pushed at the right shoulder from behind: the trunk is turned and thrown forward, the arms fly out, the left
 # foot is caught up with in a long step, the right one in a short one.
-PUSH_RECOVERY = Action(
-    seconds=2.4,
+ACTIONS["push_recovery"] = Action(
+    kind="push recovery", seconds=2.4,
     keys={
         "pelvis_pitch": ((0.30, 0), (0.52, 14), (0.80, 20), (1.15, 12), (1.8, 0)),
         "pelvis_roll": ((0.30, 0), (0.55, 6), (1.0, 3), (1.6, 0)),
@@ -36,8 +38,8 @@ PUSH_RECOVERY = Action(
 
 # A whole turn on the left foot, the right one drawn up to the knee; the arms open, close in front of the
 # chest, rise, and open again as the turn ends.
-DANCE_TURN = Action(
-    seconds=2.6,
+ACTIONS["dance_turn"] = Action(
+    kind="dance turn", seconds=2.6,
     keys={
         "pelvis_yaw": ((0.20, 0), (0.62, -24), (0.72, -24), (1.00, 60), (1.70, 330), (1.92, 360)),
         "pelvis_roll": ((0.62, 0), (1.0, 4), (1.6, 4), (1.9, 0)),
@@ -64,8 +66,8 @@ DANCE_TURN = Action(
 
 # Sideways over the left foot as into a cartwheel: both arms up, the left hand towards the floor, the right
 # leg high to the side; and back.
-CARTWHEEL_LEAN = Action(
-    seconds=2.6,
+ACTIONS["cartwheel_lean"] = Action(
+    kind="cartwheel lean", seconds=2.6,
     keys={
         "pelvis_roll": ((0.40, 0), (1.15, 50), (1.40, 50), (2.15, 0)),
         "pelvis_yaw": ((0.30, 0), (1.05, -20), (1.45, -20), (2.15, 0)),
@@ -88,8 +90,8 @@ CARTWHEEL_LEAN = Action(
 )
 
 # Down onto a seat 45 cm high, a moment upright with the hands over the knees, and up again.
-SIT_AND_STAND = Action(
-    seconds=2.8,
+ACTIONS["sit_and_stand"] = Action(
+    kind="sitting down and standing up", seconds=2.8,
     keys={
         "hip_flexion": ((0.10, 2), (0.60, 62), (1.05, 92), (1.75, 92), (2.1, 88), (2.65, 2)),
         "knee_flexion": ((0.10, 4), (0.60, 52), (1.05, 92), (1.75, 92), (2.1, 84), (2.65, 4)),
