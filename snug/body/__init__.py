@@ -8,7 +8,6 @@
 | smpl_files | `read_body`: a user's SMPL, SMPL-H, SMPL-X or plain arrays, checked |
 | t_pose | a body in A pose, brought to the T pose |
 | plain_pickle | a reader of pickles that runs nothing |
-| bake | the command that made the body of the package |
 
 >>> from snug.body import Body, JOINT_NAMES
 >>> body = Body.load()

@@ -1,7 +1,8 @@
 """Parametric human: template, shape directions, joints and skinning weights, in the layout of SMPL.
 
-Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The baked body stands with its soles on y = 0
-and its pelvis above the origin, for every shape, so a motion's translation is zero where it stands.
+Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The body of the package stands with its
+soles on y = 0 and its pelvis above the origin, for every shape, so a motion's translation is zero where it
+stands.
 A posed vertex is the skinned rest vertex plus the translation: joint 0 is at joints(betas)[0] + translation.
 """
 
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from reference_sim.files.array_file import read_arrays
 from snug.body.skeleton import JOINT_NAMES, BodyError, joint_transforms, rotation_matrices
 
-BAKED = Path(__file__).resolve().parent.parent / "data" / "body.npz"
+BODY_FILE = Path(__file__).resolve().parent.parent / "data" / "body.npz"
 SHAPES = 10  # shape coefficients kept when a file has more, and read by networks of pose and shape
 _CHUNK = 64  # frames skinned in one matrix product, to bound memory
 
@@ -62,7 +63,7 @@ class Body:
         >>> round(Body.load().height, 2)  # [m]
         1.69
         """
-        arrays = {key: _widened(stored) for key, stored in read_arrays(BAKED).items()}
+        arrays = {key: _widened(stored) for key, stored in read_arrays(BODY_FILE).items()}
         # float32 in the file: make the rows sum to one again in float64.
         arrays["skinning_weights"] /= arrays["skinning_weights"].sum(axis=1, keepdims=True)
         return Body(**arrays)

@@ -1,1 +1,1 @@
-"""Data of the package: the baked body, see `snug.body.bake`, and its licence."""
+"""Data of the package: the human body, and its notice."""

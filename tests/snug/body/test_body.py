@@ -1,4 +1,4 @@
-"""The baked body is a closed adult that poses as SMPL does."""
+"""The body of the package is a closed adult that poses as SMPL does."""
 
 import time
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from snug.body.bake import merge_weights, to_t_pose
 from snug.body.skeleton import JOINT_NAMES, BodyError
 from tests.snug.body.other_bodies import volume
 
@@ -142,26 +141,6 @@ def test_elbow_and_knee_bend_their_own_side(body):
     elbow, knee = body.joint_template[joint("left_elbow")], body.joint_template[joint("left_knee")]
     assert np.all(posed[hand, 2] > elbow[2] + 0.15) and np.abs(posed[hand, 0] - elbow[0]).max() < 0.15
     assert np.all(posed[foot, 2] < knee[2] - 0.3)
-
-
-def test_baking_undoes_an_a_pose_made_by_skinning(body):
-    """Lower the arms and bend the elbows: the step of the bake to the T-pose gives the body back."""
-    poses = np.zeros((1, 24, 3))
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        poses[0, joint(f"{side}_shoulder"), 2] = -0.8 * sign
-        poses[0, joint(f"{side}_elbow"), 1] = -0.6 * sign
-    transforms = body.transforms(poses, np.zeros((1, 3)))[0]
-    joints = np.einsum("jab,jb->ja", transforms[:, :, :3], body.joint_template) + transforms[:, :, 3]
-    vertices, rest = to_t_pose(body.vertices(poses, np.zeros((1, 3)))[0], joints, body.skinning_weights)
-    ground = [0.0, body.template[:, 1].min(), 0.0]  # the bake puts the soles on y = 0 (float32 in the file)
-    np.testing.assert_allclose(vertices, body.template - ground, atol=1e-6)
-    np.testing.assert_allclose(rest, body.joint_template - ground, atol=1e-6)
-
-
-def test_bones_without_a_joint_give_their_weights_to_the_parent():
-    labels, parents = ["Hips", "LHipJoint", "LeftUpLeg", "Toe", "Nail"], [-1, 0, 1, 2, 3]
-    merged = merge_weights(np.array([[0.1, 0.2, 0.3, 0.1, 0.3]]), labels, parents)
-    np.testing.assert_allclose(merged[0, :3], [0.3, 0.7, 0.0])
 
 
 def test_lowered_arms_keep_the_volume(body):
