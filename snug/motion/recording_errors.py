@@ -25,11 +25,11 @@ MAX_DISTANCE = 1e4  # [m]
 MAX_NAMED = 4  # joints, and errors of each, in a message; the others are counted
 
 
-def remove_recording_errors(raw: RawMotion, *, repair: bool, turn_limit: float = MAX_TURN_SPEED) -> RawMotion:
+def remove_recording_errors(raw: RawMotion, *, repair: bool) -> RawMotion:
     """Return the motion with all numbers finite and no jump; its source names what was repaired.
 
-    A joint that turns faster than `turn_limit` [rad/s] jumps. Repaired: the shortest arc, or the straight
-    line, between the good frames around an error; at an end of the clip the nearest good frame is held.
+    Repaired: the shortest arc, or the straight line, between the good frames around an error; at an end of
+    the clip the nearest good frame is held.
 
     Raises:
         MotionError: an error without `repair`, or one that cannot be repaired: too many, a jump that stays,
@@ -47,7 +47,7 @@ def remove_recording_errors(raw: RawMotion, *, repair: bool, turn_limit: float =
         for first, last in _runs(missing):
             errors.setdefault(f"{name} is not finite", []).append(f"{first}-{last}")
         _bridge(track, missing, turns)
-        jumps = _jumps(track, turns, raw.fps, turn_limit)
+        jumps = _jumps(track, turns, raw.fps)
         wrong |= missing
         wrong[jumps] = True
         for first, last in _spans_around(jumps, raw.fps, len(track)):
@@ -56,7 +56,7 @@ def remove_recording_errors(raw: RawMotion, *, repair: bool, turn_limit: float =
             around[first : last + 1] = True
             if not around.all():
                 _bridge(track, around, turns)
-        for frame in _jumps(track, turns, raw.fps, turn_limit)[:1]:
+        for frame in _jumps(track, turns, raw.fps)[:1]:
             stays = stays or f"{name} jumps after frame {frame}"
     if not errors:
         return raw
@@ -90,13 +90,13 @@ def _check_units(file: Path, poses: np.ndarray, path: np.ndarray) -> None:
         )
 
 
-def _jumps(track: np.ndarray, turns: bool, fps: float, turn_limit: float) -> np.ndarray:
+def _jumps(track: np.ndarray, turns: bool, fps: float) -> np.ndarray:
     """Return the frames k of a track (T, 3) with a jump to frame k + 1."""
     steps = np.diff(track, axis=0)
     if turns:
         rotations = rotation_matrices(track)
         steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
-    limit = turn_limit if turns else MAX_ROOT_SPEED
+    limit = MAX_TURN_SPEED if turns else MAX_ROOT_SPEED
     return np.flatnonzero(np.linalg.norm(steps, axis=1) * fps > limit)
 
 

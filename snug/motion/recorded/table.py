@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    import numpy as np
+from typing import NamedTuple
 
 CLIPS_FILE = Path(__file__).with_name("clips.npz")
 
 
 class Clip(NamedTuple):
-    """A recorded clip: what it shows, its frames at 30 fps, and the first 12 digits of its digest."""
+    """A recorded clip: what it shows, and its frames at 30 fps.
+
+    digest: the first 12 digits of the SHA-256 of its float32 arrays, poses before translations.
+    """
 
     content: str
     frames: int
@@ -95,8 +94,3 @@ def clip_of(name: str) -> str:
     ('01_01', 'walk')
     """
     return SEGMENTS[name].clip if name in SEGMENTS else name
-
-
-def digest_of(poses: np.ndarray, translations: np.ndarray) -> str:
-    """Return 12 digits of the SHA-256 of a clip's float32 arrays: poses (T,24,3), translations (T,3)."""
-    return hashlib.sha256(poses.tobytes() + translations.tobytes()).hexdigest()[:12]
