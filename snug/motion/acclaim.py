@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import check_frame_count, read_lines
+from snug.motion.raw_motion import Line, check_frame_count, read_lines
 
 INCH = 0.0254  # [m]
 _ROTATIONS = ("rx", "ry", "rz")
@@ -60,33 +60,9 @@ class Skeleton:
     degrees: bool = True
 
 
-@dataclass(slots=True)
-class _Line:
-    """One line of a file, split into tokens, and its place for messages."""
-
-    path: Path
-    number: int
-    tokens: list[str]
-
-    def error(self, problem: str) -> MotionError:
-        """Return the error that names file and line."""
-        return MotionError(f"{self.path}, line {self.number}: {problem}")
-
-    def numbers(self, first: int, last: int | None = None) -> list[float]:
-        """Return tokens first to last - 1 as numbers. Raises MotionError."""
-        text = " ".join(self.tokens)[:60]
-        try:
-            values = [float(word) for word in self.tokens[first:last]]
-        except ValueError:
-            raise self.error(f"'{text}' should be numbers; repair or fetch the file again") from None
-        if not all(map(math.isfinite, values)) or (last is not None and len(values) != last - first):
-            raise self.error(f"'{text}' has a missing or infinite number; fetch the file again")
-        return values
-
-
 def read_asf(path: Path) -> Skeleton:
     """Parse a skeleton. Raises MotionError with file and line."""
-    sections: dict[str, list[_Line]] = {}
+    sections: dict[str, list[Line]] = {}
     for line in _lines(path):
         if line.tokens[0].startswith(":"):
             current = sections.setdefault(line.tokens[0][1:].lower(), [])
@@ -161,15 +137,14 @@ def turns(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
     return rotation.as_matrix()
 
 
-def _lines(path: Path) -> list[_Line]:
-    numbered = ((number, line.split("#")[0].split()) for number, line in enumerate(read_lines(path), 1))
-    lines = [_Line(path, number, tokens) for number, tokens in numbered if tokens]
+def _lines(path: Path) -> list[Line]:
+    lines = list(read_lines(path, comment="#"))
     if not lines:
         raise MotionError(f"{path}: the file is empty; fetch it again")
     return lines
 
 
-def _check_whole(line: _Line, frames: list[dict[str, list[float]]], moving: dict[str, int]) -> None:
+def _check_whole(line: Line, frames: list[dict[str, list[float]]], moving: dict[str, int]) -> None:
     if frames and len(frames[-1]) < len(moving):
         missing = next(name for name in moving if name not in frames[-1])
         raise line.error(
@@ -177,14 +152,14 @@ def _check_whole(line: _Line, frames: list[dict[str, list[float]]], moving: dict
         )
 
 
-def _axes(line: _Line, angles: list[float], order: str, degrees: bool) -> np.ndarray:
+def _axes(line: Line, angles: list[float], order: str, degrees: bool) -> np.ndarray:
     if sorted(order.lower()) != ["x", "y", "z"]:
         raise line.error(f"axis order '{order}' is not a permutation of XYZ")
     values = np.radians([angles]) if degrees else np.array([angles])
     return turns(tuple(f"r{letter}" for letter in order.lower()), values)[0]
 
 
-def _root(lines: list[_Line], skeleton: Skeleton) -> Bone:
+def _root(lines: list[Line], skeleton: Skeleton) -> Bone:
     entries = {line.tokens[0].lower(): line for line in lines}
     if "order" not in entries:
         raise lines[0].error("the root has no 'order' of its channels")
@@ -198,7 +173,7 @@ def _root(lines: list[_Line], skeleton: Skeleton) -> Bone:
     return bone
 
 
-def _channels(line: _Line, allowed: tuple[str, ...]) -> tuple[str, ...]:
+def _channels(line: Line, allowed: tuple[str, ...]) -> tuple[str, ...]:
     channels = tuple(word.lower() for word in line.tokens[1:])
     for channel in channels:
         if channel not in allowed:
@@ -206,7 +181,7 @@ def _channels(line: _Line, allowed: tuple[str, ...]) -> tuple[str, ...]:
     return channels
 
 
-def _bones(lines: list[_Line], skeleton: Skeleton) -> dict[str, Bone]:
+def _bones(lines: list[Line], skeleton: Skeleton) -> dict[str, Bone]:
     bones: dict[str, Bone] = {}
     bone = Bone("")
     for line in lines:
@@ -234,7 +209,7 @@ def _bones(lines: list[_Line], skeleton: Skeleton) -> dict[str, Bone]:
     return bones
 
 
-def _attach(lines: list[_Line], bones: dict[str, Bone], skeleton: Skeleton) -> None:
+def _attach(lines: list[Line], bones: dict[str, Bone], skeleton: Skeleton) -> None:
     for line in lines:
         parent, *children = line.tokens
         if parent in ("begin", "end"):

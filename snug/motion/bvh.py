@@ -7,7 +7,6 @@ joints stand at the sums of their offsets: the zero pose.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import check_frame_count, read_lines
+from snug.motion.raw_motion import Line, check_frame_count, read_lines
 
 MAX_JOINTS = 1000
 MAX_ROTATIONS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second
@@ -72,62 +71,18 @@ class BvhClip:
         return shift
 
 
-class _Lines:
-    """Lines of a file that are not empty, split into tokens; the last one read stands for messages."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.number = path, 0
-        self._lines: Iterator[tuple[int, str]] = iter(enumerate(read_lines(path), 1))
-
-    def next(self) -> list[str]:
-        """Return the next line. Raises MotionError at the end of the file."""
-        for tokens in self.rest():
-            return tokens
-        raise MotionError(f"{self.path}: ends in line {self.number}, before it is whole; export it again")
-
-    def rest(self) -> Iterator[list[str]]:
-        """Yield the lines that are left."""
-        for number, line in self._lines:
-            if tokens := line.split():
-                self.number = number
-                yield tokens
-
-    def error(self, problem: str) -> MotionError:
-        """Return the error that names file and line."""
-        return MotionError(f"{self.path}, line {self.number}: {problem}")
-
-    def expect(self, *tokens: str) -> list[str]:
-        """Return the rest of a line that begins with these tokens, in any case. Raises MotionError."""
-        line = self.next()
-        if [word.lower() for word in line[: len(tokens)]] != [word.lower() for word in tokens]:
-            raise self.error(
-                f"'{' '.join(line)[:40]}' where '{' '.join(tokens)}' should be; is it a .bvh file?"
-            )
-        return line[len(tokens) :]
-
-    def numbers(self, tokens: list[str], count: int) -> list[float]:
-        """Return `count` finite numbers. Raises MotionError for another count, or for other text."""
-        try:
-            values = [float(word) for word in tokens]
-        except ValueError:
-            values = [math.nan]
-        if len(values) != count or not all(map(math.isfinite, values)):
-            raise self.error(f"{count} finite numbers should be here, not '{' '.join(tokens)[:40]}'")
-        return values
-
-
 def read_clip(path: Path) -> BvhClip:
     """Parse a file. Raises MotionError, naming file and line, for what is damaged, cut off or too large."""
-    lines = _Lines(path)
-    lines.expect("HIERARCHY")
-    joints = _hierarchy(lines)
+    lines = read_lines(path)
+    _next_line(lines, path, "HIERARCHY")
+    joints = _hierarchy(lines, path)
     columns = joints[-1].first + len(joints[-1].channels)
-    frames, frame_time = _header(lines, len(joints))
+    frames, frame_time = _header(lines, path, len(joints))
     rows: list[np.ndarray] = []
-    for tokens in lines.rest():
+    for line in lines:
         if len(rows) == frames:
-            raise lines.error(f"more than the {frames} frames that 'Frames:' declares; export it again")
-        rows.append(np.array(lines.numbers(tokens, columns)))
+            raise line.error(f"more than the {frames} frames that 'Frames:' declares; export it again")
+        rows.append(np.array(_numbers(line, 0, columns)))
     if len(rows) < frames:
         raise MotionError(
             f"{path}: declares {frames} frames and holds {len(rows)}; it is cut off, export it again"
@@ -135,59 +90,82 @@ def read_clip(path: Path) -> BvhClip:
     return BvhClip(joints, np.stack(rows), 1.0 / frame_time if frame_time else None)
 
 
-def _hierarchy(lines: _Lines) -> list[Joint]:
+def _next_line(lines: Iterator[Line], path: Path, *tokens: str) -> Line:
+    """Return the next line. Raises MotionError where there is none that begins so, in any case."""
+    line = next(lines, None)
+    if line is None:
+        raise MotionError(f"{path}: ends before it is whole; export it again")
+    if [word.lower() for word in line.tokens[: len(tokens)]] != [word.lower() for word in tokens]:
+        raise line.error(
+            f"'{' '.join(line.tokens)[:40]}' where '{' '.join(tokens)}' should be; is it a .bvh file?"
+        )
+    return line
+
+
+def _numbers(line: Line, first: int, count: int) -> list[float]:
+    """Return the tokens from `first` on as numbers. Raises MotionError unless they are `count`."""
+    values = line.numbers(first)
+    if len(values) != count:
+        raise line.error(f"{count} numbers should be here, not {len(values)}; export it again")
+    return values
+
+
+def _hierarchy(lines: Iterator[Line], path: Path) -> list[Joint]:
     joints: list[Joint] = []
     open_joints: list[int] = []
     columns = 0
-    tokens = lines.next()
     while True:
+        line = _next_line(lines, path)
+        tokens = line.tokens
         word = tokens[0].lower()
         if word in ("root", "joint", "end"):
             if (word == "root") != (not joints):
-                raise lines.error("there is one ROOT, and JOINTs and End Sites below it")
+                raise line.error("there is one ROOT, and JOINTs and End Sites below it")
             name = "" if word == "end" else " ".join(tokens[1:])
             if word != "end" and (not name or any(joint.name == name for joint in joints)):
-                raise lines.error(f"joint '{name[:40]}' has no name or one that is taken")
+                raise line.error(f"joint '{name[:40]}' has no name or one that is taken")
             if len(joints) == MAX_JOINTS:
-                raise lines.error(f"more than {MAX_JOINTS} joints; is it the skeleton of one body?")
+                raise line.error(f"more than {MAX_JOINTS} joints; is it the skeleton of one body?")
             joints.append(Joint(name, open_joints[-1] if open_joints else -1, first=columns))
             open_joints.append(len(joints) - 1)
-            lines.expect("{")
+            _next_line(lines, path, "{")
         elif not open_joints:
-            raise lines.error(f"'{tokens[0][:40]}' where ROOT should be; is it a .bvh file?")
+            raise line.error(f"'{tokens[0][:40]}' where ROOT should be; is it a .bvh file?")
         elif word == "offset":
-            joints[open_joints[-1]].offset = np.array(lines.numbers(tokens[1:], 3))
+            joints[open_joints[-1]].offset = np.array(_numbers(line, 1, 3))
         elif word == "channels" and open_joints[-1] == len(joints) - 1 and columns == joints[-1].first:
-            joints[-1].channels = _channels(lines, tokens)
+            joints[-1].channels = _channels(line)
             columns += len(joints[-1].channels)
         elif word == "}":
             open_joints.pop()
             if not open_joints:
                 return joints
         else:
-            raise lines.error(f"'{' '.join(tokens)[:40]}' is not known in a hierarchy, or out of place")
-        tokens = lines.next()
+            raise line.error(f"'{' '.join(tokens)[:40]}' is not known in a hierarchy, or out of place")
 
 
-def _channels(lines: _Lines, tokens: list[str]) -> tuple[str, ...]:
+def _channels(line: Line) -> tuple[str, ...]:
+    tokens = line.tokens
     known = {channel.lower(): channel for channel in CHANNELS}
     channels = tuple(known.get(word.lower(), "") for word in tokens[2:])
     if tokens[1:2] != [str(len(channels))] or len(set(channels)) != len(channels) or "" in channels:
-        raise lines.error(f"'{' '.join(tokens)[:60]}' declares other channels than it names, or unknown ones")
+        raise line.error(f"'{' '.join(tokens)[:60]}' declares other channels than it names, or unknown ones")
     return channels
 
 
-def _header(lines: _Lines, joints: int) -> tuple[int, float | None]:
+def _header(lines: Iterator[Line], path: Path, joints: int) -> tuple[int, float | None]:
     """Return the number of frames, and seconds a frame where it is stated."""
-    lines.expect("MOTION")
-    tokens = lines.expect("Frames:")
+    _next_line(lines, path, "MOTION")
+    line = _next_line(lines, path, "Frames:")
+    tokens = line.tokens[1:]
     if len(tokens) != 1 or not (tokens[0].isascii() and tokens[0].isdigit() and len(tokens[0]) < 10):
-        raise lines.error(f"'{' '.join(tokens)[:40]}' is no number of frames")
+        raise line.error(f"'{' '.join(tokens)[:40]}' is no number of frames")
     frames = int(tokens[0])
-    check_frame_count(lines.path, frames)
+    check_frame_count(path, frames)
     if frames * joints > MAX_ROTATIONS:
-        raise lines.error(f"{frames} frames of {joints} joints are too many; cut the clip")
-    seconds = lines.numbers(lines.expect("Frame", "Time:"), 1)[0]
+        raise line.error(f"{frames} frames of {joints} joints are too many; cut the clip")
+    line = _next_line(lines, path, "Frame", "Time:")
+    seconds = _numbers(line, 2, 1)[0]
     if seconds < 0:
-        raise lines.error("the frame time is negative")
+        raise line.error("the frame time is negative")
     return frames, seconds or None

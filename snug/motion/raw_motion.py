@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,14 +46,46 @@ class RawMotion:
             )
 
 
-def read_lines(path: Path) -> list[str]:
-    """Return the lines of a text file. Raises MotionError where it cannot be read or is too large."""
+@dataclass(slots=True)
+class Line:
+    """One line of a text file, split into tokens, and its place for messages."""
+
+    path: Path
+    number: int
+    tokens: list[str]
+
+    def error(self, problem: str) -> MotionError:
+        """Return the error that names file and line."""
+        return MotionError(f"{self.path}, line {self.number}: {problem}")
+
+    def numbers(self, first: int, last: int | None = None) -> list[float]:
+        """Return tokens first to last - 1 as numbers. Raises MotionError unless they are there and finite."""
+        words = self.tokens[first:last]
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = [math.nan]
+        if not all(map(math.isfinite, values)) or (last is not None and len(values) != last - first):
+            text = " ".join(words)[:40]
+            raise self.error(f"finite numbers should be here, not '{text}'; fetch the file again")
+        return values
+
+
+def read_lines(path: Path, comment: str | None = None) -> Iterator[Line]:
+    """Yield the lines of a text file that are not empty, up to the letter that begins a comment.
+
+    Raises:
+        MotionError: the file cannot be read or is too large.
+    """
     try:
         if path.stat().st_size > MAX_TEXT_BYTES:
             raise MotionError(f"{path}: larger than {MAX_TEXT_BYTES >> 20} MB; cut the clip")
-        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+        text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as problem:
         raise MotionError(f"{path}: cannot be read ({problem.strerror}); check the path") from None
+    for number, line in enumerate(text.splitlines(), 1):
+        if tokens := (line.split(comment)[0] if comment else line).split():
+            yield Line(path, number, tokens)
 
 
 def check_frame_count(path: Path, frames: int) -> None:

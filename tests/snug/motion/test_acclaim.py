@@ -68,7 +68,7 @@ class TestBrokenFiles:
             (lambda text: "", "empty"),
             (lambda text: ":DEGREES\n", "no frame"),
             (lambda text: text.replace("head 0.0", "head zero", 1), "line 6.*numbers"),
-            (lambda text: text.replace("head 0.0", "head nan", 1), "line 6.*infinite"),
+            (lambda text: text.replace("head 0.0", "head nan", 1), "line 6.*finite numbers"),
             (lambda text: text.replace("head 0.0", "head 0.0 1.0", 1), "line 6.*2 numbers"),
             (lambda text: text.replace("head", "tail", 1), "line 6.*unknown bone 'tail'"),
             (lambda text: text.replace("head 0.0\n", "", 1), "frame 1 ends without bone 'head'"),

@@ -204,7 +204,7 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda text: "", "ends in line 0"),
+        (lambda text: "", "ends before it is whole"),
         (lambda text: "solid\n" + text, "line 1: 'solid' where 'HIERARCHY' should be"),
         (lambda text: text.replace("MOTION", "MOVE"), "where 'MOTION' should be"),
         (lambda text: text.replace("Frames: 20", "Frames: 21"), "declares 21 frames and holds 20"),
@@ -219,7 +219,7 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
         (lambda text: text.replace("left_knee", "left_thing"), "no joint is known as 'left_knee'"),
         (lambda text: text.replace("head", "hat"), "no joint is known as 'head'"),
         (lambda text: text.replace("OFFSET", "OFFSETS", 1), "not known in a hierarchy"),
-        (lambda text: text.rsplit(" ", 1)[0], "finite numbers should be here"),
+        (lambda text: text.rsplit(" ", 1)[0], "75 numbers should be here, not 74"),
         (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "finite numbers should be here"),
         (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
     ],
