@@ -123,12 +123,9 @@ class DressForm:
 
     def fit(self, positions: Array) -> Fit:
         """Return how positions (V,3) [m] lie on it."""
-        return self._fit(positions, self.skin.signed_distance(positions, 0))
-
-    def _fit(self, positions: Array, distances: Array) -> Fit:
         size = float(np.ptp(positions, axis=0).max()) / self.height
         faces = self.skin.planes(positions, 0).faces
-        return Fit(distances, size, float(self.ends[faces].mean()))
+        return Fit(self.skin.signed_distance(positions, 0), size, float(self.ends[faces].mean()))
 
     def problem(self, positions: Array, fit: Fit) -> str:
         """Return why a garment that lies so cannot be simulated, or empty."""
@@ -180,17 +177,10 @@ class DressForm:
         return np.einsum("vi,vi->v", planes.normals, points - planes.points), planes.normals
 
 
-@dataclass(frozen=True)
-class Placement:
-    """Units and axis of a file, and a shift (3,) [m], that bring a garment onto the body."""
-
-    units: str
-    up: str
-    shift: tuple[float, float, float]
-
-
-def find_placement(form: DressForm, raw: Array, units: str, up: str, shift: Array) -> Placement | None:
-    """Return units, up and shift with which a file's vertices (V,3) lie on the body, or None.
+def find_placement(
+    form: DressForm, raw: Array, units: str, up: str, shift: Array
+) -> tuple[str, str, Array] | None:
+    """Return units, up and shift (3,) [m] with which a file's vertices (V,3) lie on the body, or None.
 
     First other units and axes alone, then a shift, then both.
     """
@@ -200,13 +190,8 @@ def find_placement(form: DressForm, raw: Array, units: str, up: str, shift: Arra
     placed = {choice: to_metres_y_up(raw, units=choice[0], up=choice[1]) for choice in choices}
     fits = {choice: form.fit(positions + shift) for choice, positions in placed.items()}
     if worn := [choice for choice, fit in fits.items() if not fit.problem and fit.cost < DOUBTFUL]:
-        return Placement(*min(worn, key=lambda choice: fits[choice].cost), _three(shift))
+        return (*min(worn, key=lambda choice: fits[choice].cost), shift)
     for (u, a), positions in placed.items():
         if SIZE_RANGE[0] < fits[u, a].size < SIZE_RANGE[1] and (moved := form.shift(positions)) is not None:
-            return Placement(u, a, _three(moved))
+            return u, a, moved
     return None
-
-
-def _three(shift: Array) -> tuple[float, float, float]:
-    x, y, z = (float(value) + 0.0 for value in shift)
-    return x, y, z

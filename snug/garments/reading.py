@@ -24,7 +24,7 @@ from snug.garments.fit import DressForm, find_placement, pose_in_file
 from snug.garments.garment import Garment, GarmentError, smooth_weights
 from snug.garments.openings import name_openings
 from snug.garments.options import OPTION, GarmentFile
-from snug.garments.weights import GarmentWeights, find_weights, read_authored_weights
+from snug.garments.weights import find_weights, read_authored_weights
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -149,10 +149,11 @@ def _check_place(examination: Examination, file: GarmentFile, form: DressForm, r
         return True
     remedy = "move it onto the unposed body, facing +z with y up"
     if placement := find_placement(form, raw.positions, file.units, file.up, np.asarray(file.shift)):
-        shift = ",".join(f"{value:g}" for value in placement.shift)
-        changes = [f"{OPTION}units {placement.units}"] * (placement.units != file.units)
-        changes += [f"{OPTION}up {placement.up}"] * (placement.up != file.up)
-        changes += [f"{OPTION}shift={shift}"] * (placement.shift != file.shift)
+        units, up, shift = placement
+        changes = [f"{OPTION}units {units}"] * (units != file.units)
+        changes += [f"{OPTION}up {up}"] * (up != file.up)
+        numbers = ",".join(f"{value + 0.0:g}" for value in shift)
+        changes += [f"{OPTION}shift={numbers}"] * (tuple(shift) != file.shift)
         remedy = " ".join(changes)
     examination.add("place", f"does not lie on the body ({size} m, {problem})", remedy, UNUSABLE)
     return False
@@ -255,12 +256,14 @@ def _make_garment(
         return None
     examination.add("openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in loops.items()))
     legs = "left_leg" in loops or "right_leg" in loops
-    weights = find_weights(form.posed, positions, faces, legs=legs, authored=authored)
-    source = "as they came with it" if weights.authored else "of the closest skin"
-    examination.add("weights", f"{source}; encloses {', '.join(weights.followed)}")
+    weights, nearest, followed = find_weights(form.posed, positions, faces, legs=legs, authored=authored)
+    source = "of the closest skin" if authored is None else "as they came with it"
+    examination.add("weights", f"{source}; encloses {', '.join(followed)}")
     if form.body.arms_lowered is not None:
         chart = flattened(positions, faces) if chart is None else chart
-        positions = _in_t_pose(form.body, positions, faces, weights)
+        smoothing = UNPOSED_SMOOTHING * len(positions) / 1000 if authored is None else 0
+        smoothed = smooth_weights(weights, faces, round(smoothing))
+        positions = _in_t_pose(form.body, positions, smoothed)
         text = "made for lowered arms, brought to the T pose; its rest shape is as it was made"
         examination.add("pose", text)
     # A garment without neck and sleeves hangs from its waist, and contact without friction does not hold it.
@@ -272,21 +275,18 @@ def _make_garment(
         name=file.name,
         rest_positions=positions,
         faces=faces,
-        body_vertices=weights.body_vertices,
-        skinning_weights=weights.weights,
+        body_vertices=nearest,
+        skinning_weights=weights,
         loops=loops,
         pins=pins,
         material=material,
         rest_uv=chart,
-        authored_weights=weights.authored,
+        authored_weights=authored is not None,
     )
 
 
-def _in_t_pose(body: Body, positions: Array, faces: Index, weights: GarmentWeights) -> Array:
+def _in_t_pose(body: Body, positions: Array, weights: Array) -> Array:
     """Return positions (V,3) [m], made for the body as its file has it, on the body in T pose."""
-    smoothed = weights.weights
-    if not weights.authored:
-        smoothed = smooth_weights(smoothed, faces, round(UNPOSED_SMOOTHING * len(positions) / 1000))
     moved = body.transforms(pose_in_file(body)[None], np.zeros((1, 3)))[0]
-    blended = np.einsum("vj,jab->vab", smoothed, moved)
+    blended = np.einsum("vj,jab->vab", weights, moved)
     return np.linalg.solve(blended[..., :3], (positions - blended[..., 3])[..., None])[..., 0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import igl
@@ -27,26 +26,9 @@ COVERED = 0.05  # share of a limb's skin within a garment, from which the garmen
 BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both legs follows neither
 
 
-@dataclass(frozen=True)
-class GarmentWeights:
-    """Skinning weights of a garment.
-
-    Attributes:
-        weights: (V,24).
-        body_vertices: (V,), nearest on the body.
-        followed: names of the joints that the garment follows.
-        authored: whether the weights came with it.
-    """
-
-    weights: Array
-    body_vertices: Index
-    followed: tuple[str, ...]
-    authored: bool = False
-
-
 def find_weights(
     body: Body, positions: Array, faces: Index, *, legs: bool, authored: Array | None
-) -> GarmentWeights:
+) -> tuple[Array, Index, tuple[str, ...]]:
     """Find the skinning weights of a garment on the unposed body.
 
     They are the authored ones, or blended from the three corners of the closest face of the skin, among the
@@ -58,6 +40,9 @@ def find_weights(
         faces: (F,3), wound outward.
         legs: whether each leg has its own opening.
         authored: (V,24), or None.
+
+    Returns:
+        Weights (V,24), nearest vertices of the body (V,), and names of the joints that the garment follows.
     """
     followed = enclosed_limbs(body, positions, faces)
     skin = np.asarray(body.faces)[skin_following(body, followed)[body.faces].all(axis=1)]
@@ -67,7 +52,7 @@ def find_weights(
     corners = skin[closest.faces]
     nearest = corners[np.arange(len(corners)), closest.barycentric.argmax(axis=1)]
     if authored is not None:
-        return GarmentWeights(authored, nearest, followed, authored=True)
+        return authored, nearest, followed
     weights = np.einsum("va,vaj->vj", closest.barycentric, body.skinning_weights[corners])
     below = joint_position(body, "left_hip")[1] - positions[:, 1]
     if not legs and below.max() > BELOW_HIPS:
@@ -75,7 +60,7 @@ def find_weights(
         smooth = smooth_weights(weights, faces, round(SKIRT_SMOOTHING * len(positions) / 1000))
         share = np.clip(below / BELOW_HIPS, 0.0, 1.0)[:, None]
         weights = (1 - share) * weights + share * smooth
-    return GarmentWeights(weights, nearest, followed)
+    return weights, nearest, followed
 
 
 def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...]:
