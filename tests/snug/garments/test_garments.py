@@ -246,11 +246,6 @@ def test_a_parameter_out_of_range_is_named(body, wrong, says):
     assert "\n" not in str(caught.value)
 
 
-def test_negative_smoothing_is_refused(shirt):
-    with pytest.raises(GarmentError, match="iterations=-1"):
-        smooth_weights(shirt.skinning_weights, shirt.faces, -1)
-
-
 SLEEVES = {"neck", "left_sleeve", "right_sleeve", "hem"}
 ARMHOLES = {"neck", "left_armhole", "right_armhole", "hem"}
 LEGS = {"waist", "left_leg", "right_leg"}
