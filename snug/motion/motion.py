@@ -249,13 +249,6 @@ def _other_side(name: str) -> str:
     return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
 
 
-def joint_speeds(motion: Motion) -> np.ndarray:
-    """Return the angular speed of every joint relative to its parent, (T - 1, 24) [rad/s]."""
-    rotations = rotation_matrices(motion.poses)
-    steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
-    return np.linalg.norm(steps, axis=-1) * motion.fps
-
-
 def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return how far each pose (T, 24, 3) is from the nearest of the others (N, 24, 3): (T,) [rad].
 

@@ -24,7 +24,6 @@ from snug.motion.motion import (
     arm_clearance,
     clear_arms,
     heading,
-    joint_speeds,
     nearest_pose,
     place,
     resample,
@@ -33,6 +32,7 @@ from snug.motion.motion import (
     turn_about_vertical,
 )
 from snug.motion.recorded.table import CLIPS, clip_of
+from tests.snug.motion.joint_speeds import joint_speeds
 
 # Those made by code; tests of recorded clips are in test_recorded.
 MADE = [name for name in (*CONTROL, *VALIDATION, *TEST, *DYNAMIC_VALIDATION) if clip_of(name) not in CLIPS]

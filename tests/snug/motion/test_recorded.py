@@ -21,10 +21,11 @@ from snug.motion.library import (
     VALIDATION,
     make_motion,
 )
-from snug.motion.motion import arm_clearance, joint_speeds
+from snug.motion.motion import arm_clearance
 from snug.motion.raw_motion import RawMotion
 from snug.motion.recorded.table import CLIPS, CLIPS_FILE, SEGMENTS, SEGMENTS_OF, clip_of
 from snug.motion.recording_errors import MAX_TURN_SPEED, remove_recording_errors
+from tests.snug.motion.joint_speeds import joint_speeds
 
 ROOT = Path(__file__).resolve().parents[3]
 NOTICE = "snug/motion/recorded/NOTICE.md"

@@ -10,6 +10,7 @@ from snug.motion.library import make_motion
 from snug.motion.motion import Motion, arm_clearance, mirror_motion
 from snug.recipes.recipe import DEFAULT
 from snug.training.augmentation.mixed_clips import augment, hang_arms, lap_clearance, make_mixed_clips
+from tests.snug.motion.joint_speeds import joint_speeds
 
 
 def test_mirror_swaps_the_sides():
@@ -28,8 +29,6 @@ def test_mixed_motions_are_continuous_and_repeat():
     again = make_mixed_clips(clips, 300, turn=0.1, lifted=0.25, seed=3)
     assert len(mixed) == 5 and all((a.poses == b.poses).all() for a, b in zip(mixed, again))
     assert make_mixed_clips(clips, 0, turn=0.1, lifted=0.25, seed=3) == []
-    from snug.motion.motion import joint_speeds
-
     fastest = max(joint_speeds(clip).max() for clip in clips)
     assert max(joint_speeds(clip).max() for clip in mixed) < 2 * fastest + 2.0
 

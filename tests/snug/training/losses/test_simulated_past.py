@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
-from snug.motion.motion import Motion, joint_speeds, turn_about_vertical
+from snug.motion.motion import Motion, turn_about_vertical
 from snug.networks.motion_features import HISTORY, RATED_JOINTS, motion_history, motion_rates
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
@@ -27,6 +27,7 @@ from snug.training.losses.vertex_targets import TargetError
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network
 from snug.training.training_set import TrainingSet
+from tests.snug.motion.joint_speeds import joint_speeds
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMALL = replace(DYNAMIC, pretraining=0)
