@@ -66,6 +66,13 @@ class Preset:
         return self.steps.get(training, self.steps.get(kind, 0))
 
 
+def _steps(*, snug: int, ncs: int, **others: int) -> dict[str, int]:
+    """Return the optimiser steps per kind: handles are trained as long as snug, ncs-static as ncs."""
+    handles = dict.fromkeys(("handles-20", "handles-40", "handles-80"), snug)
+    once = {"nearest-poses": 1, "pose-regression": 1}
+    return {"snug": snug, "ncs": ncs, "ncs-static": ncs, **handles, **once, **others}
+
+
 PRESETS = (
     Preset(
         name="smoke",
@@ -80,21 +87,7 @@ PRESETS = (
         warm_up_frames=3,
         loop_frames=390,
         settle_frames=12,
-        steps={
-            "snug": 60,
-            "dynamic": 60,
-            "supervised": 60,
-            "pbns": 60,
-            "santesteban2019": 10,
-            "handles-20": 60,
-            "handles-40": 60,
-            "handles-80": 60,
-            "ncs": 30,
-            "ncs-static": 30,
-            "tailornet": 60,
-            "nearest-poses": 1,
-            "pose-regression": 1,
-        },
+        steps=_steps(snug=60, ncs=30, dynamic=60, supervised=60, pbns=60, santesteban2019=10, tailornet=60),
         sheet_cells=6,
         sheet_frames=10,
         iteration_budgets=(1, 4),
@@ -117,21 +110,15 @@ PRESETS = (
         warm_up_frames=10,
         loop_frames=10_000,
         settle_frames=30,
-        steps={
-            "snug": 5300,
-            "dynamic": 8000,
-            "supervised": 4000,
-            "pbns": 6000,
-            "santesteban2019": 1000,
-            "handles-20": 5300,
-            "handles-40": 5300,
-            "handles-80": 5300,
-            "ncs": 2650,
-            "ncs-static": 2650,
-            "tailornet": 4000,
-            "nearest-poses": 1,
-            "pose-regression": 1,
-        },
+        steps=_steps(
+            snug=5300,
+            ncs=2650,
+            dynamic=8000,
+            supervised=4000,
+            pbns=6000,
+            santesteban2019=1000,
+            tailornet=4000,
+        ),
         sheet_cells=14,
         sheet_frames=45,
         iteration_budgets=(1, 2, 4, 8),
@@ -155,23 +142,16 @@ PRESETS = (
         warm_up_frames=10,
         loop_frames=10_000,
         settle_frames=60,
-        steps={
-            "snug": 30_000,
-            "snug-paper": 136_000,
-            "pbns-paper": 136_000,
-            "dynamic": 30_000,
-            "supervised": 10_000,
-            "pbns": 12_000,
-            "santesteban2019": 10_000,
-            "handles-20": 30_000,
-            "handles-40": 30_000,
-            "handles-80": 30_000,
-            "ncs": 15_000,
-            "ncs-static": 15_000,
-            "tailornet": 10_000,
-            "nearest-poses": 1,
-            "pose-regression": 1,
-        },
+        steps={"snug-paper": 136_000, "pbns-paper": 136_000}
+        | _steps(
+            snug=30_000,
+            ncs=15_000,
+            dynamic=30_000,
+            supervised=10_000,
+            pbns=12_000,
+            santesteban2019=10_000,
+            tailornet=10_000,
+        ),
         further=True,
         sheet_cells=30,
         sheet_frames=90,
