@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from benchmarks.fingerprint.digest import digest_of_file
-from benchmarks.results.json_file import ResultsError
+from benchmarks.results.json_file import ResultsError, read_json
 from benchmarks.results.row import COLUMNS, Row, cells_to_row, row_to_cells
-from benchmarks.results.run_config import read_run_config, write_run_config
+from benchmarks.results.run_config import FORMAT, OLD, check_types
 from reference_sim.files.atomic_files import replacing
 
 LATER = ("moved", "protocol")  # columns that runs of before have not
@@ -125,11 +126,17 @@ class RunFolder:
 
     def write_config(self, config: dict[str, Any]) -> None:
         """Write run.json, with its format, whole or not at all."""
-        write_run_config(self.config_path, config)
+        text = json.dumps({"format": FORMAT, **config}, indent=2, ensure_ascii=False)
+        with replacing(self.config_path) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
 
     def read_config(self) -> dict[str, Any]:
         """Read run.json. Raises ResultsError where it is absent, broken, or of another format."""
-        return read_run_config(self.config_path)
+        config = read_json(self.config_path)
+        if config.get("format") != FORMAT:
+            raise ResultsError(f"{self.config_path}: {OLD}")
+        check_types(self.config_path, config)
+        return config
 
     def changed(self, config: dict[str, Any]) -> list[str]:
         """Return the files of the run that are not as it wrote them; those that are gone are not named."""
