@@ -179,11 +179,11 @@ SOLVERS = (
     ),
     *_truncated(
         "vbd", "Vertex block descent", "sweep", "vertex block descent on our energies, {} a step",
-        (5, 20, 80), module="benchmarks.methods.solvers.vertex_block_descent",
+        (5, 20, 80), module="benchmarks.methods.minimisers.block_descent",
     ),
     *_truncated(
         "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
-        (10, 40, 160), module="benchmarks.methods.solvers.xpbd",
+        (10, 40, 160), module="benchmarks.methods.minimisers.xpbd",
     ),
     *(
         MethodEntry(

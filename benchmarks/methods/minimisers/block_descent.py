@@ -13,10 +13,13 @@ is no line search; its guess and its Chebyshev acceleration are left out: all so
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from benchmarks.methods.minimisers.kernels import sweep_vertices
 from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
+from benchmarks.methods.solvers.simulation import Simulation
 from reference_sim.kernels.fast_kernels import step_terms
 from reference_sim.kernels.kernel_argument import kernel_argument, with_types_resolved
 from reference_sim.minimise.result import Stop
@@ -70,3 +73,8 @@ def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np
     owner = stencils.ravel()[corners]
     first = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=vertices))])
     return first, corners[np.argsort(owner, kind="stable")]
+
+
+def make(*, models: Path, seed: int, iterations: int) -> Simulation:
+    """Make a simulation whose every step is `iterations` sweeps of vertex block descent."""
+    return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})

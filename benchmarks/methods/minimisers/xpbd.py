@@ -19,10 +19,13 @@ potential where C is linear in x; elsewhere its limit for many sweeps is another
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from benchmarks.methods.minimisers.kernels import sweep_constraints
 from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
+from benchmarks.methods.solvers.simulation import Simulation
 from reference_sim.kernels.fast_kernels import step_terms
 from reference_sim.kernels.kernel_argument import kernel_argument, with_types_resolved
 from reference_sim.minimise.result import Stop
@@ -57,3 +60,8 @@ class XPBD(SweepSolver):
         terms = tuple(zip(self._kernels, frozen))
         run.swept, run.sweep = x, with_types_resolved(sweep_constraints, x, self._inverse, terms)
         return None
+
+
+def make(*, models: Path, seed: int, iterations: int) -> Simulation:
+    """Make a simulation whose every step is `iterations` sweeps of XPBD."""
+    return Simulation(options={"method": XPBD, "max_iterations": iterations})
