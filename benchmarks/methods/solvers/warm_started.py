@@ -35,40 +35,31 @@ SHARE = 0.6  # of the last residual
 
 
 class FromElsewhere:
-    """Minimiser that starts each step where `starts` says, whatever guess it is given."""
+    """Minimiser that starts each step where `starts` says, whatever guess it is given.
 
-    def __init__(self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray) -> None:
-        self._inner, self._starts, self._pins = inner, starts, pins
-
-    def minimise(self, x0: np.ndarray) -> Result:
-        """Run from the next start; pinned vertices stay where x0 (V, 3) [m] has them."""
-        start = next(self._starts)
-        start[self._pins] = x0[self._pins]
-        return self._inner.minimise(start)
-
-
-class WithResidual(FromElsewhere):
-    """Minimiser that adds SHARE of the last frame's residual, carried by the skin, to each start.
-
+    With `carry`, SHARE of the last frame's residual, carried by the skin, is added to each start.
     The residual is what the inner minimiser added to the last frame. first: (V, 3) [m] what the start of the
     scene adds to frame 0 of the starts.
     """
 
     def __init__(
-        self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray, first: np.ndarray,
-        carry: ResidualTransport,
+        self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray,
+        carry: ResidualTransport | None = None, first: np.ndarray | None = None,
     ) -> None:  # fmt: skip
-        super().__init__(inner, starts, pins)
-        self._added, self._carry, self._frame = first, carry, 0
+        self._inner, self._starts, self._pins, self._carry = inner, starts, pins, carry
+        self._added: Any = first
+        self._frame = 0
 
     def minimise(self, x0: np.ndarray) -> Result:
-        """Run from the next start and the carried residual."""
+        """Run from the next start; pinned vertices stay where x0 (V, 3) [m] has them."""
         self._frame += 1
-        given = next(self._starts)
-        start = given + SHARE * self._carry.carried(self._added, self._frame)
+        given = start = next(self._starts)
+        if self._carry is not None:
+            start = given + SHARE * self._carry.carried(self._added, self._frame)
         start[self._pins] = x0[self._pins]
         result = self._inner.minimise(start)
-        self._added = result.positions - given
+        if self._carry is not None:
+            self._added = result.positions - given
         return result
 
 
@@ -98,10 +89,7 @@ class WarmStarted(Method):
             starts = frames()
             first = next(starts)  # frame 0 is the scene's start, as for every solver
             inner, pins = make_minimiser(potential, **self.solver), np.asarray(potential.cloth.pins)
-            if carry is None:
-                return FromElsewhere(inner, starts, pins)
-            assert scene.start is not None
-            return WithResidual(inner, starts, pins, scene.start - first, carry)
+            return FromElsewhere(inner, starts, pins, carry, None if carry is None else scene.start - first)
 
         self.simulation.options = {"method": from_elsewhere}
         self.simulation.prepare(scene)
@@ -128,7 +116,6 @@ class WarmStarted(Method):
         return prepare_frames(model, dressed, motion, betas, earlier=before)
 
     def _carry(self, scene: BuiltScene) -> ResidualTransport:
-
         assert scene.dressed is not None
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         transforms = dressed.transforms(scene.dressed.motion.poses, scene.dressed.betas)
