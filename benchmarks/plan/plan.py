@@ -59,11 +59,6 @@ class Network:
         """The training; None: an untrained network."""
         return self.users_training or TRAININGS.get(self.name)
 
-    @property
-    def learns_from_simulation(self) -> bool:
-        """True where it needs simulated motions to be trained."""
-        return self.training is not None and self.training.simulated is not None
-
 
 @dataclass(frozen=True)
 class Motions:
@@ -172,12 +167,6 @@ class Plan:
         """Return the names of a garment's motions of the split, and of others in the plan's scenes."""
         done = (scene.motion for scene in self.scenes if scene.garment == garment)
         return tuple(dict.fromkeys((*self.motions.measured_of(garment), *done)))
-
-    @property
-    def simulated(self) -> tuple[str, ...]:
-        """Garments whose training motions have to be simulated."""
-        learning = (network for network in self.networks if network.learns_from_simulation)
-        return tuple(dict.fromkeys(network.garment for network in learning))
 
     @property
     def cut_motions(self) -> dict[str, str]:

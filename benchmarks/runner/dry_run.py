@@ -41,8 +41,9 @@ def _head(plan: Plan) -> list[str]:
         *([f"body {plan.inputs.body.path}"] if plan.inputs.body else []),
         *map(partial(_size, plan), plan.garments),
     ]
+    learning = {net.garment for net in plan.networks if net.training and net.training.simulated}
     for garment in dict.fromkeys(network.garment for network in plan.networks):
-        how = "simulated for networks that learn from it" if garment in plan.simulated else "not simulated"
+        how = "simulated for networks that learn from it" if garment in learning else "not simulated"
         how = f"networks of {plan.trained}" if plan.trained else how
         lines.append(f"training motions {', '.join(plan.motions.train)} ({how})")
     counts = f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"
