@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from benchmarks.method import MethodEntry
-from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import Scene
 
 TaskId = tuple[str, str]  # kind and name of a task
@@ -37,6 +35,11 @@ class Cell:
         return f"{flat(self.scene.name)}/{flat(self.method)}" + (f"-seed{self.seed}" if self.seed else "")
 
     @property
+    def key(self) -> tuple[str, str, int]:
+        """Scene, method and seed, by which RunFolder names its files."""
+        return self.scene.name, self.method, self.seed
+
+    @property
     def task_id(self) -> TaskId:
         """Id of the task that runs the cell."""
         return "cell", self.name
@@ -59,18 +62,6 @@ class Cell:
     def timed(self) -> bool:
         """True if its costs are measured; other cells run side by side."""
         return self.scene.timed and self.entry.timed
-
-    def trajectory(self, folder: RunFolder) -> Path:
-        """Return the path of its trajectory."""
-        return folder.trajectory_path(self.scene.name, self.method, self.seed)
-
-    def curves(self, folder: RunFolder) -> Path:
-        """Return the path of its curves, metrics of every frame."""
-        return folder.curves_path(self.scene.name, self.method, self.seed)
-
-    def quasi_static(self, folder: RunFolder) -> Path:
-        """Return the path of the method's quasi-static solution."""
-        return folder.quasi_static_path(self.scene.name, self.method, self.seed)
 
 
 def flat(name: str) -> str:

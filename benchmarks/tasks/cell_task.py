@@ -141,9 +141,9 @@ class RunCell(CellTask):
 
     def clear(self, folder: RunFolder) -> None:
         """Remove the files of an earlier run of the cell."""
-        self.cell.trajectory(folder).unlink(missing_ok=True)
-        self.cell.curves(folder).unlink(missing_ok=True)
-        self.cell.quasi_static(folder).unlink(missing_ok=True)
+        folder.trajectory_path(*self.cell.key).unlink(missing_ok=True)
+        folder.curves_path(*self.cell.key).unlink(missing_ok=True)
+        folder.quasi_static_path(*self.cell.key).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Prepare off the clock, run on it, write the trajectory; memory is that until the run has ended."""
@@ -183,7 +183,7 @@ class RunCell(CellTask):
         )
         if status == "failed":
             return Outcome(status, reason, failed=True, result={"peak": peak})
-        paths = [cell.trajectory(folder)]
+        paths = [folder.trajectory_path(*cell.key)]
         paths[0].parent.mkdir(parents=True, exist_ok=True)
         provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
         replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
@@ -191,7 +191,7 @@ class RunCell(CellTask):
         if quasi_static is not None:
             if wrong := misshapen(quasi_static.positions, scene):
                 raise ValueError(f"quasi_static() {wrong}")
-            paths.append(cell.quasi_static(folder))
+            paths.append(folder.quasi_static_path(*cell.key))
             quasi_static.save(paths[1])
         CellProcess.of(context).finished = method
         return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))

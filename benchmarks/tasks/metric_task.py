@@ -58,7 +58,7 @@ class MeasureCell(Task):
 
     def clear(self, folder: RunFolder) -> None:
         """Remove the curves of an earlier measurement."""
-        self.cell.curves(folder).unlink(missing_ok=True)
+        folder.curves_path(*self.cell.key).unlink(missing_ok=True)
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Measure the trajectory, and write energies of each frame and other curves beside it."""
@@ -68,11 +68,11 @@ class MeasureCell(Task):
         if self.counterpart is not None:
             outcome = needed.get(self.counterpart.task_id)
             if outcome is not None and outcome.status in USABLE:
-                roll_out.counterpart = _positions(self.counterpart.trajectory(folder))
+                roll_out.counterpart = _positions(folder.trajectory_path(*self.counterpart.key))
         if self.training is not None:
             roll_out.training_poses = _training_poses(self.training, context)
         metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
-        path = self.cell.curves(folder)
+        path = folder.curves_path(*self.cell.key)
         if curves:
             curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
             curves[SECONDS][: roll_out.scene.warm_up] = np.nan
@@ -92,10 +92,10 @@ class MeasureCell(Task):
         for cell in self.cells:
             outcome = needed.get(cell.task_id)
             if outcome is not None and outcome.files:
+                still = folder.quasi_static_path(*cell.key) if len(outcome.files) > 1 else None
                 roll_outs[cell] = RollOut(
-                    group, cell.entry, Trajectory.load(cell.trajectory(folder)), status=outcome.status,
-                    suites=cell.suites,
-                    quasi_static=_positions(cell.quasi_static(folder)) if len(outcome.files) > 1 else None,
+                    group, cell.entry, Trajectory.load(folder.trajectory_path(*cell.key)),
+                    status=outcome.status, suites=cell.suites, quasi_static=still and _positions(still),
                 )  # fmt: skip
                 if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
                     group.roll_outs.append(roll_outs[cell])
