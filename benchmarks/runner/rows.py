@@ -43,6 +43,7 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
     if outcome.files and measured is None:
         return  # interrupted before it was measured
     trained, taught_by = network_tasks(cell, tasks)
+    network = outcomes.get(trained, Outcome()) if trained else Outcome()
     metrics: dict[str, Any] = {}  # a number, or the parts of an Estimate
     status, reason = outcome.status, "; ".join(filter(None, (outcome.reason, outcome.remark)))
     if outcome.files:
@@ -62,9 +63,8 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
             elif (declared_ms := cell.entry.declared_ms or outcome.result.get("declared_ms")) is not None:
                 metrics["cost/frame"] = declared_ms
             if cell.scene.timed:
-                metrics |= model_costs(trained, taught_by, outcomes)
-            reasons = (reason or not_learned(trained, outcomes), taken(trained, outcomes))
-            reason = "; ".join(filter(None, reasons))
+                metrics |= model_costs(network, taught_by, outcomes)
+            reason = "; ".join(filter(None, (reason or not_learned(network), taken(network))))
     batch = outcomes.get(cell.batch_id, Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
@@ -176,20 +176,17 @@ def network_tasks(cell: Cell, tasks: Mapping[TaskId, Task]) -> tuple[TaskId | No
     return trained, tasks[trained].reads if trained else ()
 
 
-def model_costs(
-    trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes: Outcomes
-) -> dict[str, float]:
+def model_costs(network: Outcome, taught_by: tuple[TaskId, ...], outcomes: Outcomes) -> dict[str, float]:
     """Return cost/data, cost/setup, cost/memory and cost/train* of a trained network."""
-    outcome = outcomes.get(trained) if trained else None
-    if outcome is None or not outcome.result:
+    if not network.result:
         return {}
     names = {
         "cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes",
         "cost/train_steps": "steps", "cost/train_frames": "frames",
     }  # fmt: skip
-    costs = {metric: outcome.result[name] for metric, name in names.items()}
-    if NAME in outcome.result:
-        return {"cost/data": outcome.result["data_seconds"]} | costs
+    costs = {metric: network.result[name] for metric, name in names.items()}
+    if NAME in network.result:
+        return {"cost/data": network.result["data_seconds"]} | costs
     return {"cost/data": sum(outcomes[id].seconds for id in taught_by if id in outcomes)} | costs
 
 
@@ -210,25 +207,23 @@ def machines_of(trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes:
     }
 
 
-def not_learned(trained: TaskId | None, outcomes: Outcomes) -> str:
+def not_learned(network: Outcome) -> str:
     """Return a remark where a simulation failed, so that the cell's network learned without it."""
-    outcome = outcomes.get(trained) if trained else None
-    if outcome is None or not outcome.result.get("left_out"):
+    if not network.result.get("left_out"):
         return ""
-    return f"its network learned without {', '.join(outcome.result['left_out'])}: no simulation is whole"
+    return f"its network learned without {', '.join(network.result['left_out'])}: no simulation is whole"
 
 
-def taken(trained: TaskId | None, outcomes: Outcomes) -> str:
+def taken(network: Outcome) -> str:
     """Return a remark where the cell's network is of a file, with what a training here would differ in."""
-    outcome = outcomes.get(trained) if trained else None
-    if outcome is None or NAME not in outcome.result:
+    if NAME not in network.result:
         return ""
-    differing = outcome.result["differing"]
+    differing = network.result["differing"]
     more = f" and {len(differing) - MOST_NAMED} more" * (len(differing) > MOST_NAMED)
     same = "a training here gives the same bits"
     if differing:
         same = f"a training here differs in {', '.join(differing[:MOST_NAMED])}{more}"
-    return f"{PRETRAINED} {outcome.result[NAME]} of {outcome.result['trained_at']}; {same}"
+    return f"{PRETRAINED} {network.result[NAME]} of {network.result['trained_at']}; {same}"
 
 
 def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
