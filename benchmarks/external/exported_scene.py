@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.external.scene_files import (
-    FileList,
-    facts_of,
-    write_cloth,
-    write_energies,
-    write_motion,
-    write_obstacle,
-)
+from benchmarks.external.scene_files import FileList, facts_of, write_scene_files
 from reference_sim.files.atomic_files import new_folder
 from reference_sim.trajectory.point_cache import write_point_cache
 
@@ -44,12 +36,9 @@ def write_scene(
     if simulation is not None and declared.networks_only:
         raise ValueError(f"--reference: nobody simulates {declared.name}: it is for networks alone")
     with new_folder(folder) as part:
-        files = [*write_cloth(part, scene), *write_energies(part, scene), *write_obstacle(part, scene)]
-        if scene.dressed is not None:
-            files += write_motion(part, scene.dressed)
-        files += _reference(part, scene, simulation) if simulation is not None else []
         facts = _description(declared, scene, preset)
-        (part / "scene.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+        files = write_scene_files(part, scene, facts)
+        files += _reference(part, scene, simulation) if simulation is not None else []
         (part / "README.txt").write_text(readme(scene, facts, files, score), encoding="utf-8")
 
 

@@ -21,15 +21,13 @@ Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 FileList = list[tuple[str, str]]  # name of a file, its content
 
 
-def write_for_program(folder: Path, scene: BuiltScene) -> None:
-    """Write the scene into a new folder for a program: arrays, meshes and scene.json, no README."""
-    folder.mkdir()
-    write_cloth(folder, scene)
-    write_energies(folder, scene)
-    write_obstacle(folder, scene)
+def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> FileList:
+    """Write arrays, meshes and the facts, as scene.json; return what was written beside scene.json."""
+    files = [*write_cloth(part, scene), *write_energies(part, scene), *write_obstacle(part, scene)]
     if scene.dressed is not None:
-        write_motion(folder, scene.dressed)
-    (folder / "scene.json").write_text(json.dumps(facts_of(scene), indent=2) + "\n", encoding="utf-8")
+        files += write_motion(part, scene.dressed)
+    (part / "scene.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+    return files
 
 
 def write_cloth(part: Path, scene: BuiltScene) -> FileList:

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_option import FileConventions
-from benchmarks.external.scene_files import write_for_program
+from benchmarks.external.scene_files import facts_of, write_scene_files
 from benchmarks.method import MethodEntry
 from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.process.isolated_process import WorkerDied
@@ -88,7 +88,8 @@ class Program(Stored):
         """
         with tempfile.TemporaryDirectory(prefix="program-") as folder:
             exported, out, output = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))
-            write_for_program(exported, self.scene)
+            exported.mkdir()
+            write_scene_files(exported, self.scene, facts_of(self.scene))
             places = {"{scene}": str(exported), "{out}": str(out), "{seed}": str(self.seed)}
             self._execute([_filled(word, places) for word in shlex.split(self.command)], output)
             if not out.is_file():
