@@ -59,6 +59,8 @@ class RollOutOption:
     role: str = "external"
 
     def __post_init__(self) -> None:
+        if (ms := self.declared_ms) is not None and not 0.0 < ms < 1e9:
+            raise RollOutFileError(f"declared time {ms} ms: give a positive number of milliseconds a frame")
         if not re.fullmatch(rf"\w[{CHARACTERS}]*", self.name):
             raise RollOutFileError(
                 f"{self.path}: the name '{self.name}' has other than letters, digits and _-+., or "
@@ -96,14 +98,7 @@ def parse_roll_out(text: str) -> RollOutOption:
         except ValueError:
             raise RollOutFileError(f"--rollout {text}: {key}={value} is no number") from None
     declared = fields.pop("declared_ms", None)
-    return RollOutOption(name, path, FileConventions(**fields), check_declared_ms(declared))
-
-
-def check_declared_ms(value: float | None) -> float | None:
-    """Return a declared time [ms] a frame. Raises RollOutFileError where it is no time."""
-    if value is not None and not 0.0 < value < 1e9:
-        raise RollOutFileError(f"declared time {value} ms: give a positive number of milliseconds a frame")
-    return value
+    return RollOutOption(name, path, FileConventions(**fields), declared)
 
 
 _WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {

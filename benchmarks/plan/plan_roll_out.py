@@ -14,7 +14,6 @@ from benchmarks.external.roll_out_option import (
     FileConventions,
     RollOutFileError,
     RollOutOption,
-    check_declared_ms,
 )
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import scene_fields, split
@@ -42,7 +41,7 @@ def plan_roll_out(options: argparse.Namespace, command: str) -> Plan:
     )
     stem = Path(options.roll_out.rstrip("/").replace(PLACE, "")).stem
     name = options.name or re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out"
-    option = RollOutOption(name, options.roll_out, stated, check_declared_ms(options.declared_ms))
+    option = RollOutOption(name, options.roll_out, stated, options.declared_ms)
     fields, scenes = scene_fields(options), split([options.scene or ""])
     if options.rest_mesh and options.other_mesh:
         raise RollOutFileError("--other-mesh compares with a scene: give --scene, not --rest-mesh")
