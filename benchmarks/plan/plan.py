@@ -103,17 +103,15 @@ class Motions:
         """The name of the first one."""
         return self.worn[0].garment
 
-    def validation_of(self, garment: str) -> tuple[str, ...]:
-        """Return the names of a garment's validation motions."""
-        return self.dynamic_validation if of_garment(garment, self.worn).dynamic else self.validation
-
-    def test_of(self, garment: str) -> tuple[str, ...]:
-        """Return the names of a garment's test motions."""
-        return self.dynamic_test if of_garment(garment, self.worn).dynamic else self.test
+    def by_role(self, garment: str) -> dict[str, tuple[str, ...]]:
+        """Return role -> names of a garment's motions."""
+        if of_garment(garment, self.worn).dynamic:
+            return {"train": self.train, "validation": self.dynamic_validation, "test": self.dynamic_test}
+        return {"train": self.train, "validation": self.validation, "test": self.test}
 
     def measured_of(self, garment: str) -> tuple[str, ...]:
         """Return the names of a garment's motions of the split."""
-        return self.dynamic_measured if of_garment(garment, self.worn).dynamic else self.measured
+        return self.by_role(garment)[self.split][: self.few]
 
 
 @dataclass(frozen=True, kw_only=True)

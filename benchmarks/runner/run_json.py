@@ -56,13 +56,9 @@ class RunLog:
             "protocol": {"number": NUMBER, "digest": DIGEST},
             "suites": list(plan.suites),
             "motions": {
-                f"{what} {garment}": list(names(garment))
+                f"{role} {garment}": list(names)
                 for garment in plan.garments
-                for what, names in (
-                    ("train", lambda _: plan.motions.train),
-                    ("validation", plan.motions.validation_of),
-                    ("test", plan.motions.test_of),
-                )
+                for role, names in plan.motions.by_role(garment).items()
             },
             "cut_motions": plan.cut_motions,
             "split": plan.motions.split,
