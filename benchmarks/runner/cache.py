@@ -13,7 +13,6 @@ import dataclasses
 import json
 import shutil
 from collections.abc import Iterable, Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -81,12 +80,9 @@ class Cache:
         entry = {
             "format": FORMAT,
             "task": task.title,
-            "stage": task.stage,
-            "alone": bool(task.process),
             "inputs": sorted(task.inputs),
             "parts": dependencies(task),
             "needs": _needs(task, others),
-            "written": datetime.now().astimezone().isoformat(timespec="seconds"),
             "origin": outcome.origin,
             "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},

@@ -7,9 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.results.row import DECLARED, Row
-from benchmarks.runner.rows import SPREAD
-
-MOST_NAMED = 3  # cells, tasks or stages that a line names
+from benchmarks.runner.rows import MOST_NAMED, SPREAD, first_of
 
 
 def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str = "") -> str:
@@ -36,7 +34,7 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
     wide = {cell: percent for cell, percent in spreads.items() if percent > 100.0 * SPREAD}
     if wide:
         cells = [f"{cell} ({wide[cell]:.0f} %)" for cell in sorted(wide, key=lambda cell: -wide[cell])]
-        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {_first_of(cells)}")
+        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {first_of(cells)}")
     declared = dict.fromkeys(row.method for row in rows if row.declared)
     if declared:
         lines.append(f"run time {DECLARED}: {', '.join(declared)}")
@@ -56,8 +54,3 @@ def named(lines: Sequence[str], where: str, most: int = MOST_NAMED) -> list[str]
     """
     more = len(lines) - most
     return [*lines[:most], *([f"and {more} more {where}"] if more > 0 else [])]
-
-
-def _first_of(names: Sequence[str]) -> str:
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -53,14 +53,12 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     print(summary(log.rows, log.stages, answer or ""), flush=True)
     failed = [row for row in log.rows if not accepted(row)]
     ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
-    broken = runner.broken()
-    for line in named(list(ends), "failed in results.csv", MOST_FAILURES):
-        print(line, file=sys.stderr)
-    for line in named(
-        [f"{label}: {reason}" for label, reason in broken.items()], "failed in run.json", MOST_FAILURES
+    broken = [f"{label}: {reason}" for label, reason in runner.broken().items()]
+    for line in (
+        *named(list(ends), "failed in results.csv", MOST_FAILURES),
+        *named(broken, "failed in run.json", MOST_FAILURES),
+        *remarks(log.rows, len(runner.reused), runner.outdated()),
     ):
-        print(line, file=sys.stderr)
-    for line in remarks(log.rows, len(runner.reused), runner.outdated()):
         print(line, file=sys.stderr)
     if looks := log.config["test_looks"]:
         print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)

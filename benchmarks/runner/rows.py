@@ -21,7 +21,7 @@ from benchmarks.tasks.training import TrainNetwork
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
-MOST_NAMED = 3  # names of what differs in a remark
+MOST_NAMED = 3  # cells, tasks, stages or differences that a line names
 
 Outcomes = Mapping[TaskId, Outcome]
 
@@ -219,11 +219,16 @@ def taken(network: Outcome) -> str:
     if NAME not in network.result:
         return ""
     differing = network.result["differing"]
-    more = f" and {len(differing) - MOST_NAMED} more" * (len(differing) > MOST_NAMED)
     same = "a training here gives the same bits"
     if differing:
-        same = f"a training here differs in {', '.join(differing[:MOST_NAMED])}{more}"
+        same = f"a training here differs in {first_of(differing)}"
     return f"{PRETRAINED} {network.result[NAME]} of {network.result['trained_at']}; {same}"
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first names in one text, and how many more there are."""
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
