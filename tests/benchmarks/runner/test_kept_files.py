@@ -101,7 +101,6 @@ def dressed(tmp_path_factory) -> tuple[Path, dict]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", [flip, truncate, "replace", Path.unlink])
 @pytest.mark.parametrize(
     "name",
     [
@@ -111,17 +110,12 @@ def dressed(tmp_path_factory) -> tuple[Path, dict]:
         "models/supervised-seed0.safetensors",
     ],
 )  # fmt: skip
-def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dressed, tmp_path, name, damage):
+def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dressed, tmp_path, name):
     folder = shutil.copytree(dressed[0], tmp_path / "run")
     digests = RunFolder(folder).read_config()["digests"]
-    if damage == "replace":  # by another whole file of its kind
-        other = next(n for n in digests if Path(n).suffix == Path(name).suffix and n != name)
-        shutil.copyfile(folder / other, folder / name)
-    else:
-        damage(folder / name)
-    assert not (folder / name).is_file() or digest_of_file(folder / name) != digests[name]
-    rows = run_dressed(folder)
-    assert rows == dressed[1]
+    flip(folder / name)
+    assert digest_of_file(folder / name) != digests[name]
+    assert run_dressed(folder) == dressed[1]
     config = RunFolder(folder).read_config()
     assert set(config["digests"]) == set(digests) and RunFolder(folder).changed(config) == []
 
