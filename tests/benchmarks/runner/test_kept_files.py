@@ -137,21 +137,6 @@ def test_a_number_changed_in_a_record_is_not_believed(whole, tmp_path):
     assert METRICS not in runner.reused and rows == whole[1]
 
 
-def test_a_file_that_comes_back_as_it_was_does_nothing_else_again(tmp_path):
-    tasks = task("first"), task("second", needs=(("network", "first"),))
-
-    def run() -> Runner:
-        runner = Runner(tasks, Cache(RunFolder(tmp_path)))
-        runner.run(InProcess(RunFolder(tmp_path)))
-        return runner
-
-    run()
-    (tmp_path / "first.txt").write_text("damaged")
-    runner = run()
-    assert runner.reused == ["network second"]
-    assert (tmp_path / "first.txt").read_text() == "first"
-
-
 def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it(tmp_path, monkeypatch):
     folder = RunFolder(tmp_path)
     first, second = task("first"), task("second", needs=(("network", "first"),))

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -29,7 +27,7 @@ from benchmarks.scenes import of_garment
 from benchmarks.tasks.task import Outcome
 from benchmarks.tasks.training import TrainNetwork
 from tests.benchmarks.runner.misbehaving import interrupt_at
-from tests.benchmarks.tasks.test_cell_tasks import TINY, found_of, of_session, plan_of
+from tests.benchmarks.tasks.test_cell_tasks import TINY, found_of, plan_of
 
 ROOT = Path(__file__).resolve().parents[3]
 WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall"]
@@ -183,43 +181,6 @@ def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
     assert (row.method, row.status, row.reason) == ("supervised", "failed", "killed")
     assert runner.outcomes["data", "tshirt-run/simulation"].reason == "far away"
     assert found_of(plan).state == "failed"
-
-
-@pytest.mark.slow
-def test_killed_at_any_moment_a_run_ends_as_one_that_was_not(tmp_path):
-    names = ("simulation", "newton-1", "newton-4", "lbfgs-5", "gradient-descent-10")
-    assert run.main(words_of(tmp_path / "whole", *names)) == 0
-    folder = tmp_path / "killed"
-    words, killed = words_of(folder, *names), []
-    for files in (1, 5, 9, 14, 19):  # in the folder when it is killed, a little later each time
-        kept = {path: path.read_bytes() for path in folder.glob("cache/cell/**/*.json")}
-        process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.run", *words],
-            cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL, start_new_session=True,
-        )  # fmt: skip
-        deadline = time.monotonic() + 120
-        while process.poll() is None and sum(path.is_file() for path in folder.rglob("*")) < files:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        time.sleep(0.03 * files)
-        process.kill()
-        process.wait()
-        killed.append(process.returncode)
-        while of_session(process.pid):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        assert {path: path.read_bytes() for path in kept} == kept
-    assert killed.count(-signal.SIGKILL) >= 4  # in the midst of it
-    assert run.main(words) == 0
-    assert measured(folder) == measured(tmp_path / "whole")
-    assert not [path for path in folder.rglob("*") if "part" in path.name]
-
-
-def measured(folder: Path) -> dict[tuple[str, str], tuple[float | None, str]]:
-    """Return value and status of every row but the costs, which depend on clock and process."""
-    rows = RunFolder(folder).read_rows()
-    return {(r.method, r.metric): (r.value, r.status) for r in rows if not r.metric.startswith("cost/")}
 
 
 def test_the_longest_training_begins_first(tmp_path):
