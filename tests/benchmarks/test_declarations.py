@@ -8,7 +8,6 @@ import pytest
 
 from benchmarks import metrics, run, scenes
 from benchmarks.declarations import DeclarationError
-from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.methods.catalogue import all_methods as methods
 from benchmarks.metric import Metric
 from benchmarks.presets import find_preset
@@ -70,15 +69,6 @@ def test_a_role_and_a_size_that_nobody_knows_are_named():
     scene = dataclasses.replace(scenes.SCENES[0], sizes=("sheet_cell",))
     with pytest.raises(DeclarationError, match="'sheet_cell', which no preset has"):
         scene.at(find_preset("smoke"))
-
-
-def test_source_that_cannot_be_read_is_named(tmp_path, monkeypatch):
-    (tmp_path / "broken_method.py").write_text("x = 1\ny = )\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(DeclarationError, match=r"broken_method\.py: line 2: unmatched '\)'"):
-        code_of("broken_method")
-    with pytest.raises(DeclarationError, match=r"no module benchmarks\.nothing: see the entry that names it"):
-        code_of("benchmarks.nothing")
 
 
 @pytest.mark.parametrize("more", [[], ["--dry-run"]])

@@ -16,7 +16,6 @@ from benchmarks.results.row import COLUMNS, Row, with_provenance
 from benchmarks.results.run_config import FORMAT
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
-from reference_sim.files.atomic_files import replacing
 from reports.run.reading import read_run
 
 ROWS = [
@@ -25,10 +24,6 @@ ROWS = [
     Row("validation", "free_fall", "simulation", 3, "check", "m", 1e-17, expected=0.0, tolerance=1e-12),
     Row("extremes", "stiff", "simulation", 0, "outcome", "weights", float("nan"), "failed", "line\ntwo"),
 ]
-
-
-def test_columns_are_the_fields_of_a_row():
-    assert [field.name for field in dataclasses.fields(Row)] == list(COLUMNS)
 
 
 def test_rows_come_back_digit_for_digit(tmp_path):
@@ -174,21 +169,6 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
 
-def test_whoever_is_reading_the_old_rows_reads_them_to_their_end(tmp_path):
-    folder = RunFolder(tmp_path)
-    folder.write_rows(ROWS[:1])
-    with folder.rows_path.open() as reader:
-        folder.write_rows(ROWS)
-        assert len(reader.readlines()) == 2
-
-
-def test_replacing_keeps_the_suffix_for_writers_that_look_at_it(tmp_path):
-    with replacing(tmp_path / "a.vtkhdf") as temporary:
-        assert temporary.suffix == ".vtkhdf" and temporary.parent == tmp_path
-        temporary.write_text("x")
-    assert (tmp_path / "a.vtkhdf").read_text() == "x"
-
-
 def test_what_lies_under_a_part_files_name_is_not_followed(tmp_path):
     """Links under the names of part files, as somebody else may leave them in a folder that all can write."""
     other = tmp_path / "other"
@@ -214,10 +194,6 @@ def test_trajectory_paths_are_flat_and_told_apart(tmp_path):
     folder = RunFolder(tmp_path)
     paths = {folder.trajectory_path(s, m, k) for s in ("a/b", "a") for m in ("x", "y") for k in (0, 1)}
     assert len(paths) == 8 and all(len(p.relative_to(tmp_path).parts) == 3 for p in paths)
-
-
-def test_provenance_is_filled_in():
-    assert {row.commit for row in with_provenance(ROWS, commit="abc")} == {"abc"}
 
 
 def test_a_row_of_an_earlier_run_keeps_where_it_comes_from():

@@ -256,24 +256,6 @@ def test_vertices_without_triangles_are_matched_by_the_start_alone(tmp_path):
 # --- damaged files ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["vtkhdf", "npz", "pkl", "pc2", "obj"])
-def test_a_damaged_file_is_one_line(kind, tmp_path):
-    path = Path(write(kind, tmp_path))
-    target = path / "cloth_3.obj" if path.is_dir() else path
-    whole, refused = target.read_bytes(), 0
-    for _ in range(40):
-        data = bytearray(whole[: RANDOM.integers(1, len(whole))] if RANDOM.random() < 0.3 else whole)
-        for place in RANDOM.integers(0, len(data), 6):
-            data[place] = RANDOM.integers(0, 256)
-        target.write_bytes(bytes(data))
-        try:
-            read_roll_out(path)
-        except RollOutFileError as error:
-            refused += 1
-            assert "\n" not in str(error) and str(tmp_path) in str(error)
-    assert refused > 5
-
-
 def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_path):
     path = tmp_path / "mine.pc2"
     head = np.array([1, 2**30], "<i4").tobytes() + np.array([0, 1], "<f4").tobytes()

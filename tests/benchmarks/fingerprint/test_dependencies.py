@@ -133,11 +133,6 @@ def test_the_kernels_that_a_term_declares_count_with_it(project):
     }
 
 
-def test_an_unknown_module_is_named():
-    with pytest.raises(ValueError, match=r"benchmarks\.nothing"):
-        code_of("benchmarks.nothing")
-
-
 def test_digests_tell_values_apart():
     @dataclasses.dataclass
     class Pair:

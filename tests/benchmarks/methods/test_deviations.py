@@ -11,7 +11,6 @@ from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.options import EXAMPLES
 from benchmarks.plan.plan import Motions, PlanError
 from benchmarks.presets import find_preset
-from benchmarks.run import main
 from snug.motion.library import TEST, VALIDATION
 from snug.recipes.deviations import DEVIATIONS
 
@@ -62,9 +61,3 @@ def test_a_deviation_is_trained_for_as_many_steps_as_the_recipe_that_it_changes(
     for base, others in (("snug", "snug-without-"), ("snug-paper", "snug-paper-with-")):
         of_base = {name for name in NAMES if name.startswith(others)}
         assert len(of_base) == len(DEVIATIONS) and {steps[name] for name in of_base} == {steps[base]}
-
-
-def test_deviations_are_listed(capsys):
-    assert main(["--list"]) == 0
-    said = capsys.readouterr().out
-    assert all(name in said for name in NAMES)

@@ -9,19 +9,15 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
-from benchmarks.assets.inputs import Inputs, UserGarment, read_inputs
 from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.make_plan import scenes_of_file
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.metric_task import _training_poses
 from benchmarks.tasks.task import Context, Task
 from benchmarks.training import Simulated, Training
-from snug.garments.garment import Garment
-from snug.garments.options import GarmentFile
 from snug.motion.library import make_motion
 from snug.recipes.recipe import DEFAULT, TERMS
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
@@ -87,20 +83,6 @@ def test_a_cell_that_begins_removes_nothing_that_another_task_of_its_scene_has_m
         schedule.cell(cell).clear(folder)
         schedule.metrics(cell).clear(folder)
     assert all(path.exists() for path in made)
-
-
-def test_a_file_that_a_garment_is_read_from_is_an_input(tmp_path):
-    mesh = tmp_path / "cape.obj"
-    with pytest.raises(ValueError, match=r"cape\.obj"):
-        read_inputs(garment=GarmentFile(path=mesh))
-    seen = []
-    for height in (0.0, 1.0):
-        read = Garment("cape", np.array([[0.0, 0.0, height]]), *3 * [np.zeros((1, 3), dtype=np.int64)])
-        garment = UserGarment(GarmentFile(path=mesh), read)
-        motions = dataclasses.replace(MOTIONS, worn=(scenes_of_file(garment.file),))
-        plan = dataclasses.replace(plan_of(tmp_path, motions=motions), inputs=Inputs(garment=garment))
-        seen.append(dict(Schedule(plan).data("walk", "cape", find_method("simulation")).inputs))
-    assert seen[0] != seen[1] and seen[0].keys() == seen[1].keys()
 
 
 def test_only_what_trains_depends_on_the_accelerator(tmp_path, monkeypatch):

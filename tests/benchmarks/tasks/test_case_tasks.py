@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-import signal
 import time
 
 import pytest
@@ -33,15 +31,6 @@ def hang():
     time.sleep(1000)
 
 
-def crash():
-    signal.signal(signal.SIGSEGV, signal.SIG_DFL)
-    os.kill(os.getpid(), signal.SIGSEGV)
-
-
-def killed():
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 def wrong():
     raise RuntimeError("lost")
 
@@ -63,8 +52,6 @@ def rows_of_cases(folder, *cases: Case, **changes):
     ("function", "seconds", "words"),
     [
         ("hang", 0.5, "no answer within 0.5 s"),
-        ("crash", 60.0, "ended by SIGSEGV"),
-        ("killed", 60.0, "out of memory"),
         ("wrong", 60.0, "RuntimeError: lost"),
         ("absent", 60.0, "AttributeError"),
     ],
