@@ -56,6 +56,15 @@ def context(folder, assets: Assets | None = None, **fields) -> Context:
     return Context(RunFolder(folder), assets, **fields)
 
 
+class Bar:
+    """A progress bar that counts the units of which it is told."""
+
+    total, n = 100, 0
+
+    def update(self, units=1):
+        self.n += units
+
+
 class InProcess:
     """An executor that does everything here: the seam behind which a cluster could stand."""
 

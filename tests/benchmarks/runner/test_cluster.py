@@ -32,15 +32,9 @@ from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.tasks.task import Outcome, RunStopped
 from snug.networks.tensor_file import read_tensors
 from tests.benchmarks.runner.cluster_by_hand import PATH, Cluster, cluster, finish, write
+from tests.benchmarks.runner.tasks_by_hand import Bar
 
 KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
-
-
-class Bar:
-    total, n = 100, 0
-
-    def update(self, units=1):
-        self.n += units
 
 
 @pytest.fixture(scope="module")

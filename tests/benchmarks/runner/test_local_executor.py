@@ -11,16 +11,10 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import task_process
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.tasks.task import Outcome, Task
+from tests.benchmarks.runner.tasks_by_hand import Bar
 from tests.project.own_memory import needs_proc, own_memory
 
 HELD: list[bytearray] = []  # of a process
-
-
-class Bar:
-    total, n = 100, 0
-
-    def update(self, units=1):
-        self.n += units
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

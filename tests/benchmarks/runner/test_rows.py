@@ -142,17 +142,6 @@ def test_networks_skip_scenes_without_a_body_and_solvers_skip_nothing():
         assert bool(reason) == entry.needs_body and entry.skip(dressed_scene("walk")) is None
 
 
-def test_the_closing_line_counts_the_endings_of_every_suite():
-    rows = [
-        Row("garments", "tshirt/a", "snug", 0, "energy/total", "J", 1.0),
-        Row("garments", "tshirt/b", "snug", 0, "energy/total", "J", 3.0),
-        Row("garments", "tshirt/a", "pbns", 0, "cost/frame", "ms", None, "failed", "why"),
-        Row("validation", "c", "simulation", 0, "check", "1", 0.0),
-    ]
-    text = summary(rows, [{"name": "cells", "seconds": 3.2}])
-    assert text == "garments: 2 ok, 1 failed; validation: 1 ok; time: 3 s (cells 3 s)"
-
-
 def test_the_remarks_name_repeats_that_lie_apart_and_what_is_out_of_date():
     base = Row("speed", "flag", "newton-1", 0, "cost/spread", "%", 12.0)
     late = dataclasses.replace(base, method="lbfgs-5", value=31.0, status="stalled", reason="2 of 4 frames")
@@ -175,11 +164,12 @@ def test_remarks_name_few_and_count_the_others():
     assert old == ["cell 0: kept", "cell 1: kept", "cell 2: kept", "and 2 more outdated in run.json"]
 
 
-def test_the_closing_lines_are_ten_with_an_answer():
+def test_the_closing_lines_are_ten_with_an_answer_and_the_last_counts_the_endings_of_every_suite():
     rows = [Row(suite, "c", "simulation", 0, "check", "1", 0.0) for suite in ("validation", "extremes")]
+    rows += [dataclasses.replace(rows[1], status="failed", reason="why")] * 2
     stages = [{"name": name, "seconds": 60.0 + k} for k, name in enumerate(("a", "b", "c", "d", "a"))]
     lines = summary(rows, stages, "\n".join("answer" for _ in range(8))).splitlines()
-    last = "validation: 1 ok; extremes: 1 ok; time: 310 s (a 124 s, d 63 s, c 62 s)"
+    last = "validation: 1 ok; extremes: 1 ok, 2 failed; time: 310 s (a 124 s, d 63 s, c 62 s)"
     assert len(lines) == 9 and lines[-1] == last  # the path of the report follows
 
 
