@@ -98,21 +98,6 @@ def test_a_body_of_fewer_shapes_has_zeros_for_the_rest(shapes):
     assert torch.equal(features, whole) and features.shape == (5, 151)
 
 
-def test_pivots_share_by_their_distance_and_each_is_itself_at_home():
-    pivots = np.zeros((3, 10))
-    pivots[1, 0], pivots[2, 1] = 6.0, -6.0
-    network = FrequencyMixture(15, 5, pivots=pivots)
-    share = network.weights(torch.as_tensor(pivots, dtype=torch.float32))
-    assert torch.allclose(share.sum(-1), torch.ones(3)) and torch.allclose(share, torch.eye(3), atol=1e-6)
-    middle = network.weights(torch.as_tensor(0.5 * (pivots[0] + pivots[1]), dtype=torch.float32))
-    assert middle[0] == middle[1] > 0.49
-    features = torch.randn(2, 1, 15)
-    features[..., -10:] = torch.as_tensor(pivots[2])
-    network.normalise_by(np.zeros(15), np.ones(15))
-    alone = network.high[2](features[..., :-10], None).unflatten(-1, (5, 3))
-    assert torch.allclose(network.bands(features)[1], alone, atol=1e-5)
-
-
 def test_dropout_keeps_the_mean_and_is_absent_at_run_time():
     network = FrequencyMixture(15, 5)
     masks = network.random_state(4000, 0.3, torch.Generator().manual_seed(0))

@@ -7,9 +7,8 @@ import torch
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
 from snug.networks.architectures import ARCHITECTURES, make_network
-from snug.networks.frame_layout import CompiledFrame, FramePlan
+from snug.networks.frame_layout import CompiledFrame
 from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
-from snug.networks.tailornet import FrequencyMixture
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import RECIPE_OF_KIND
 from tests.snug.training.dressing import swaying, tube_dress
@@ -50,12 +49,6 @@ def test_a_compiled_frame_is_the_modules_own(kind):
     size = np.abs(offsets).max()
     assert size > 0.03 and (offsets[:, PINS] == 0.0).all()
     assert np.abs(found - expected).max() < 3e-6 * max(size, 1.0)
-
-
-def test_several_pivots_are_refused():
-    network = FrequencyMixture(15, 5, pivots=np.zeros((2, 10)))
-    with pytest.raises(ValueError, match="2 pivots"):
-        network.lay_out(FramePlan(np.arange(5), 64))
 
 
 @pytest.mark.parametrize(("vertices", "joints"), [(1, 2), (63, 5), (64, 24), (200, 24)])
