@@ -7,6 +7,8 @@ compares every kind with its `forward`.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -123,6 +125,13 @@ class FramePlan:
         target = self._place(layer.out_features)
         self._product(ACTIVATIONS[activation], *_numbers_of(layer), x, target.start)
         return target
+
+    def add_layers(self, layers: nn.Sequential, x: slice) -> slice:
+        """Add the layers of snug.networks.garment_network.perceptron; return the place of their outputs."""
+        for layer, activation in pairwise(layers):
+            if isinstance(layer, nn.Linear):
+                x = self.add_linear(layer, x, type(activation))
+        return x
 
     def add_gru(self, gru: nn.GRU, x: slice) -> slice:
         """Add recurrent units of the numbers at x; return the place of the last layer's new state."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -27,6 +28,8 @@ class GarmentNetwork(nn.Module):
         closed_form: whether it trains by snug.kernels.gru, on a CPU; its next state then has no gradient.
         pins: vertices without offset, which the body carries; see snug.networks.architectures.make_network.
         output_scale: factor on the predicted offsets.
+        offsets: last layer of a network that has one.
+        gru: recurrent units of a network that has them; their state (layers, N, hidden) is the network's.
     """
 
     feature_set: ClassVar[str]
@@ -37,6 +40,8 @@ class GarmentNetwork(nn.Module):
     pins: tuple[int, ...] = ()
     input_mean: Tensor
     input_std: Tensor
+    offsets: nn.Linear
+    gru: nn.GRU
 
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__()
@@ -57,8 +62,15 @@ class GarmentNetwork(nn.Module):
         """Take what the garment fixes of the network, before it is trained. Nothing by default."""
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor | None:
-        """Draw the state that a training window starts from; None for a network without one."""
-        return None
+        """Draw the state that a training window starts from; None where there is none, or a `lead` gives it.
+
+        By default it is that of `gru`, from N(0, sigma); the noise keeps long roll-outs stable.
+        """
+        if not self.sequential or self.lead:
+            return None
+        shape = (self.gru.num_layers, batch, self.gru.hidden_size)
+        state = sigma * torch.randn(shape, generator=generator, device=generator.device)
+        return state.to(self.input_mean.device)
 
     def state_after(self, features: Tensor) -> Tensor:
         """Return the state after frames with features (N, T, D), for a network with `lead`."""
@@ -70,7 +82,7 @@ class GarmentNetwork(nn.Module):
 
     def last_layers(self) -> tuple[nn.Linear, ...]:
         """Return the layers whose sum the offsets are."""
-        raise NotImplementedError
+        return (self.offsets,)
 
     def offset_space(self) -> tuple[Tensor, Tensor]:
         """Return what the last layer can express: a basis (3 V, K) and a centre (3 V,) [m] of the offsets.
@@ -94,3 +106,9 @@ class GarmentNetwork(nn.Module):
         """Memory of the weights and of the input normalisation [MB]."""
         tensors = [*self.parameters(), *self.buffers()]
         return sum(t.numel() * t.element_size() for t in tensors) / 1e6
+
+
+def perceptron(*widths: int, bias: bool = True, activation: type[nn.Module] = nn.ReLU) -> nn.Sequential:
+    """Return linear layers of these widths, the first those of the inputs, each with an activation."""
+    sizes = pairwise(widths)
+    return nn.Sequential(*(layer for a, b in sizes for layer in (nn.Linear(a, b, bias=bias), activation())))

@@ -8,13 +8,12 @@ membrane strain it is what the SNUG paper calls the extended PBNS.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from torch import Tensor, nn
 
 from snug.kernels.gru import run_linear
-from snug.networks.garment_network import GarmentNetwork
+from snug.networks.garment_network import GarmentNetwork, perceptron
 
 if TYPE_CHECKING:
     from snug.networks.frame_layout import FramePlan
@@ -31,9 +30,7 @@ class PoseSpaceDeformation(GarmentNetwork):
 
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
-        sizes = pairwise((inputs, *self.widths))
-        layers = [layer for a, b in sizes for layer in (nn.Linear(a, b), self.activation())]
-        self.activations = nn.Sequential(*layers)
+        self.activations = perceptron(inputs, *self.widths, activation=self.activation)
         # The deformation matrix, (width, V, 3) flattened.
         self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=self.constant)
 
@@ -43,14 +40,7 @@ class PoseSpaceDeformation(GarmentNetwork):
         flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), None
 
-    def last_layers(self) -> tuple[nn.Linear, ...]:
-        """Return the layers whose sum the offsets are."""
-        return (self.offsets,)
-
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self)
-        for layer in self.activations:
-            if isinstance(layer, nn.Linear):
-                x = plan.add_linear(layer, x, self.activation)
+        x = plan.add_layers(self.activations, plan.add_normalised(self))
         plan.add_offsets(self, (self.offsets, x))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor, nn
 
 from snug.kernels.gru import run_gru, run_linear
@@ -47,20 +46,6 @@ class Regressor(GarmentNetwork):
         flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), state
 
-    def last_layers(self) -> tuple[nn.Linear, ...]:
-        """Return the layers whose sum the offsets are."""
-        return (self.offsets,)
-
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
         plan.add_offsets(self, (self.offsets, plan.add_gru(self.gru, plan.add_normalised(self))))
-
-    def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
-        """Draw (layers, batch, hidden) from N(0, sigma); it keeps long roll-outs stable."""
-        return random_gru_state(self.gru, batch, sigma, generator).to(self.input_mean.device)
-
-
-def random_gru_state(gru: nn.GRU, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
-    """Draw a state (layers, batch, hidden) of gated recurrent units from N(0, sigma)."""
-    shape = (gru.num_layers, batch, gru.hidden_size)
-    return sigma * torch.randn(shape, generator=generator, device=generator.device)

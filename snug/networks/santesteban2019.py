@@ -14,13 +14,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-import torch
 from torch import Tensor, nn
 
 from snug.body.parametric_body import SHAPES
 from snug.kernels.gru import run_gru, run_linear
 from snug.networks.garment_network import GarmentNetwork
-from snug.networks.regressor import random_gru_state
 
 if TYPE_CHECKING:
     from snug.networks.frame_layout import FramePlan
@@ -59,7 +57,3 @@ class FitAndWrinkles(GarmentNetwork):
         first, drape = cast(nn.Linear, self.fit[0]), cast(nn.Linear, self.fit[2])
         shape = plan.add_linear(first, slice(x.stop - SHAPES, x.stop), nn.ReLU)
         plan.add_offsets(self, (drape, shape), (self.offsets, plan.add_gru(self.gru, x)))
-
-    def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
-        """Draw (1, batch, 1500) from N(0, sigma)."""
-        return random_gru_state(self.gru, batch, sigma, generator).to(self.input_mean.device)

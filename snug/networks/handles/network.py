@@ -9,13 +9,12 @@ sees one pose and no motion.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import torch
 from torch import Tensor, nn
 
-from snug.networks.garment_network import GarmentNetwork
+from snug.networks.garment_network import GarmentNetwork, perceptron
 from snug.networks.handles.shape_functions import shape_functions, span
 
 if TYPE_CHECKING:
@@ -38,8 +37,7 @@ class HandleNetwork(GarmentNetwork):
 
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
-        sizes = pairwise((inputs, *WIDTHS))
-        self.activations = nn.Sequential(*(layer for a, b in sizes for layer in (nn.Linear(a, b), nn.SiLU())))
+        self.activations = perceptron(inputs, *WIDTHS, activation=nn.SiLU)
         self.numbers = nn.Linear(WIDTHS[-1], 12 * self.handles)
         self.functions = nn.Parameter(torch.zeros(vertices, self.handles, 4), requires_grad=False)
 
@@ -64,10 +62,7 @@ class HandleNetwork(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self)
-        for layer in self.activations:
-            if isinstance(layer, nn.Linear):
-                x = plan.add_linear(layer, x, nn.SiLU)
+        x = plan.add_layers(self.activations, plan.add_normalised(self))
         plan.add_handles(self, self.functions, plan.add_linear(self.numbers, x))
 
 

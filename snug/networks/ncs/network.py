@@ -10,14 +10,13 @@ decoder alone, and by the static energies alone.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.networks.garment_network import GarmentNetwork
+from snug.networks.garment_network import GarmentNetwork, perceptron
 from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES
 
 if TYPE_CHECKING:
@@ -40,8 +39,8 @@ class StaticBranch(GarmentNetwork):
 
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
-        self.static_encoder = _perceptron(POSE_NUMBERS, *STATIC_WIDTHS)
-        self.decoder = _perceptron(WIDTH, *[WIDTH] * DECODER_LAYERS)
+        self.static_encoder = perceptron(POSE_NUMBERS, *STATIC_WIDTHS)
+        self.decoder = perceptron(WIDTH, *[WIDTH] * DECODER_LAYERS)
         self.offsets = nn.Linear(WIDTH, 3 * vertices, bias=False)
 
     def normalise_by(self, mean: np.ndarray, std: np.ndarray) -> None:
@@ -61,19 +60,15 @@ class StaticBranch(GarmentNetwork):
         """Return offsets (N, T, V, 3) [m] and no state."""
         return self.decode(self.static_code(features)), None
 
-    def last_layers(self) -> tuple[nn.Linear, ...]:
-        """Return the layers whose sum the offsets are."""
-        return (self.offsets,)
-
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
         self._lay_out_decoder(plan, self._lay_out_static(plan, plan.add_normalised(self)))
 
     def _lay_out_static(self, plan: FramePlan, x: slice) -> slice:
-        return _lay_out(plan, self.static_encoder, slice(x.start, x.start + POSE_NUMBERS))
+        return plan.add_layers(self.static_encoder, slice(x.start, x.start + POSE_NUMBERS))
 
     def _lay_out_decoder(self, plan: FramePlan, code: slice) -> None:
-        plan.add_offsets(self, (self.offsets, _lay_out(plan, self.decoder, code)))
+        plan.add_offsets(self, (self.offsets, plan.add_layers(self.decoder, code)))
 
 
 class TwoBranches(StaticBranch):
@@ -84,9 +79,9 @@ class TwoBranches(StaticBranch):
 
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
-        self.joint_encoder = _perceptron(RATES, *JOINT_WIDTHS, bias=False)
+        self.joint_encoder = perceptron(RATES, *JOINT_WIDTHS, bias=False)
         joints = len(DESCRIBED) * JOINT_WIDTHS[-1]
-        self.dynamic_encoder = _perceptron(joints, WIDTH, WIDTH, bias=False)
+        self.dynamic_encoder = perceptron(joints, WIDTH, WIDTH, bias=False)
         self.gru = nn.GRU(WIDTH, WIDTH, bias=False, batch_first=True)
 
     def dynamic_code(self, features: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:
@@ -122,22 +117,8 @@ class TwoBranches(StaticBranch):
             if isinstance(layer, nn.Linear):
                 motion = plan.add_linear(_repeated(layer, len(DESCRIBED)), motion, nn.ReLU)
         code = self._lay_out_static(plan, x)
-        plan.add_sum(code, plan.add_gru(self.gru, _lay_out(plan, self.dynamic_encoder, motion)))
+        plan.add_sum(code, plan.add_gru(self.gru, plan.add_layers(self.dynamic_encoder, motion)))
         self._lay_out_decoder(plan, code)
-
-
-def _perceptron(*widths: int, bias: bool = True) -> nn.Sequential:
-    """Return linear layers of these widths, the first those of the inputs, each with ReLU behind it."""
-    sizes = pairwise(widths)
-    return nn.Sequential(*(layer for a, b in sizes for layer in (nn.Linear(a, b, bias=bias), nn.ReLU())))
-
-
-def _lay_out(plan: FramePlan, layers: nn.Sequential, x: slice) -> slice:
-    """Add the layers of `_perceptron` to the plan; return the place of their outputs."""
-    for layer in layers:
-        if isinstance(layer, nn.Linear):
-            x = plan.add_linear(layer, x, nn.ReLU)
-    return x
 
 
 def _repeated(layer: nn.Linear, count: int) -> nn.Linear:
