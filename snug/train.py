@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     from snug.body.smpl_files import read_body
     from snug.training.command.choices import choose_garments, choose_motions, output_files
-    from snug.training.command.train_to_file import TrainingJob
+    from snug.training.command.train_to_file import train_to_file
     from snug.training.device import find_device
     from snug.training.process_group import join_group, leave_group
     from snug.training.simulated_data import DataSet
@@ -42,9 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         body = read_body(options.body)
         outputs[0].parent.mkdir(parents=True, exist_ok=True)
-        job = TrainingJob(options, body, motions, held_out, data, str(device), group, stop)
         for template, output in zip(templates, outputs):
-            job.train(template, output)
+            train_to_file(
+                options, body, template, motions, held_out, data, output,
+                device=str(device), group=group, stop=stop,
+            )  # fmt: skip
     except Interrupted as interrupted:
         if group.writes:
             print(f"snug.train: {interrupted}; go on with --resume", file=sys.stderr)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,105 +25,94 @@ from snug.training.train_network import train_network
 from snug.training.validation import Validation
 
 
-@dataclass(frozen=True)
-class TrainingJob:
-    """All that the networks of one command share.
+def train_to_file(
+    options: argparse.Namespace,
+    body: Body,
+    template: GarmentTemplate,
+    motions: list[Motion],
+    held_out: list[Motion],
+    data: DataSet | None,
+    output: Path,
+    *,
+    device: str,
+    group: Group,
+    stop: Callable[[], bool],
+) -> None:
+    """Train the network of one garment by the checked options of the command, and write it to `output`.
 
-    Attributes:
-        options: of the command line, checked.
-        body: wears the garments.
+    Args:
+        options: of the command line.
+        body: wears the garment.
+        template: of the garment.
         motions: to train on.
         held_out: to validate with.
         data: simulated motions, or None.
+        output: the model file.
         device: `cpu` or `cuda`.
         group: processes that share the training.
         stop: whether the process was asked to end.
+
+    Raises:
+        ValueError: for unfit data, or an existing model of another command that was to be resumed.
+        Interrupted: when asked to stop.
     """
-
-    options: argparse.Namespace
-    body: Body
-    motions: list[Motion]
-    held_out: list[Motion]
-    data: DataSet | None
-    device: str
-    group: Group
-    stop: Callable[[], bool]
-
-    @property
-    def recipe(self) -> Recipe:
-        """The recipe named in the command, or that of the model's kind."""
-        name = self.options.recipe
-        return find_recipe(name) if name else RECIPE_OF_KIND[self.options.model]
-
-    def train(self, template: GarmentTemplate, output: Path) -> None:
-        """Train the network of one garment and write it. Raises ValueError, Interrupted."""
-        options, say = self.options, print if self.group.writes else lambda *_: None
-        checkpoint = Checkpoint(
-            path=output.with_name(f"{output.stem}.checkpoint.safetensors"), steps=options.checkpoint_steps,
-            minutes=options.checkpoint_minutes, resume=options.resume,
+    say = print if group.writes else lambda *_: None
+    recipe = find_recipe(options.recipe) if options.recipe else RECIPE_OF_KIND[options.model]
+    checkpoint = Checkpoint(
+        path=output.with_name(f"{output.stem}.checkpoint.safetensors"), steps=options.checkpoint_steps,
+        minutes=options.checkpoint_minutes, resume=options.resume,
+    )  # fmt: skip
+    if checkpoint.path.is_file() and not options.resume:
+        say(f"note: {checkpoint.path} of a stopped run will be replaced; --resume would go on with it")
+    dressed = DressedBody(body, template.tailor(body, vertices=options.vertices))
+    trajectories = None
+    if data is not None:
+        data.check(settings_of(body, dressed.garment))
+        trajectories = None if find_kind(options.model).physics else data.targets()
+    learned_from = digest_inputs(dressed, motions, held_out, trajectories or {})
+    if options.resume and output.is_file() and not checkpoint.path.is_file():
+        _check_finished(output, options, recipe, dressed.vertices, learned_from)
+        say(f"{output}: is there, and no checkpoint beside it; nothing to resume")
+        return
+    if output.is_file():
+        say(f"note: {output} will be replaced when this training has ended")
+    frames = sum(motion.frames for motion in motions)
+    say(f"{template.description}: {dressed.vertices} vertices, {len(motions)} motions, "
+        f"{frames} frames, recipe {recipe.name}")  # fmt: skip
+    validation = None
+    if held_out:
+        validation = Validation(
+            motions=held_out, every=options.validate_every, patience=options.patience,
+            trajectories=trajectories,
         )  # fmt: skip
-        if checkpoint.path.is_file() and not options.resume:
-            say(f"note: {checkpoint.path} of a stopped run will be replaced; --resume would go on with it")
-        dressed = DressedBody(self.body, template.tailor(self.body, vertices=options.vertices))
-        trajectories = self._trajectories(dressed)
-        learned_from = digest_inputs(dressed, self.motions, self.held_out, trajectories or {})
-        if options.resume and output.is_file() and not checkpoint.path.is_file():
-            self._check_finished(output, dressed.vertices, learned_from)
-            say(f"{output}: is there, and no checkpoint beside it; nothing to resume")
-            return
-        if output.is_file():
-            say(f"note: {output} will be replaced when this training has ended")
-        frames = sum(motion.frames for motion in self.motions)
-        say(f"{template.description}: {dressed.vertices} vertices, {len(self.motions)} motions, "
-            f"{frames} frames, recipe {self.recipe.name}")  # fmt: skip
-        model = self._run(dressed, checkpoint, trajectories)
-        if self.group.writes:
-            model.summary["learned_from"] = learned_from
-            print_summary(model)
-            print(model.save(output))
-            checkpoint.delete()
+    model = train_network(
+        options.model, dressed, motions, steps=options.steps, seed=options.seed, recipe=recipe,
+        trajectories=trajectories, device=device, checkpoint=checkpoint, validation=validation,
+        group=group, stop=stop,
+    )  # fmt: skip
+    if group.writes:
+        model.summary["learned_from"] = learned_from
+        print_summary(model)
+        print(model.save(output))
+        checkpoint.delete()
 
-    def _trajectories(self, dressed: DressedBody) -> dict[str, StoredVertices] | None:
-        """Return the simulated vertices, if the model learns from them. Raises ValueError for unfit data."""
-        if self.data is None:
-            return None
-        self.data.check(settings_of(self.body, dressed.garment))
-        return None if find_kind(self.options.model).physics else self.data.targets()
 
-    def _run(
-        self,
-        dressed: DressedBody,
-        checkpoint: Checkpoint,
-        trajectories: Mapping[str, StoredVertices] | None,
-    ) -> TrainedModel:
-        options, validation = self.options, None
-        if self.held_out:
-            validation = Validation(
-                motions=self.held_out, every=options.validate_every, patience=options.patience,
-                trajectories=trajectories,
-            )  # fmt: skip
-        return train_network(
-            options.model, dressed, self.motions, steps=options.steps, seed=options.seed,
-            recipe=self.recipe, trajectories=trajectories, device=self.device, checkpoint=checkpoint,
-            validation=validation, group=self.group, stop=self.stop,
-        )  # fmt: skip
-
-    def _check_finished(self, output: Path, vertices: int, learned_from: str) -> None:
-        """Raise ValueError unless the existing model is the one that this command trains."""
-        model, options = TrainedModel.load(output), self.options
-        facts = {
-            "model": (model.kind, options.model),
-            "recipe": (model.recipe, self.recipe),
-            "seed": (model.seed, options.seed),
-            "vertices": (model.vertices, vertices),
-            "number of steps": (model.steps, model.steps if options.patience else options.steps),
-            "body, garment or motions": (model.summary.get("learned_from"), learned_from),
-        }
-        differing = [name for name, (stored, wanted) in facts.items() if stored != wanted]
-        if differing:
-            raise ValueError(
-                f"{output}: of another {differing[0]}; name another --out, or leave out --resume"
-            )
+def _check_finished(
+    output: Path, options: argparse.Namespace, recipe: Recipe, vertices: int, learned_from: str
+) -> None:
+    """Raise ValueError unless the existing model is the one that the command trains."""
+    model = TrainedModel.load(output)
+    facts = {
+        "model": (model.kind, options.model),
+        "recipe": (model.recipe, recipe),
+        "seed": (model.seed, options.seed),
+        "vertices": (model.vertices, vertices),
+        "number of steps": (model.steps, model.steps if options.patience else options.steps),
+        "body, garment or motions": (model.summary.get("learned_from"), learned_from),
+    }
+    differing = [name for name, (stored, wanted) in facts.items() if stored != wanted]
+    if differing:
+        raise ValueError(f"{output}: of another {differing[0]}; name another --out, or leave out --resume")
 
 
 def digest_inputs(
