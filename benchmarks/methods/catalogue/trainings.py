@@ -8,35 +8,19 @@ from __future__ import annotations
 
 from benchmarks.training import Simulated, Training
 from snug.recipes.deviations import exchange_deviations
-from snug.recipes.named import (
-    ABLATIONS,
-    DYNAMIC,
-    HANDLES,
-    NCS,
-    NEAREST_POSES,
-    PAPER,
-    PBNS,
-    PBNS_SPRINGS,
-    POSE_REGRESSION,
-    SANTESTEBAN2019,
-    SUPERVISED,
-    TAILORNET,
-)
+from snug.recipes.named import ABLATIONS, DYNAMIC, PAPER, PBNS_SPRINGS, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
 
+LEARN_FROM_SIMULATIONS = ("supervised", "santesteban2019", "tailornet", "nearest-poses", "pose-regression")
 TRAININGS = {
-    "snug": Training("snug", DEFAULT),
-    "pbns": Training("pbns", PBNS),
+    # Each kind by its own recipe; `dynamic` learns from other simulations, as `snug-dynamic`.
+    **{
+        kind: Training(kind, recipe, Simulated() if kind in LEARN_FROM_SIMULATIONS else None)
+        for kind, recipe in RECIPE_OF_KIND.items()
+        if kind != "dynamic"
+    },
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    "supervised": Training("supervised", SUPERVISED, Simulated()),
-    "santesteban2019": Training("santesteban2019", SANTESTEBAN2019, Simulated()),
-    "tailornet": Training("tailornet", TAILORNET, Simulated()),
-    "nearest-poses": Training("nearest-poses", NEAREST_POSES, Simulated()),
-    "pose-regression": Training("pose-regression", POSE_REGRESSION, Simulated()),
-    **{f"handles-{count}": Training(f"handles-{count}", HANDLES) for count in (20, 40, 80)},
-    "ncs": Training("ncs", NCS),
-    "ncs-static": Training("ncs-static", NCS),
     "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
     # Each deviation has as many steps as the recipe that it changes.
