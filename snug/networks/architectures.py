@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from snug.networks.fitted import NearestPoses, PoseRegression
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.handles.network import Handles20, Handles40, Handles80
-from snug.networks.initialisation import initialise, zero
+from snug.networks.initialisation import initialise
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.ncs.network import StaticBranch, TwoBranches
 from snug.networks.pbns import PoseSpaceDeformation
@@ -76,7 +76,9 @@ def make_network(
         network = architecture(inputs, vertices, output_scale=recipe.output_scale)
         initialise(network, recipe.initialisation)
     if recipe.zero_last_layer:
-        zero(*network.last_layers())
+        for layer in network.last_layers():  # training then starts at the skinned garment
+            for parameter in layer.parameters():
+                nn.init.zeros_(parameter)
     network.pins = tuple(pins)
     if network.pins:
         free = torch.ones(vertices, 1)

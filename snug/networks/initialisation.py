@@ -11,8 +11,6 @@ import math
 
 from torch import nn
 
-from snug.recipes.recipe import INITIALISATIONS
-
 
 def initialise(network: nn.Module, rules: str) -> None:
     """Give a network's linear layers and gated recurrent units the weights that they start from.
@@ -25,13 +23,8 @@ def initialise(network: nn.Module, rules: str) -> None:
 
     Args:
         network: newly made; changed in place by Keras' rules.
-        rules: one of INITIALISATIONS.
-
-    Raises:
-        ValueError: for other rules.
+        rules: one of snug.recipes.recipe.INITIALISATIONS.
     """
-    if rules not in INITIALISATIONS:
-        raise ValueError(f"unknown rules of initialisation {rules!r}: use one of {INITIALISATIONS}")
     if rules == "torch":
         return
     for layer in network.modules():
@@ -44,10 +37,3 @@ def initialise(network: nn.Module, rules: str) -> None:
             else:
                 limit = math.sqrt(6 / sum(parameter.shape))
                 nn.init.uniform_(parameter, -limit, limit)
-
-
-def zero(*layers: nn.Linear) -> None:
-    """Set weights and biases of the layers to zero, so that training starts at the skinned garment."""
-    for layer in layers:
-        for parameter in layer.parameters():
-            nn.init.zeros_(parameter)

@@ -5,6 +5,7 @@ snug.training.training_loop repeats it.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
@@ -27,7 +28,6 @@ from snug.training.device import CPU
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.hidden_state_cache import HiddenStateCache
 from snug.training.kinds import find_kind
-from snug.training.learning_rate import rate_factor
 from snug.training.losses.physics_loss import PhysicsLoss
 from snug.training.losses.simulated_past import SimulatedPast
 from snug.training.losses.vertex_targets import Targets, VertexTargets
@@ -35,6 +35,7 @@ from snug.training.process_group import ALONE, Group, GroupError
 from snug.training.stopwatch import Stopwatch
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 
+DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -264,7 +265,12 @@ class Trainer:
             return self.posed_by(offsets + batch.rest, self.weights, batch.transforms), after
 
     def _set_rate(self, number: int) -> None:
-        factor = rate_factor(self.recipe, step=number, steps=self.steps, epoch=self.epoch)
+        """Set the learning rate of step `number`, see Recipe.schedule."""
+        factor = 1.0
+        if self.recipe.schedule == "epochs" and self.epoch > self.recipe.drop_after_epochs:
+            factor = DROP
+        if self.recipe.schedule == "cosine":
+            factor = COSINE_END + (1 - COSINE_END) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
         for group in self.optimiser.param_groups:
             group["lr"] = self.guard.rate * self.recipe.learning_rate * factor
 

@@ -103,11 +103,6 @@ def test_the_floor_of_a_network_lies_in_the_span_of_its_last_layer(scene, tmp_pa
     assert left_over(columns.double().numpy(), unposed(scene, floor.positions)) < 1e-6
 
 
-def test_networks_without_a_last_layer_have_no_floor():
-    with pytest.raises(ValueError, match="NearestPoses has no last layer"):
-        make_network("nearest-poses", 141, 5, DEFAULT, seed=0).offset_space()
-
-
 def test_floors_run_when_named_and_are_not_timed():
     floors = [entry for entry in FURTHER_METHODS if entry.name.endswith("-floor")]
     assert len(floors) == 6 and not any(entry.timed or entry.static_known for entry in floors)

@@ -11,9 +11,7 @@ import torch
 from snug.garments import tailor_tshirt
 from snug.networks.architectures import ARCHITECTURES, make_network
 from snug.networks.dressed_body import DressedBody
-from snug.networks.initialisation import initialise
 from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES
-from snug.networks.regressor import Regressor
 from snug.recipes.named import PAPER, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
@@ -63,11 +61,6 @@ def test_a_last_layer_of_zero_starts_at_the_template(kind):
     offsets, _ = network(torch.randn(3, 4, inputs))
     assert offsets.shape == (3, 4, 5, 3) and not offsets.any()
     assert all(not p.any() for layer in network.last_layers() for p in layer.parameters())
-
-
-def test_unknown_rules_are_refused():
-    with pytest.raises(ValueError, match="'jax'"):
-        initialise(Regressor(4, 5), "jax")
 
 
 def test_initial_strain_at_the_papers_size_is_of_the_authors_order(body):

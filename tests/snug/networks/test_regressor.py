@@ -157,6 +157,7 @@ def test_recipes_survive_a_file(recipe):
     [
         ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
         ({"terms": ("strain", "wind")}, "'wind'"),
+        ({"initialisation": "jax"}, "initialisation='jax'"),
         ({"window": 2}, "window"),
         ({"learning_rate": 0.0}, "learning_rate"),
         ({"even": 0}, "even"),
