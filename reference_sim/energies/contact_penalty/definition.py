@@ -131,7 +131,7 @@ class ContactPenalty(Energy):
         n = torch.as_tensor(self.normals).to(u) if normals is None else normals
         sample = (torch.as_tensor(self.weights).to(u)[:, :, None] * u).sum(-2)
         depth = torch.clamp(self.margin - (n * (sample - c)).sum(-1), min=0.0)
-        return torch.as_tensor(self.stiffness).to(u) * depth**3
+        return torch.as_tensor(self.stiffness).to(u) * depth**self.power
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""

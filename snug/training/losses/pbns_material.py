@@ -12,17 +12,12 @@ method, on the mean body.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchSpring
 from reference_sim.energies.energy import Energy
 from reference_sim.material import GRAVITY, Material
-
-if TYPE_CHECKING:
-    from torch import Tensor
 
 BENDING = 5e-5  # [J]
 AREAL_DENSITY = 0.3  # [kg/m^2]
@@ -54,14 +49,3 @@ class SquaredContact(ContactPenalty):
 
     def __init__(self, cloth: Cloth) -> None:
         super().__init__(cloth, samples="vertices", margin=MARGIN, per_sample_stiffness=CONTACT_STIFFNESS)
-
-    def element_energy(
-        self, u: Tensor, points: Tensor | None = None, normals: Tensor | None = None
-    ) -> Tensor:
-        """Return the energy of each sample [J] from its vertex u (..., 1, 3) and its plane."""
-        import torch  # a simulation with this material runs without
-
-        c = torch.as_tensor(self.points).to(u) if points is None else points
-        n = torch.as_tensor(self.normals).to(u) if normals is None else normals
-        depth = torch.clamp(self.margin - (n * (u[..., 0, :] - c)).sum(-1), min=0.0)
-        return torch.as_tensor(self.stiffness).to(u) * depth**2
