@@ -280,12 +280,25 @@ def arm_clearance(motion: Motion) -> np.ndarray:
 
     Small when the arm lies on the torso.
     """
+    return _limb_angles(motion, ("shoulder", "elbow"), ("spine3", "spine1"))
+
+
+def lap_clearance(motion: Motion) -> np.ndarray:
+    """Return the angles (T, 2) [rad] between the left and right thigh and the upward spine.
+
+    Small when the thigh lies on the belly.
+    """
+    return _limb_angles(motion, ("hip", "knee"), ("spine1", "spine3"))
+
+
+def _limb_angles(motion: Motion, limb: tuple[str, str], trunk: tuple[str, str]) -> np.ndarray:
+    """Return the angles (T, 2) [rad] between left and right limb and the trunk, each from joint to joint."""
     joints = joint_positions(motion.poses, motion.translations)
-    down = joints[:, JOINT["spine1"]] - joints[:, JOINT["spine3"]]
+    along = joints[:, JOINT[trunk[1]]] - joints[:, JOINT[trunk[0]]]
     angles = []
     for side in ("left", "right"):
-        arm = joints[:, JOINT[f"{side}_elbow"]] - joints[:, JOINT[f"{side}_shoulder"]]
-        cosine = (arm * down).sum(-1) / np.linalg.norm(arm, axis=-1) / np.linalg.norm(down, axis=-1)
+        bone = joints[:, JOINT[f"{side}_{limb[1]}"]] - joints[:, JOINT[f"{side}_{limb[0]}"]]
+        cosine = (bone * along).sum(-1) / np.linalg.norm(bone, axis=-1) / np.linalg.norm(along, axis=-1)
         angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
     return np.stack(angles, axis=1)
 

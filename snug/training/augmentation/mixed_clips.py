@@ -18,8 +18,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from snug.body.skeleton import JOINT, axis_angles, joint_positions, rotation_matrices
-from snug.motion.motion import Motion, arm_clearance, mirror_motion
+from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.motion.motion import Motion, arm_clearance, lap_clearance, mirror_motion
 from snug.recipes.recipe import DEFAULT, Recipe
 from snug.training.augmentation.swinging_clips import make_swinging_motion
 
@@ -169,23 +169,6 @@ def hang_arms(motion: Motion, nearest: np.ndarray) -> Motion:
             rotation_matrices(angle * FRONT) @ rotation_matrices(poses[:, shoulder])
         )
     return replace(motion, poses=poses)
-
-
-def lap_clearance(motion: Motion) -> np.ndarray:
-    """Return the angle between each thigh and the upward spine, (T, 2) [rad], left and right.
-
-    It is small when the thigh lies on the belly.
-    """
-    joints = joint_positions(motion.poses, motion.translations)
-    up = joints[:, JOINT["spine3"]] - joints[:, JOINT["spine1"]]
-    thighs = [
-        joints[:, JOINT[f"{side}_knee"]] - joints[:, JOINT[f"{side}_hip"]] for side in ("left", "right")
-    ]
-    cosines = [
-        (thigh * up).sum(-1) / np.linalg.norm(thigh, axis=-1) / np.linalg.norm(up, axis=-1)
-        for thigh in thighs
-    ]
-    return np.arccos(np.clip(np.stack(cosines, axis=1), -1.0, 1.0))
 
 
 def open_hips(motion: Motion) -> Motion:
