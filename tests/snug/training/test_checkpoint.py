@@ -12,7 +12,6 @@ import pytest
 import torch
 
 from reference_sim import Material
-from reference_sim.files import atomic_files as whole_file
 from snug.networks import tensor_file
 from snug.networks.dressed_body import DressedBody
 from snug.networks.tensor_file import TensorFileError, read_tensors
@@ -141,23 +140,6 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path):
         runs.append(read_tensors(checkpoint.path)[0])
     assert runs[0].keys() == runs[1].keys()
     assert all(torch.equal(runs[0][name], runs[1][name]) for name in runs[0])
-
-
-def test_a_kill_while_writing_leaves_the_older_checkpoint(tmp_path, monkeypatch):
-    path = tmp_path / "run.safetensors"
-    with pytest.raises(Interrupted):
-        short(checkpoint=Checkpoint(path=path), stop=asked_after(6))
-    before = path.read_bytes()
-
-    def killed(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(whole_file.os, "replace", killed)
-    with pytest.raises(KeyboardInterrupt):
-        short(checkpoint=Checkpoint(path=path, resume=True, steps=2))
-    assert path.read_bytes() == before
-    monkeypatch.undo()
-    same_model(short(), short(checkpoint=Checkpoint(path=path, resume=True)))
 
 
 def test_files_are_the_users_own(tmp_path):
