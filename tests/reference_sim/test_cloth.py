@@ -162,7 +162,3 @@ def test_the_message_counts_the_faces_of_the_edge_it_names():
 def test_slivers_are_kept_down_to_a_million_to_one():
     thin = moved(3, (1, -1e-6, 0))
     assert Cloth(thin, KITE_FACES).areas[1] == pytest.approx(1e-6, rel=1e-9)
-
-
-def test_a_mesh_error_is_a_value_error():
-    assert issubclass(MeshError, ValueError)

@@ -6,7 +6,6 @@ The suite `validation` holds the steps to their exact discrete answers: fall, mo
 from __future__ import annotations
 
 import re
-import shutil
 import time
 
 import h5py
@@ -117,28 +116,6 @@ def test_two_runs_give_the_same_bits_also_with_the_same_terms():
     runs = [simulate(cloth, energies, obstacle=table, velocity=pushed, frames=8) for _ in range(2)]
     assert runs[0].frame_fields["energy/friction"][-1] > 0
     assert (runs[0].positions == runs[1].positions).all()
-
-
-def test_the_file_grows_frame_by_frame_and_is_readable_at_any_time(tmp_path):
-    cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    path = tmp_path / "run.vtkhdf"
-
-    def spy(frame: int) -> np.ndarray:
-        """Called before each frame: what a reader would find at that time."""
-        shutil.copy(path, tmp_path / f"at{frame}")
-        return SHEET[[0, 6]]
-
-    result = simulate(cloth, terms_of(cloth), frames=5, pin_positions=spy, path=path)
-    for frame in range(1, 5):
-        loaded = Trajectory.load(tmp_path / f"at{frame}")
-        assert loaded.frames == frame and loaded.status == "unfinished"
-        assert (loaded.positions == result.positions[:frame]).all()
-    whole = Trajectory.load(path)
-    assert whole.status == "converged" and whole.reason == result.reason
-    assert (whole.positions == result.positions).all()
-    assert whole.provenance["terms"] == result.provenance["terms"]
-    for name, values in result.frame_fields.items():
-        np.testing.assert_array_equal(whole.frame_fields[name], values)
 
 
 # Failures

@@ -92,15 +92,22 @@ def test_distances_are_those_of_libigl(name, kind):
     assert_closest(tree_of(positions, faces), positions, samples(positions, faces).astype(kind))
 
 
-def one_by_one(
-    positions: np.ndarray, faces: np.ndarray, points: np.ndarray, allowed: np.ndarray | None = None
-) -> np.ndarray:
-    """Return the closest face (S,) among `allowed` (S, F), or among all; at a tie the lowest index."""
-    corners = positions[np.sort(faces, axis=1)]
-    squared = np.array([[closest_on_triangle(corners, f, *p)[2] for f in range(len(faces))] for p in points])
-    if allowed is not None:
-        squared[~allowed & allowed.any(axis=1, keepdims=True)] = np.inf
-    return squared.argmin(axis=1)
+@njit(cache=False, error_model="numpy")
+def one_by_one(corners, points, centroids, home, region):
+    """Closest face (S,) and its distance squared, by every face in the region; by all if none is in it.
+
+    At a tie it is the lowest index.
+    """
+    faces, distances = np.full(len(points), -1), np.full(len(points), np.inf)
+    for s in range(len(points)):
+        for reach in (region, np.inf):
+            for f in range(len(corners) if faces[s] < 0 else 0):
+                offset = centroids[f] - home[s]
+                if offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2 <= reach**2:
+                    squared = closest_on_triangle(corners, f, points[s, 0], points[s, 1], points[s, 2])[2]
+                    if squared < distances[s]:
+                        faces[s], distances[s] = f, squared
+    return faces, distances
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -108,7 +115,8 @@ def test_of_faces_equally_near_the_lowest_answers(name):
     positions, faces = mesh(name)
     points = samples(positions, faces)[::5]
     points = np.concatenate([points, positions[:50], np.round(4 * points) / 4])
-    expected = one_by_one(positions, faces, points)
+    corners = positions[np.sort(faces, axis=1)]
+    expected, _ = one_by_one(corners, points, corners.mean(axis=1), points, np.inf)
     assert (tree_of(positions, faces).nearest(points).faces == expected).all()
 
 
@@ -167,10 +175,9 @@ def test_only_faces_near_the_place_at_rest_are_met(name, region):
     moved = positions[generator.permutation(len(positions))]  # nothing is where it was at rest
     tree.refit(moved)
     points, home = generator.normal(size=(2, 60, 3))
-    offset = centroids[None] - home[:, None]
-    allowed = np.einsum("sfi,sfi->sf", offset, offset) <= region**2
+    expected, _ = one_by_one(moved[np.sort(faces, axis=1)], points, centroids, home, region)
     closest = tree.nearest(points, samples=tree.listed(home, region)).faces
-    assert (closest == one_by_one(moved, faces, points, allowed)).all()
+    assert (closest == expected).all()
     assert name == "soup 7" or (closest != tree.nearest(points).faces).any()
 
 
@@ -215,19 +222,6 @@ def test_no_points_have_no_closest():
     assert closest.faces.shape == (0,) and closest.points.shape == (0, 3)
 
 
-@njit(cache=False, error_model="numpy")
-def plain(corners, centroids, points, home, region, faces, distances):
-    """Try every face whose rest centroid is within the region of each sample."""
-    for s in range(len(points)):
-        faces[s], distances[s] = -1, np.inf
-        for f in range(len(corners)):
-            offset = centroids[f] - home[s]
-            if offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2 <= region**2:
-                squared = closest_on_triangle(corners, f, points[s, 0], points[s, 1], points[s, 2])[2]
-                if squared < distances[s]:
-                    faces[s], distances[s] = f, squared
-
-
 @pytest.mark.parametrize(
     ("frames", "every"), [(3, 20), pytest.param(180, 1, marks=pytest.mark.slow)]
 )  # a million answers in the slow one
@@ -242,7 +236,6 @@ def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search(frames, ever
     home, x = contact.rest_samples, scene.settle()
     search, hints, count = FaceSearch(obstacle.faces, obstacle.rest_centroids), None, 0
     samples, chosen = search.listed(home, obstacle.region), np.arange(0, len(home), every)
-    faces, distances = np.empty(len(chosen), np.int64), np.empty(len(chosen))
     for frame in range(1, frames + 1):
         x = obstacle.transported(x, frame, scene.cloth.rest_positions)
         x += generator.normal(0, 0.01, (1, 3)) + generator.normal(0, 0.001, x.shape)
@@ -251,8 +244,8 @@ def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search(frames, ever
         found = search.nearest(points, hints=hints, samples=samples)
         hints = found.faces
         corners = body[np.sort(obstacle.faces, axis=1)]
-        plain(
-            corners, obstacle.rest_centroids, points[chosen], home[chosen], obstacle.region, faces, distances
+        faces, distances = one_by_one(
+            corners, points[chosen], obstacle.rest_centroids, home[chosen], obstacle.region
         )
         assert (found.faces[chosen] == faces).all()
         distance = np.linalg.norm(points - found.points, axis=1)[chosen]

@@ -1,4 +1,4 @@
-"""Hinges folded by hand, through half a turn and flat on themselves, and their scaling."""
+"""Hinges folded by hand, through half a turn and flat on themselves."""
 
 from __future__ import annotations
 
@@ -72,18 +72,6 @@ def test_a_hinge_folded_flat_is_finite_and_the_same_in_both_forms():
     expected_value, expected = Energy.value_and_gradient(energy, x)
     assert value == pytest.approx(np.pi**2, rel=1e-14) and value == pytest.approx(expected_value, rel=1e-14)
     assert np.abs(expected).max() > 1.0 and close(gradient, expected, 1e-12)
-
-
-def test_the_default_is_scaled_by_the_rest_shape_of_the_hinge_and_the_printed_form_by_nothing():
-    cloth = curved_cloth()
-    plain, scaled = BendHinge(cloth, scaling="none"), BendHinge(cloth)
-    assert plain.stiffness == pytest.approx(cloth.material.bending_stiffness, rel=1e-15)
-    assert (plain.parameters()["scaling"], scaled.parameters()["scaling"]) == ("none", "length_area")
-    x = cloth.rest_positions
-    for h, (a, b, first, second) in enumerate(cloth.hinges):
-        area = [np.linalg.norm(np.cross(x[b] - x[a], x[tip] - x[a])) / 2 for tip in (first, second)]
-        factor = np.sum((x[b] - x[a]) ** 2) / (4 * sum(area))
-        assert scaled.stiffness[h] == pytest.approx(plain.stiffness[h] * factor, rel=1e-13)
 
 
 @pytest.mark.parametrize(

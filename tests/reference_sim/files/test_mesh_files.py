@@ -106,8 +106,6 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, su
         ("a.ply", PLY.format(10**12, 1), "shorter than .element vertex 1000000000000. says"),
         ("a.ply", PLY.format(3, 10**30), "shorter than .element face 1000"),
         ("a.vtk", "rubbish\n", "cannot be read"),
-        ("a.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n", "its header does not end"),
-        ("a.ply", "ply\nelement vertex 9999999\nend_header\n", "shorter than 'element vertex 9999999' says"),
         ("a.off", "OFF\n", "its header does not end"),
         ("a.vtk", "DATASET POLYDATA\nPOLYGONS 5 1000000000\n", "shorter than 'POLYGONS 5 1000000000' says"),
         ("a.vtp", '<Piece NumberOfPoints="99999999"/>', "shorter than 'NumberOfPoints=.99999999' says"),
@@ -122,7 +120,6 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, su
         ("a.obj", SEAM + "f 1/1 2/2 3/7\n", "triangle 0 names a texture coordinate beyond the 6"),
         ("a.obj", SEAM + "vt\nf 1 2 3\n", "line 11 is not understood: 'vt'"),
         ("a.off", "OFF\n3 1 0\n0 0\n1 0\n0 1\n3 0 1 2\n", "cannot be read"),
-        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 nan\nf 1 2 3\n", "vertex 2 is not finite"),
         (
             "a.obj",
             "".join(f"v {k} {k * k} 0\n" for k in range(5)) + "f 1 2 3 4 5\n",

@@ -98,16 +98,6 @@ def test_an_unfinished_file_gives_its_whole_frames(tmp_path):
     assert Trajectory.load(tmp_path / "live").status == "converged"
 
 
-def test_a_half_written_frame_does_not_count(tmp_path):
-    wave(4).save(tmp_path / "cut")
-    with h5py.File(tmp_path / "cut", "r+") as file:
-        # The count is written last: as if the run had died while frame 3 was being appended.
-        file["benchmark"].attrs["frames"] = 3
-    loaded = Trajectory.load(tmp_path / "cut")
-    assert loaded.frames == len(loaded.times) == len(loaded.frame_seconds) == 3
-    assert loaded.frame_fields["iterations"].tolist() == [0, 1, 2]
-
-
 def test_a_field_that_begins_late_is_nan_before(tmp_path):
     with TrajectoryWriter(tmp_path / "late", FACES, {}, vertex_count=len(REST)) as writer:
         writer.append(REST, 0.0)
@@ -176,17 +166,6 @@ def test_vtk_reads_a_file_that_is_still_being_written(tmp_path):
     _, points, _ = vtk_frames(tmp_path / "copy.vtkhdf")
     assert len(points) == 3
     np.testing.assert_array_equal(points[2], whole.positions[2])
-
-
-def test_pyvista_reads_it(tmp_path):
-    import pyvista
-
-    wave(3).save(tmp_path / "wave.vtkhdf")
-    reader = pyvista.get_reader(tmp_path / "wave.vtkhdf")
-    reader.reader.SetStep(2)
-    mesh = reader.read()
-    assert mesh.n_points == len(REST) and mesh.n_cells == len(FACES)
-    np.testing.assert_array_equal(mesh.points, wave(3).positions[2])
 
 
 def test_a_tree_that_comes_back_to_itself_crashes_no_reader(tmp_path):
