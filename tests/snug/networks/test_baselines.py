@@ -13,7 +13,6 @@ from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.tailornet import DROPOUT, FrequencyMixture
-from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import ABLATIONS, RECIPE_OF_KIND
 from snug.recipes.recipe import DEFAULT
 from snug.training.losses.pbns_material import SquaredContact, spring_terms
@@ -21,8 +20,6 @@ from snug.training.losses.physics_loss import PhysicsLoss
 from snug.training.losses.vertex_targets import smooth_offsets
 from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
-
-TAUGHT = ("supervised", "santesteban2019", "tailornet")
 
 
 def puffed(motion):
@@ -44,24 +41,13 @@ def taught(kind, steps, **changes):
 
 
 @pytest.mark.parametrize("kind", ["santesteban2019", "tailornet"])
-def test_a_taught_baseline_learns_its_targets_and_survives_its_file(kind, tmp_path):
+def test_a_taught_baseline_learns_its_targets(kind):
     model, motion = taught(kind, 30, learning_rate=2e-3, window=4 if kind != "tailornet" else 1)
     assert model.history[-1]["loss"] < 0.5 * model.history[0]["loss"]
-    loaded = TrainedModel.load(model.save(tmp_path / "model.safetensors"))
-    target = puffed(motion)
-    run = roll_out(loaded, tube_dress(), motion)
-    assert np.array_equal(run.positions, roll_out(model, tube_dress(), motion).positions)
+    target, found = puffed(motion), roll_out(model, tube_dress(), motion).positions
     skinned = tube_dress().skinned(motion, smoothing=20)
-    error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (run.positions, skinned))
+    error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (found, skinned))
     assert error < 0.5 * start
-
-
-@pytest.mark.parametrize("kind", TAUGHT)
-def test_same_seed_same_taught_weights_whatever_was_drawn_before(kind):
-    first = taught(kind, 3)[0]
-    torch.rand(7)
-    again = taught(kind, 3)[0]
-    assert all(torch.equal(a, b) for a, b in zip(first.network.parameters(), again.network.parameters()))
 
 
 def test_sizes_are_those_of_the_papers():

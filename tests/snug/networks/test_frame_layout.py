@@ -42,10 +42,13 @@ def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("kind", ARCHITECTURES)
-def test_a_compiled_frame_is_the_modules_own(kind):
+def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path):
     model, motion = random_model(kind), swaying(8)
     expected, offsets = by_torch(model, motion)
     found = roll_out(model, tube_dress(), motion).positions
+    loaded = TrainedModel.load(model.save(tmp_path / "model.safetensors"))
+    assert np.array_equal(roll_out(loaded, tube_dress(), motion).positions, found)
+    assert loaded.megabytes == model.megabytes
     size = np.abs(offsets).max()
     assert size > 0.03 and (offsets[:, PINS] == 0.0).all()
     assert np.abs(found - expected).max() < 3e-6 * max(size, 1.0)
@@ -82,4 +85,5 @@ def test_gates_are_torchs_gates_and_not_a_number_stays_so():
     model = random_model("snug")
     with torch.no_grad():
         model.network.gru.bias_hh_l1[5] = float("nan")
-    assert roll_out(model, tube_dress(), swaying(2)).status == "diverged"
+    run = roll_out(model, tube_dress(), swaying(2))
+    assert run.status == "diverged" and "not finite" in run.reason

@@ -1,4 +1,4 @@
-"""Handles: their shape functions, what they express, and a network of them through training and file."""
+"""Handles: their shape functions, what they express, and a network of them in training."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import torch
 from snug.body.skeleton import rotation_matrices
 from snug.networks.handles.shape_functions import HandleError, farthest_points, shape_functions, span
 from snug.networks.roll_out import roll_out
-from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import HANDLES
 from snug.training.train_network import train_network, untrained_model
 from tests.snug.training.dressing import swaying, tube_dress
@@ -99,10 +98,3 @@ def test_offsets_lie_in_the_space_that_the_network_names(trained):
     network = trained.network
     numbers = network.output_scale * network.numbers(network.activations(network.normalise(features)))[0]
     assert torch.allclose(offsets, numbers @ columns.T + centre, atol=1e-6) and offsets.abs().max() > 1e-5
-
-
-def test_a_file_gives_the_same_network(trained, tmp_path):
-    loaded = TrainedModel.load(trained.save(tmp_path / "handles.safetensors"))
-    motion = swaying(5)
-    first, again = (roll_out(model, tube_dress(), motion).positions for model in (trained, loaded))
-    assert np.array_equal(first, again) and loaded.megabytes == trained.megabytes

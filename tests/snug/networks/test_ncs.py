@@ -1,4 +1,4 @@
-"""Neural Cloth Simulation: inputs at rest, branches apart, training, file and ONNX."""
+"""Neural Cloth Simulation: inputs at rest, branches apart, training and ONNX."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES, joint_motion
 from snug.networks.ncs.network import LEAD
-from snug.networks.roll_out import prepare_frame_inputs, roll_out
+from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.onnx_file import write_onnx
 from snug.recipes.named import NCS
@@ -55,13 +55,6 @@ def test_inputs_know_no_heading_and_no_place():
     other = turned(motion, 2.0, np.array([3.0, 0.5, -1.0]))
     for first, second in zip(joint_motion(body, motion), joint_motion(body, other)):
         assert np.abs(first - second).max() < 1e-9
-
-
-def test_one_frame_at_a_time_has_the_inputs_of_the_whole(trained):
-    motion = swaying(6)
-    whole = tube_dress().features(motion, NCS, feature_set="joint_motion")
-    inputs = prepare_frame_inputs(trained, tube_dress(), motion)
-    assert all(torch.allclose(inputs(t)[0], whole[t], atol=1e-4) for t in range(6))
 
 
 def test_the_dynamic_branch_adds_nothing_where_nothing_moves(network):
@@ -116,14 +109,12 @@ def test_a_window_begins_with_the_state_that_its_lead_leaves():
         assert torch.allclose(state[:, row], expected, atol=1e-6) and expected.any()
 
 
-def test_poses_held_have_the_static_answer_and_a_file_gives_the_same(trained, tmp_path):
+def test_poses_held_have_the_static_answer(trained):
     motion = swaying(8)
-    loaded = TrainedModel.load(trained.save(tmp_path / "ncs.safetensors"))
-    still, again = (roll_out(model, tube_dress(), motion, quasi_static=True) for model in (trained, loaded))
-    one = roll_out(loaded, tube_dress(), held(motion, 5, 20)).positions
-    assert np.abs(one - one[0]).max() < 1e-6 and np.abs(one[0] - still.positions[5]).max() < 2e-6
-    assert np.array_equal(still.positions, again.positions)
-    assert np.abs(roll_out(loaded, tube_dress(), motion).positions - still.positions).max() > 1e-6
+    still = roll_out(trained, tube_dress(), motion, quasi_static=True).positions
+    one = roll_out(trained, tube_dress(), held(motion, 5, 20)).positions
+    assert np.abs(one - one[0]).max() < 1e-6 and np.abs(one[0] - still[5]).max() < 2e-6
+    assert np.abs(roll_out(trained, tube_dress(), motion).positions - still).max() > 1e-6
 
 
 @pytest.mark.slow

@@ -84,14 +84,6 @@ def test_trained_beats_skinning_in_a_roll_out(trained):
     assert np.mean([joules(x) for x in run.positions]) < np.mean([joules(x) for x in skinned])
 
 
-@pytest.mark.parametrize("kind", ["snug", "pbns"])
-def test_same_seed_same_weights(kind):
-    a, b, c = (short(kind, steps=12, seed=seed) for seed in (4, 4, 5))
-    same = [torch.equal(p, q) for p, q in zip(a.network.parameters(), b.network.parameters())]
-    assert all(same)
-    assert not torch.equal(a.network.offsets.weight, c.network.offsets.weight)
-
-
 def test_model_survives_its_file(trained, tmp_path):
     path = trained.save(tmp_path / "deep" / "model.safetensors")
     loaded = TrainedModel.load(path)
@@ -99,9 +91,6 @@ def test_model_survives_its_file(trained, tmp_path):
     assert (loaded.kind, loaded.recipe, loaded.steps) == ("snug", trained.recipe, 100)
     assert loaded.history == trained.history and loaded.megabytes == trained.megabytes
     assert read_tensors(path)[1]["unit"] == "J"  # of the losses, for whoever draws them
-    motion = swaying(12)
-    before, after = (roll_out(model, tube_dress(), motion).positions for model in (trained, loaded))
-    assert (before == after).all()
 
 
 def test_broken_model_files_are_named(tmp_path, trained, monkeypatch):
