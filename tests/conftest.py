@@ -1,4 +1,4 @@
-"""Garbage: what is loaded when the tests begin is none. And what a refusal by a command is."""
+"""Garbage: what is loaded when the tests begin is none. What a refusal by a command is; narrow networks."""
 
 import gc
 from collections.abc import Callable
@@ -34,6 +34,13 @@ def refused(capsys, tmp_path) -> Callable[..., str]:
         return error
 
     return check
+
+
+@pytest.fixture
+def narrow(monkeypatch) -> None:
+    """Hidden layers of 60 in place of the papers' 1500 and 1024, where their size is not the subject."""
+    monkeypatch.setattr("snug.networks.santesteban2019.WRINKLE_WIDTH", 60)  # fills no vector, as 1500
+    monkeypatch.setattr("snug.networks.tailornet.WIDTH", 60)
 
 
 def _files(folder: Path) -> dict[Path, int]:

@@ -42,7 +42,7 @@ def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("kind", ARCHITECTURES)
-def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path):
+def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path, narrow):
     model, motion = random_model(kind), swaying(8)
     expected, offsets = by_torch(model, motion)
     found = roll_out(model, tube_dress(), motion).positions

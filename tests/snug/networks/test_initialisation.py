@@ -39,7 +39,7 @@ def test_keras_rules_of_the_papers_network():
 
 
 @pytest.mark.parametrize("kind", [kind for kind in ARCHITECTURES if kind != "nearest-poses"])
-def test_every_kind_follows_the_rules_of_its_recipe(kind):
+def test_every_kind_follows_the_rules_of_its_recipe(kind, narrow):
     recipe = replace(RECIPE_OF_KIND[kind], zero_last_layer=False, initialisation="keras")
     keras, again = (make_network(kind, 151, 5, recipe, seed=3) for _ in range(2))
     torchs = make_network(kind, 151, 5, replace(recipe, initialisation="torch"), seed=3)
@@ -55,7 +55,7 @@ def test_every_kind_follows_the_rules_of_its_recipe(kind):
 
 
 @pytest.mark.parametrize("kind", ARCHITECTURES)
-def test_a_last_layer_of_zero_starts_at_the_template(kind):
+def test_a_last_layer_of_zero_starts_at_the_template(kind, narrow):
     inputs = POSE_NUMBERS + RATES * len(DESCRIBED)  # what ncs reads; the others read any number
     network = make_network(kind, inputs, 5, replace(DEFAULT, initialisation="keras"), seed=1)
     offsets, _ = network(torch.randn(3, 4, inputs))

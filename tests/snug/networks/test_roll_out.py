@@ -83,7 +83,7 @@ def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_com
 
 
 @pytest.mark.parametrize("kind", ["snug", "dynamic", "pbns", "santesteban2019", "ncs"])
-def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind):
+def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind, narrow):
     dressed, motion = tube_dress(), swaying()
     model = untrained_model(kind, dressed, [motion], seed=0, recipe=RECIPE_OF_KIND[kind])
     features = dressed.features(motion, model.recipe, feature_set=model.network.feature_set)

@@ -70,14 +70,12 @@ def asked_after(steps):
         ("pbns", PLAIN),
         ("dynamic", replace(DYNAMIC, pretraining=3)),
         ("supervised", SUPERVISED),
-        pytest.param(
-            "santesteban2019", SANTESTEBAN2019, marks=pytest.mark.slow
-        ),  # its GRU of 1500 takes half a minute
+        ("santesteban2019", SANTESTEBAN2019),
         ("tailornet", TAILORNET),
     ],
     ids=["mixed", "paper", "pbns", "dynamic", "supervised", "santesteban2019", "tailornet"],
 )
-def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path):
+def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path, narrow):
     whole = short(kind, recipe=recipe)
     path = tmp_path / "run.safetensors"
     for number, steps in enumerate((3, 5)):  # twice, the second time on a resumed run
