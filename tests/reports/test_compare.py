@@ -44,12 +44,6 @@ def found(one, other, **options):
     ]
 
 
-def test_the_same_run_and_another_draw_of_the_seeds_are_no_change():
-    assert found(rows_of(), rows_of()) == []
-    for draw in range(1, 8):
-        assert found(rows_of(), rows_of(draw)) == []
-
-
 def test_of_many_means_that_scatter_none_is_a_change():
     def many(draw: int):  # another seed moves all motions alike
         values = np.random.default_rng(draw).normal(10.0, 3.0, (80, len(SEEDS)))

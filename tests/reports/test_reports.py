@@ -138,9 +138,9 @@ def test_no_run_folder_is_one_line_and_status_2(tmp_path, refused, what):
 
 
 def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
-    run = RunFolder(tmp_path)
-    run.write_config(declaration(all_rows()))
-    run.write_rows(all_rows())
+    run, rows = RunFolder(tmp_path), [r for r in all_rows() if r.method in ("simulation", "skinning", "snug")]
+    run.write_config(declaration(rows))
+    run.write_rows(rows)
     path = run.trajectory_path(SCENES[0], "snug")
     path.parent.mkdir(parents=True)
     path.write_bytes(b"no mesh")

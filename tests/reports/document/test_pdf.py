@@ -85,6 +85,12 @@ def report(request, tmp_path_factory):
     found.close()
 
 
+@pytest.fixture(scope="module")
+def texts(report):
+    """The words of each page."""
+    return [words(page) for page in report]
+
+
 def words(page) -> list[tuple[str, np.ndarray]]:
     """Each word and its box (left, bottom, right, top) [pt]."""
     text = page.get_textpage()
@@ -102,9 +108,8 @@ def words(page) -> list[tuple[str, np.ndarray]]:
     return found
 
 
-def test_no_word_lies_over_a_margin_or_over_another(report):
-    for page in report:
-        found = words(page)
+def test_no_word_lies_over_a_margin_or_over_another(report, texts):
+    for page, found in zip(report, texts, strict=True):
         boxes = np.array([box for _, box in found])
         width, height = page.get_size()
         out = [word for word, box in found if box[0] < MARGIN - SLACK or box[2] > width - MARGIN + SLACK]
@@ -136,8 +141,8 @@ def test_pages_are_few_and_full(report):
         assert np.diff(inked).max() < len(image) / 3
 
 
-def test_names_stand_as_they_are(report):
-    text = " ".join("".join(word for word, _ in words(page)) for page in report)
+def test_names_stand_as_they_are(texts):
+    text = " ".join("".join(word for word, _ in page) for page in texts)
     bare = "".join(text.split())
     assert "裙" not in bare  # of no font: it would be an empty box
     if "U+88D9" in bare:
@@ -146,7 +151,7 @@ def test_names_stand_as_they_are(report):
     assert "simulation" in bare.lower()
 
 
-def test_what_failed_is_said_on_page_one(report):
-    first = " ".join(word for word, _ in words(report[0]))
+def test_what_failed_is_said_on_page_one(texts):
+    first = " ".join(word for word, _ in texts[0])
     assert "What went worst." in first
     assert ("failed" in first and "skipped" in first) or "timeout" in first

@@ -11,10 +11,9 @@ from matplotlib.mathtext import MathTextParser
 
 from benchmarks.results import run_folder as results
 from benchmarks.results.run_folder import RunFolder
-from reports import build
 from reports.run.finished_run import make_run
-from reports.run.reading import read_run
-from reports.tables import latex, make_tables
+from reports.run.reading import read_run, read_run_with_trainings
+from reports.tables import latex, make_tables, write_tables
 from reports.tables.dictionary import dictionary
 from tests.reports.report_folder import all_rows, declaration, row
 
@@ -41,7 +40,8 @@ def made(tmp_path_factory) -> RunFolder:
     folder.write_config(said)
     folder.tables.mkdir()
     (folder.tables / "of_before.tex").touch()
-    assert build.main([str(folder.path)]) == 0
+    run = read_run_with_trainings(folder)
+    write_tables(folder.tables, run, make_tables(run))
     return folder
 
 

@@ -21,6 +21,8 @@ from reports.text.published_parts import (
 from snug.motion.library import TEST
 from snug.motion.recorded.table import CLIPS, clip_of
 
+JUDGED = "quick, paper_text, ablations"  # as in the documents: what has been judged is kept
+
 
 @pytest.fixture(scope="module")
 def project():
@@ -58,7 +60,7 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
 
 @pytest.mark.parametrize(("kind", "claims"), [("primary", PRIMARY), ("exploratory", EXPLORATORY)])
 def test_every_claim_has_a_row_whether_or_not_a_run_judges_it(kind, claims):
-    lines = published_part(f"claims {kind} of quick").splitlines()[2:]
+    lines = published_part(f"claims {kind} of {JUDGED}").splitlines()[2:]
     assert len(lines) == len(claims)
     said = [line.split(" | ") for line in lines]
     assert all((cells[8] == "not measured") == (cells[9] == "– |") for cells in said)
@@ -102,16 +104,14 @@ def test_documents_are_readme_docs_and_the_page_of_entries(project):
 
 def test_a_run_that_shared_its_machine_judges_no_claim_on_times():
     units = ("[s]", "[ms]")
-    lines = [
-        line.split(" | ") for line in published_part("claims exploratory of quick, ablations").splitlines()
-    ]
+    lines = [line.split(" | ") for line in published_part(f"claims exploratory of {JUDGED}").splitlines()]
     assert any(cells[1].endswith("[MB]") and cells[-1] == "ablations |" for cells in lines)
     assert not [cells for cells in lines if cells[1].endswith(units) and cells[-1] == "ablations |"]
 
 
 def test_a_later_run_judges_what_those_before_it_cannot_and_nothing_else():
     alone = published_part("claims exploratory of quick").splitlines()[2:]
-    both = published_part("claims exploratory of quick, ablations").splitlines()[2:]
+    both = published_part(f"claims exploratory of {JUDGED}").splitlines()[2:]
     assert len(alone) == len(both)
     cells = [(before.split(" | "), after.split(" | ")) for before, after in zip(alone, both, strict=True)]
     judged = [
