@@ -16,7 +16,12 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 EXTEND, EXAMPLES = ROOT / "docs" / "extend.md", ROOT / "docs" / "examples"
 FILE = re.compile(r"File `([^`]+)`:$")
-SHORT = ("A method", "An energy", "A scene", "A metric")
+# As written they are run by -m slow; in one run by TOGETHER.
+JOINED = ("A method", "A scene", "A metric")
+TOGETHER = (
+    "python -m benchmarks.run --preset smoke --scenes hanging_sheet,./curtain.py"
+    " --methods simulation,newton-1,./held.py,./explicit.py --metrics ./height.py -o "
+)
 LONG = (
     "How to add something",
     "A program",
@@ -61,11 +66,11 @@ def run(folder: Path, line: str) -> None:
     assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
 
 
-def commands(folder: Path, title: str, out: Path | None = None) -> None:
-    """Run the commands of a section, in their order."""
+def commands(folder: Path, title: str, out: Path, more: str = "") -> None:
+    """Run the commands of a section, in their order, each with `more` at its end."""
     for _, language, content in blocks(SECTIONS[title]):
         if language == "sh":
-            run(folder, content.replace("DIR", str(out)))
+            run(folder, content.replace("DIR", str(out)).rstrip() + more)
 
 
 def rows_of(folder: Path) -> list[dict[str, str]]:
@@ -73,16 +78,12 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-@pytest.mark.parametrize("title", [*SHORT, *(pytest.param(title, marks=pytest.mark.slow) for title in LONG)])
-def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
-    commands(user, title, tmp_path)
-    if title in ("How to add something", "An energy"):
-        return  # they leave no results
-    rows = rows_of(tmp_path)
+def judge(title: str, rows: list[dict[str, str]], folder: Path) -> None:
+    """Hold rows of a run, and its folder, to what the section says."""
     assert rows and all(row["status"] == "ok" for row in rows)
-    methods = {row["method"] for row in rows}
     if title == "A method":
-        total = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/total"}
+        sheet = [row for row in rows if (row["scene"], row["metric"]) == ("hanging_sheet", "energy/total")]
+        total = {row["method"]: float(row["value"]) for row in sheet}
         # In n frames backward Euler falls (n + 1) / n times as far.
         assert total["explicit-200"] == pytest.approx(total["simulation"], rel=0.2)
         assert total["held"] > total["simulation"]  # it keeps its height
@@ -91,23 +92,43 @@ def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
         assert skinned["pose-network"] > skinned["skinning"] > 0.0  # the same but for smoothed weights
     if title == "A program":
         off = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "exact/distance"}
-        assert methods == {"simulation", "fall"} and max(off.values()) < 1e-9
+        assert off.keys() == {"simulation", "fall"} and max(off.values()) < 1e-9
     if title == "A scene":
-        assert {row["scene"] for row in rows} == {"curtain"}
         # The section on energies gives the curtain its wind, which does work on it.
         wind = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/wind"}
-        assert wind.keys() == {"simulation", "newton-1"} and max(wind.values()) < 0.0
+        assert wind["simulation"] < 0.0 > wind["newton-1"]
+        assert {row["scene"] for row in rows if row["metric"] == "energy/wind"} == {"curtain"}
     if title == "A metric":
         assert {row["unit"] for row in rows if row["metric"] == "height/lowest"} == {"m"}
-        table = (tmp_path / "tables" / "height_by_scene.csv").read_text(encoding="utf-8")
+        table = (folder / "tables" / "height_by_scene.csv").read_text(encoding="utf-8")
         assert table.startswith("suite,scene,method,height/lowest [m],")
     if title == "A recipe":
-        assert methods == {"snug-windy"}
+        assert {row["method"] for row in rows} == {"snug-windy"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("title", [*JOINED, *LONG])
+def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
+    commands(user, title, tmp_path)
+    if title != "How to add something":  # it leaves no results
+        judge(title, rows_of(tmp_path), tmp_path)
+
+
+def test_the_example_of_an_energy_runs_as_written(user, tmp_path):
+    commands(user, "An energy", tmp_path)
+
+
+def test_a_method_a_scene_and_a_metric_of_the_examples_run_together(user, tmp_path):
+    for title in JOINED:
+        commands(user, title, tmp_path / "plan", " --dry-run")
+    run(user, TOGETHER + str(tmp_path))
+    for title in JOINED:
+        judge(title, rows_of(tmp_path), tmp_path)
 
 
 def test_every_example_is_tested():
     examples = {title for title, text in SECTIONS.items() if "```sh" in text}
-    assert examples == {*SHORT, *LONG}
+    assert examples == {"An energy", *JOINED, *LONG}
 
 
 def test_the_lines_of_python_in_the_readme_run(tmp_path):
