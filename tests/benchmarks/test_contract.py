@@ -93,20 +93,6 @@ def breach(name):
             stream.connect_ex(("127.0.0.1", 9))
         return Still.positions(self)
 
-    def late(self):
-        import threading
-        import time
-
-        positions = Still.positions(self)
-
-        def work():
-            end = time.perf_counter() + 0.3
-            while time.perf_counter() < end:
-                positions[-1] += 1e-6
-
-        threading.Thread(target=work, daemon=True).start()
-        return positions
-
     def raises(self):
         raise RuntimeError("broken on\npurpose")
 
@@ -123,7 +109,6 @@ BREACHES = {
     "kept": "run() gave again what it had given before: each call of run() has to do all of the work",
     "alters": "alters the scene: cloth.masses: copy what you change",
     "connects": "connects to 127.0.0.1:9: fetch what it needs beforehand",
-    "late": "positions still changed after run() had come back: wait in run() for all threads",
     "raises": "run() raises RuntimeError: broken on purpose (",
 }
 
@@ -164,7 +149,7 @@ def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatc
     [
         ("raise", "prepare() raises RuntimeError: broken on purpose"),
         ("hungry", "run() raises MemoryError: no room"),
-        ("early", "positions still changed"),
+        ("early", "positions still changed after run() had come back: wait in run() for all threads"),
         ("unheld", "quasi_static() raises OSError: no room left for the held poses"),
         ("crowded", "batch(): its time cannot be believed"),
         ("torn", "batch() raises RuntimeError: no two bodies"),

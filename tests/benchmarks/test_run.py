@@ -21,10 +21,8 @@ from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS
 from benchmarks.validation.stress.cases import MAPS, STEPS
-from reference_sim import Trajectory
 from reference_sim.files.array_file import array_names
 from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
-from tests.benchmarks.runner.misbehaving import interrupt_at
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -159,16 +157,4 @@ def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, caps
     assert "newton-1" in said and (out / "report.pdf").stat().st_size > 1000
     fields = array_names(RunFolder(out).curves_path("free_fall", "simulation"))
     assert {"energy/gravity", "energy/inertia", "energy/total"} <= set(fields)
-    assert not [path for path in out.rglob("*") if "part" in path.name]
-
-
-def test_an_interrupt_leaves_what_was_finished(tmp_path, monkeypatch, capsys):
-    interrupt_at("newton-1", monkeypatch)
-    out = tmp_path / "run"
-    words = ["--preset", "smoke", "--scenes", "free_fall", "--suite", "speed", "-o", str(out)]
-    assert run.main([*words, "--methods", "simulation,newton-1"]) == 130
-    assert "interrupted" in capsys.readouterr().err
-    folder = RunFolder(out)
-    assert folder.read_config()["interrupted"] is True and folder.read_rows() == []
-    assert Trajectory.load(folder.trajectory_path("free_fall", "simulation")).status == "converged"
     assert not [path for path in out.rglob("*") if "part" in path.name]

@@ -136,7 +136,7 @@ def test_what_is_out_of_date_is_not_measured_as_if_it_were_not(tmp_path):
 # --- interrupts and kills --------------------------------------------------------------------------------
 
 
-def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path, monkeypatch):
+def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path, monkeypatch, capsys):
     words = words_of(tmp_path, "simulation,newton-4")
     assert run.main(words) == 0
     before = RunFolder(tmp_path).read_rows()
@@ -144,6 +144,8 @@ def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path
     with monkeypatch.context() as patch:
         interrupt_at("newton-1", patch)
         assert run.main(words_of(tmp_path, "simulation,newton-1,newton-4")) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert RunFolder(tmp_path).read_config()["interrupted"] is True
     assert RunFolder(tmp_path).read_rows() == [row for row in before if row.method == "simulation"]
     assert run.main(words) == 0 and RunFolder(tmp_path).read_rows() == before
 
