@@ -5,6 +5,7 @@ Mixed training poses count. See snug.motion.motion.nearest_pose for the distance
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,15 +18,13 @@ if TYPE_CHECKING:
 
 DISTANCE = "angle to the nearest training pose, augmented ones included, mean over joints: "
 
+_metric = partial(Metric, unit="deg", table="training_distance")
+
 METRICS = (
-    Metric(
-        name="training_distance/median", unit="deg", title="From training poses", table="training_distance",
-        definition=f"{DISTANCE}median over frames",
-    ),
-    Metric(
-        name="training_distance/p95", unit="deg", title="95 % of frames below", table="training_distance",
-        definition=f"{DISTANCE}95th percentile of frames",
-    ),
+    _metric(name="training_distance/median", title="From training poses",
+            definition=f"{DISTANCE}median over frames"),
+    _metric(name="training_distance/p95", title="95 % of frames below",
+            definition=f"{DISTANCE}95th percentile of frames"),
 )  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,51 +56,34 @@ PRECISION = 0.1  # standard error of the gap, as a share of it
 NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3
 
+_metric = partial(Metric, lower_is_better=True)
+
 METRICS = (
-    Metric(
-        name="gap/energy", unit="J", title="Energy gap", table="speed", lower_is_better=True,
-        definition="how far frames lie above the lowest minimum found of their own time step, mean over "
-        "frames",
-    ),
-    Metric(
-        name="gap/relative", unit="1", title="Relative energy gap", table="speed", lower_is_better=True,
-        definition="the same over what skinning, or the first guess, lies above the steps of the simulation: "
-        "one scale a scene, the same for all methods",
-    ),
-    Metric(
-        name="gap/scale", unit="J", title="Scale of the gap", lower_is_better=None,
-        definition="that scale: what skinning, or the first guess, lies above the steps of the simulation",
-    ),
-    Metric(
-        name="gap/local", unit="J", title="Local gap", lower_is_better=True,
-        definition="how far frames lie above the minimum below the frame itself",
-    ),
-    Metric(
-        name="gap/refrozen", unit="J", title="Refrozen gap", table="speed", lower_is_better=True,
-        definition="how far frames lie above the minimum below them where contact planes are searched at the "
-        "frame instead of the step's first guess",
-    ),
-    Metric(
-        name="step/distance", unit="mm", title="One-step distance", table="speed", lower_is_better=True,
-        definition="root mean square distance of vertices between a frame and the minimum of its own time "
-        "step that lies below it, mean over frames",
-    ),
-    Metric(
-        name="step/curvature", unit="1/m", title="One-step curvature error", table="speed",
-        lower_is_better=True,
-        definition="|H - H_min| of the same vertices between a frame and that minimum, mean by its areas",
-    ),
-    Metric(
-        name="gradient/norm", unit="1", title="Gradient", table="speed", lower_is_better=True,
-        definition="largest component of the gradient left in a step, in mean vertex weights",
-    ),
-    *(
-        Metric(
-            name=f"gap/found_by_{finder}", unit="frames", title=f"Found by {finder.replace('_', ' ')}",
-            definition=f"sampled frames whose lowest minimum was found {how}",
-        )
-        for finder, how in FINDERS.items()
-    ),
+    _metric(name="gap/energy", unit="J", title="Energy gap", table="speed",
+            definition="how far frames lie above the lowest minimum found of their own time step, mean over "
+            "frames"),
+    _metric(name="gap/relative", unit="1", title="Relative energy gap", table="speed",
+            definition="the same over what skinning, or the first guess, lies above the steps of the "
+            "simulation: one scale a scene, the same for all methods"),
+    Metric(name="gap/scale", unit="J", title="Scale of the gap",
+           definition="that scale: what skinning, or the first guess, lies above the steps of the "
+           "simulation"),
+    _metric(name="gap/local", unit="J", title="Local gap",
+            definition="how far frames lie above the minimum below the frame itself"),
+    _metric(name="gap/refrozen", unit="J", title="Refrozen gap", table="speed",
+            definition="how far frames lie above the minimum below them where contact planes are searched at "
+            "the frame instead of the step's first guess"),
+    _metric(name="step/distance", unit="mm", title="One-step distance", table="speed",
+            definition="root mean square distance of vertices between a frame and the minimum of its own "
+            "time step that lies below it, mean over frames"),
+    _metric(name="step/curvature", unit="1/m", title="One-step curvature error", table="speed",
+            definition="|H - H_min| of the same vertices between a frame and that minimum, mean by its "
+            "areas"),
+    _metric(name="gradient/norm", unit="1", title="Gradient", table="speed",
+            definition="largest component of the gradient left in a step, in mean vertex weights"),
+    *(Metric(name=f"gap/found_by_{finder}", unit="frames", title=f"Found by {finder.replace('_', ' ')}",
+             definition=f"sampled frames whose lowest minimum was found {how}")
+      for finder, how in FINDERS.items()),
 )  # fmt: skip
 
 

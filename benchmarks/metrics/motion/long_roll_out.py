@@ -6,6 +6,7 @@ either stretch have no inertia and are left out.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,19 +20,15 @@ if TYPE_CHECKING:
 MM = 1e3
 OF_CLOTH = ("strain", "bending", "inertia")
 
+_metric = partial(Metric, table="roll_outs", lower_is_better=True)
+
 METRICS = (
-    Metric(
-        name="roll_out/first", unit="J", title="Energy, first", table="roll_outs", lower_is_better=True,
-        definition="strain, bending and inertia, mean over the frames of the early stretch",
-    ),
-    Metric(
-        name="roll_out/last", unit="J", title="Energy, last", table="roll_outs", lower_is_better=True,
-        definition="the same of the late stretch, which shows the same motion",
-    ),
-    Metric(
-        name="roll_out/drift", unit="mm", title="Drift", table="roll_outs", lower_is_better=True,
-        definition="root mean square distance between the two stretches, about the pelvis",
-    ),
+    _metric(name="roll_out/first", unit="J", title="Energy, first",
+            definition="strain, bending and inertia, mean over the frames of the early stretch"),
+    _metric(name="roll_out/last", unit="J", title="Energy, last",
+            definition="the same of the late stretch, which shows the same motion"),
+    _metric(name="roll_out/drift", unit="mm", title="Drift",
+            definition="root mean square distance between the two stretches, about the pelvis"),
 )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ can be told. Then q(dt) - q(dt/8) alone is known, and the error is not smaller i
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,31 +25,24 @@ if TYPE_CHECKING:
 
 ORDERS = 0.5, 1.5  # observed ones between which the formula is believed
 
+_metric = partial(Metric, table="time_error")
+
 METRICS = (
-    Metric(
-        name="time_error/curvature", unit="1/m", title="Time error of mean curvature", table="time_error",
-        definition="mean curvature of the reference less its limit of small time steps, by Richardson; only "
-        "where its own observed order is 0.5 to 1.5",
-    ),
-    Metric(
-        name="time_error/order", unit="1", title="Observed order", table="time_error",
-        definition="order in dt that the total energy shows; 1 where a limit is near, none without a trend",
-    ),
-    Metric(
-        name="time_error/*", unit="J", title="Time error of {}", table="time_error",
-        definition="energy of the reference less its limit of small time steps, by Richardson; only where "
-        "its own observed order is 0.5 to 1.5",
-    ),
-    Metric(
-        name="time_error/eighth/curvature", unit="1/m", title="Mean curvature less that at dt/8",
-        table="time_error",
-        definition="mean curvature of the reference less that with an eighth of its time step, where no "
-        "limit shows",
-    ),
-    Metric(
-        name="time_error/eighth/*", unit="J", title="{} less that at dt/8", table="time_error",
-        definition="energy of the reference less that with an eighth of its time step, where no limit shows",
-    ),
+    _metric(name="time_error/curvature", unit="1/m", title="Time error of mean curvature",
+            definition="mean curvature of the reference less its limit of small time steps, by Richardson; "
+            "only where its own observed order is 0.5 to 1.5"),
+    _metric(name="time_error/order", unit="1", title="Observed order",
+            definition="order in dt that the total energy shows; 1 where a limit is near, none without a "
+            "trend"),
+    _metric(name="time_error/*", unit="J", title="Time error of {}",
+            definition="energy of the reference less its limit of small time steps, by Richardson; only "
+            "where its own observed order is 0.5 to 1.5"),
+    _metric(name="time_error/eighth/curvature", unit="1/m", title="Mean curvature less that at dt/8",
+            definition="mean curvature of the reference less that with an eighth of its time step, where no "
+            "limit shows"),
+    _metric(name="time_error/eighth/*", unit="J", title="{} less that at dt/8",
+            definition="energy of the reference less that with an eighth of its time step, where no limit "
+            "shows"),
 )  # fmt: skip
 
 

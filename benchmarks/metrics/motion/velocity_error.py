@@ -7,6 +7,7 @@ and the error is the root mean square of |v - v_ref|, or |a - a_ref|, over verti
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,17 +19,14 @@ if TYPE_CHECKING:
 
 ORDERS = {"velocity": 1, "acceleration": 2}  # of the difference in time
 
+_metric = partial(Metric, table="motion_error", lower_is_better=True)
+
 METRICS = (
-    Metric(
-        name="velocity/error", unit="m/s", title="Velocity error", table="motion_error", lower_is_better=True,
-        definition="root mean square difference of the velocities of the same vertices, (x - x') / dt with "
-        "x' the frame before, over evaluated frames",
-    ),
-    Metric(
-        name="acceleration/error", unit="m/s^2", title="Acceleration error", table="motion_error",
-        lower_is_better=True,
-        definition="the same of accelerations, (x - 2 x' + x'') / dt^2",
-    ),
+    _metric(name="velocity/error", unit="m/s", title="Velocity error",
+            definition="root mean square difference of the velocities of the same vertices, (x - x') / dt "
+            "with x' the frame before, over evaluated frames"),
+    _metric(name="acceleration/error", unit="m/s^2", title="Acceleration error",
+            definition="the same of accelerations, (x - 2 x' + x'') / dt^2"),
 )  # fmt: skip
 
 

@@ -24,6 +24,7 @@ the joints make of wrinkles that stay, a simulation has swing and history too, a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,29 +39,22 @@ Floats = NDArray[np.float64]
 BLOCK_FRAMES = 32  # frames
 FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
+_metric = partial(Metric, unit="1/m", table="curvature")
+
 METRICS = (
-    Metric(
-        name="curvature/mean", unit="1/m", title="Mean curvature", table="curvature",
-        definition="magnitude of the mean curvature, mean over interior vertices by area and over frames",
-    ),
-    Metric(
-        name="curvature/error", unit="1/m", title="Mean-curvature error", table="curvature",
-        lower_is_better=True,
-        definition="|H - H_ref| of the same vertices and frames, mean by the reference's areas",
-    ),
-    Metric(
-        name="curvature/histogram", unit="1/m", title="Histogram", table="curvature", lower_is_better=True,
-        definition="Wasserstein-1 distance between the area-weighted distributions of H at the same frame",
-    ),
-    Metric(
-        name="curvature/mean_difference", unit="1/m", title="Difference of means", table="curvature",
-        definition="area-weighted mean of H less that of the reference",
-    ),
-    Metric(
-        name="curvature/change", unit="1", title="Change of wrinkles", table="curvature",
-        definition="mean |H - median of the vertex over frames| over mean |H - mean of all|, by area: the "
-        "part of the spread of curvature that is in time; 0 where wrinkles stay the same, at most 1",
-    ),
+    _metric(name="curvature/mean", title="Mean curvature",
+            definition="magnitude of the mean curvature, mean over interior vertices by area and over "
+            "frames"),
+    _metric(name="curvature/error", title="Mean-curvature error", lower_is_better=True,
+            definition="|H - H_ref| of the same vertices and frames, mean by the reference's areas"),
+    _metric(name="curvature/histogram", title="Histogram", lower_is_better=True,
+            definition="Wasserstein-1 distance between the area-weighted distributions of H at the same "
+            "frame"),
+    _metric(name="curvature/mean_difference", title="Difference of means",
+            definition="area-weighted mean of H less that of the reference"),
+    _metric(name="curvature/change", unit="1", title="Change of wrinkles",
+            definition="mean |H - median of the vertex over frames| over mean |H - mean of all|, by area: "
+            "the part of the spread of curvature that is in time; 0 where wrinkles stay the same, at most 1"),
 )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from benchmarks.metric import Metric
@@ -9,19 +10,13 @@ from benchmarks.metric import Metric
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
 
+_metric = partial(Metric, table="dependence")
+
 METRICS = (
-    Metric(
-        name="mesh/vertices", unit="1", title="Vertices", table="dependence",
-        definition="vertices of the garment",
-    ),
-    Metric(
-        name="mesh/edge", unit="mm", title="Edge", table="dependence",
-        definition="mean length of its edges at rest",
-    ),
-    Metric(
-        name="mesh/steps", unit="1", title="Steps of a frame", table="dependence",
-        definition="time steps that a frame is simulated in",
-    ),
+    _metric(name="mesh/vertices", unit="1", title="Vertices", definition="vertices of the garment"),
+    _metric(name="mesh/edge", unit="mm", title="Edge", definition="mean length of its edges at rest"),
+    _metric(name="mesh/steps", unit="1", title="Steps of a frame",
+            definition="time steps that a frame is simulated in"),
 )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,44 +21,27 @@ Floats = NDArray[np.float64]
 MM = 1e3
 DEEP = 5e-3  # [m] below the skin: what an eye sees
 
+_metric = partial(Metric, table="penetration", lower_is_better=True)
+
 METRICS = (
-    Metric(
-        name="distance/rms", unit="mm", title="Distance", table="penetration", lower_is_better=True,
-        definition="root mean square distance between the same vertices of method and simulation",
-    ),
-    Metric(
-        name="distance/p95", unit="mm", title="95 %", table="penetration", lower_is_better=True,
-        definition="95 % of these distances are smaller",
-    ),
-    Metric(
-        name="penetration/vertices", unit="%", title="Penetration", table="penetration",
-        lower_is_better=True, definition="vertices inside the body, none left out, mean over frames",
-    ),
-    Metric(
-        name="penetration/surface", unit="%", title="Surface inside", table="penetration",
-        lower_is_better=True,
-        definition="share of the cloth's area inside the body, at vertices, midpoints of edges and "
-        "centroids, mean over frames",
-    ),
-    Metric(
-        name="penetration/deep", unit="%", title="Deep", table="penetration", lower_is_better=True,
-        definition="vertices more than 5 mm inside the body",
-    ),
-    Metric(
-        name="penetration/depth_p99", unit="mm", title="Depth, 99 %", lower_is_better=True,
-        definition="99 % of all vertices and frames are less deep; 0 outside",
-    ),
-    Metric(
-        name="penetration/own_part_p999", unit="mm", title="Own part, 99.9 %", table="penetration",
-        lower_is_better=True,
-        definition="99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold of a "
-        "hip does not count",
-    ),
-    Metric(
-        name="drift/hem", unit="mm", title="Hem drift", table="penetration",
-        definition="how far the hem's mean height above the pelvis has risen from the first evaluated frame "
-        "to the last",
-    ),
+    _metric(name="distance/rms", unit="mm", title="Distance",
+            definition="root mean square distance between the same vertices of method and simulation"),
+    _metric(name="distance/p95", unit="mm", title="95 %", definition="95 % of these distances are smaller"),
+    _metric(name="penetration/vertices", unit="%", title="Penetration",
+            definition="vertices inside the body, none left out, mean over frames"),
+    _metric(name="penetration/surface", unit="%", title="Surface inside",
+            definition="share of the cloth's area inside the body, at vertices, midpoints of edges and "
+            "centroids, mean over frames"),
+    _metric(name="penetration/deep", unit="%", title="Deep",
+            definition="vertices more than 5 mm inside the body"),
+    _metric(name="penetration/depth_p99", unit="mm", title="Depth, 99 %", table="",
+            definition="99 % of all vertices and frames are less deep; 0 outside"),
+    _metric(name="penetration/own_part_p999", unit="mm", title="Own part, 99.9 %",
+            definition="99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold "
+            "of a hip does not count"),
+    _metric(name="drift/hem", unit="mm", title="Hem drift", lower_is_better=None,
+            definition="how far the hem's mean height above the pelvis has risen from the first evaluated "
+            "frame to the last"),
 )  # fmt: skip
 
 

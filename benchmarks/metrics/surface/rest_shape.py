@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,29 +16,22 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+_metric = partial(Metric, table="shape")
+
 METRICS = (
-    Metric(
-        name="deformation/edges", unit="%", title="Edges", table="shape",
-        definition="|length / rest length - 1|, mean over edges and frames",
-    ),
-    Metric(
-        name="deformation/areas", unit="%", title="Areas", table="shape",
-        definition="|area / rest area - 1|, mean over faces and frames",
-    ),
-    Metric(
-        name="dihedral/mean", unit="deg", title="Folds", table="shape",
-        definition="angle between the normals of the two faces of an inner edge, mean over edges and frames",
-    ),
-    Metric(
-        name="intersections/triangles", unit="%", title="Self-cut", table="shape", lower_is_better=True,
-        definition="triangles that pass through another one of the same cloth, mean over frames",
-    ),
-    Metric(
-        name="intersections/contours", unit="m", title="Contours", table="intersections",
-        lower_is_better=True,
-        definition="length of the lines in which triangles of the cloth pass through others of it, mean over "
-        "frames",
-    ),
+    _metric(name="deformation/edges", unit="%", title="Edges",
+            definition="|length / rest length - 1|, mean over edges and frames"),
+    _metric(name="deformation/areas", unit="%", title="Areas",
+            definition="|area / rest area - 1|, mean over faces and frames"),
+    _metric(name="dihedral/mean", unit="deg", title="Folds",
+            definition="angle between the normals of the two faces of an inner edge, mean over edges and "
+            "frames"),
+    _metric(name="intersections/triangles", unit="%", title="Self-cut", lower_is_better=True,
+            definition="triangles that pass through another one of the same cloth, mean over frames"),
+    _metric(name="intersections/contours", unit="m", title="Contours", table="intersections",
+            lower_is_better=True,
+            definition="length of the lines in which triangles of the cloth pass through others of it, mean "
+            "over frames"),
 )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ penetration alone: energies, curvature errors and distances are of the same vert
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,16 +31,15 @@ Indices = NDArray[np.int64]
 SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
 LOST = 1e6  # [m] from the origin: a vertex so far off is on no surface, and its square may overflow
 
+_metric = partial(Metric, table="surface", lower_is_better=True)
+
 METRICS = (
-    Metric(
-        name="surface/chamfer", unit="mm", title="Chamfer", table="surface", lower_is_better=True,
-        definition="mean distance from vertices to the nearest point of the reference's surface and from its "
-        "vertices back, by area, mean of both ways and of 12 evaluated frames",
-    ),
-    Metric(
-        name="surface/normals", unit="deg", title="Normals", table="surface", lower_is_better=True,
-        definition="angle between the normals of the two surfaces at these nearest points, mean as above",
-    ),
+    _metric(name="surface/chamfer", unit="mm", title="Chamfer",
+            definition="mean distance from vertices to the nearest point of the reference's surface and from "
+            "its vertices back, by area, mean of both ways and of 12 evaluated frames"),
+    _metric(name="surface/normals", unit="deg", title="Normals",
+            definition="angle between the normals of the two surfaces at these nearest points, mean as "
+            "above"),
 )  # fmt: skip
 
 

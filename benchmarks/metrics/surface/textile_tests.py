@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from benchmarks.metric import Metric
@@ -11,20 +12,16 @@ if TYPE_CHECKING:
 
     from benchmarks.metric import RollOut
 
+_metric = partial(Metric, table="fabric")
+
 METRICS = (
-    Metric(
-        name="fabric/bending_length", unit="mm", title="Bending length", table="fabric",
-        definition="bending length of the elastica whose chord has the strip's angle, at the last frame",
-    ),
-    Metric(
-        name="fabric/drape_coefficient", unit="%", title="Drape coefficient", table="fabric",
-        definition="shadow less the plate, over the specimen less the plate (areas), at the last frame",
-    ),
-    Metric(
-        name="fabric/error", unit="%", title="Error of the test", table="fabric", lower_is_better=True,
-        definition="of a bending length: its distance from (rigidity / weight)^(1/3), over that; of a drape "
-        "coefficient: its difference from the reference's, in points",
-    ),
+    _metric(name="fabric/bending_length", unit="mm", title="Bending length",
+            definition="bending length of the elastica whose chord has the strip's angle, at the last frame"),
+    _metric(name="fabric/drape_coefficient", unit="%", title="Drape coefficient",
+            definition="shadow less the plate, over the specimen less the plate (areas), at the last frame"),
+    _metric(name="fabric/error", unit="%", title="Error of the test", lower_is_better=True,
+            definition="of a bending length: its distance from (rigidity / weight)^(1/3), over that; of a "
+            "drape coefficient: its difference from the reference's, in points"),
 )  # fmt: skip
 
 
