@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,23 +19,8 @@ FRAME = 1 / 30  # [s] between frames
 ITERATIONS, SUBSTEPS = "iterations", "substeps"
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """State at the end of a frame.
-
-    Attributes:
-        x: positions (V, 3) [m].
-        v: velocities (V, 3) [m/s]; None where the engine does not tell.
-        before: x and v one time step earlier; None where the engine does not tell.
-    """
-
-    x: np.ndarray
-    v: np.ndarray | None = None
-    before: tuple[np.ndarray, np.ndarray] | None = None
-
-
 class EngineCloth:
-    """Cloth of an engine, ready to step. An adapter defines `advance`, or `frames` where it has no state.
+    """Cloth of an engine, ready to step. An adapter defines `advance`.
 
     Attributes:
         energies: static terms that the engine minimises, gravity aside; empty where they are not documented.
@@ -48,15 +33,6 @@ class EngineCloth:
     def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (V, 3) [m] and velocities [m/s] a time step of dt [s] after x and v."""
         raise NotImplementedError
-
-    def frames(self, specimen: Specimen, substeps: int) -> Iterator[Frame]:
-        """Yield frame after frame without end, `substeps` time steps each."""
-        x, v = specimen.start, specimen.velocity
-        while True:
-            for _ in range(substeps):
-                before = x, v
-                x, v = self.advance(x, v, FRAME / substeps)
-            yield Frame(x, v, before)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,13 +79,7 @@ class Engine:
         return f"{self.package or 'this project'} {version}, {self.licence}"
 
     def budget(self, factor: int) -> tuple[int, int]:
-        """Return sub-steps per frame and iterations per time step of that multiple of the default.
-
-        Raises:
-            ValueError: the factor is below 1.
-        """
-        if factor < 1:
-            raise ValueError(f"engine {self.name}: factor {factor}: give 1 or more")
+        """Return sub-steps per frame and iterations per time step of that multiple of the default."""
         if self.grows == SUBSTEPS:
             return factor * self.substeps, self.iterations
         return self.substeps, factor * self.iterations

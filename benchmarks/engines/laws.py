@@ -51,13 +51,8 @@ def momentum_error(run: RollOut) -> float:
     return 100.0 * float(np.linalg.norm(way - path) / np.linalg.norm(path))
 
 
-def spin_kept(run: RollOut) -> float | None:
-    """Return the share of the angular momentum about the vertical that is left at the end [%].
-
-    None where the engine tells no velocities.
-    """
-    if run.velocity is None:
-        return None
+def spin_kept(run: RollOut) -> float:
+    """Return the share of the angular momentum about the vertical that is left at the end [%]."""
     start = _spin(run, run.positions[0], run.specimen.velocity)
     return 100.0 * _spin(run, run.positions[-1], run.velocity) / start
 
@@ -100,12 +95,12 @@ def reaction_over_weight(run: RollOut) -> float:
     the law is exact in every time step. Forces at the ends of frames over an acceleration from the centres of
     frames would be wrong by 1 or 2 % where the strip bounces: 30 samples a second do not average its force.
 
-    Without energies or time steps the force is not known, and the number is 1 + a / g, with the a between the
-    ends of the last second; it is 1 at rest.
+    Without energies the force is not known, and the number is 1 + a / g, with the a between the ends of the
+    last second; it is 1 at rest.
     """
     cloth = run.specimen.cloth
     first = len(run.positions) // 3 * 2
-    if not run.energies or not run.last_steps:
+    if not run.energies:
         speeds = np.diff(centre(run)[first - 1 :, 1]) / FRAME
         return 1.0 + float(speeds[-1] - speeds[0]) / (FRAME * (len(speeds) - 1)) / GRAVITY
     pulls, inertias = [], []
@@ -122,9 +117,9 @@ def energy_gap(run: RollOut) -> float | None:
     """Return what the engine leaves of the decrease of its own incremental potential, in some steps [%].
 
     0 is the minimum, found by Newton's method from the same state; 100 is the inertial guess x + h v. None
-    where energies or time steps are not told.
+    where energies are not documented.
     """
-    if not run.energies or not run.last_steps:
+    if not run.energies:
         return None
     return float(np.mean([_gap(run.last_steps[frame], run) for frame in GAP_FRAMES]))
 

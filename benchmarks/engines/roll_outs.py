@@ -6,11 +6,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import islice
 
 import numpy as np
 
-from benchmarks.engines.engine import FRAME, Engine, EngineCloth
+from benchmarks.engines.engine import FRAME, Engine
 from benchmarks.engines.registry import find_engine
 from benchmarks.engines.specimens import Specimen, specimen
 from reference_sim.energies.energy import Energy
@@ -35,21 +34,21 @@ class RollOut:
     Attributes:
         specimen: that moved.
         positions: (T, V, 3) [m], the start included.
-        velocity: (V, 3) [m/s] at the end; None where the engine does not tell.
+        velocity: (V, 3) [m/s] at the end.
         seconds: processor time (T-1,) [s] of each frame.
         step: time step of the engine [s].
-        last_steps: last time step of each frame; empty where the engine does not tell.
+        last_steps: last time step of each frame.
         energies, explicit: as those of EngineCloth.
     """
 
     specimen: Specimen
     positions: np.ndarray
-    velocity: np.ndarray | None
+    velocity: np.ndarray
     seconds: np.ndarray
     step: float
-    last_steps: Sequence[Step] = ()
-    energies: Sequence[Energy] = ()
-    explicit: bool = False
+    last_steps: Sequence[Step]
+    energies: Sequence[Energy]
+    explicit: bool
 
     @property
     def milliseconds(self) -> float:
@@ -72,24 +71,28 @@ def roll_out(engine: Engine, sample: Specimen, factor: int = 1) -> RollOut:
         ImportError: the engine is not installed.
     """
     substeps, iterations = engine.budget(factor)
-    cloth: EngineCloth = engine.make(sample, iterations)
-    next(cloth.frames(sample, substeps))
-    positions, seconds, steps, velocity = [sample.start], [], [], None
-    frames = islice(cloth.frames(sample, substeps), sample.frames)
-    clock = time.process_time()
-    for number, frame in enumerate(frames, start=1):
-        seconds.append(time.process_time() - clock)
-        if not (np.isfinite(frame.x).all() and np.abs(frame.x).max() < FAR):
-            raise EngineDiverged(f"frame {number}: a vertex is nowhere, or {FAR:g} m away")
-        positions.append(frame.x)
-        velocity = frame.v
-        if frame.before is not None:
-            steps.append(Step(*frame.before, frame.x, FRAME / substeps))
+    cloth, dt = engine.make(sample, iterations), FRAME / substeps
+
+    def last_step(x: np.ndarray, v: np.ndarray) -> tuple[Step, np.ndarray]:
+        """Return the last time step of the frame after x and v, and the velocity at its end."""
+        for _ in range(substeps):
+            before = x, v
+            x, v = cloth.advance(x, v, dt)
+        return Step(*before, x, dt), v
+
+    last_step(sample.start, sample.velocity)
+    positions, velocity, seconds, steps = [sample.start], sample.velocity, [], []
+    for number in range(1, sample.frames + 1):
         clock = time.process_time()
+        step, velocity = last_step(positions[-1], velocity)
+        seconds.append(time.process_time() - clock)
+        if not (np.isfinite(step.after).all() and np.abs(step.after).max() < FAR):
+            raise EngineDiverged(f"frame {number}: a vertex is nowhere, or {FAR:g} m away")
+        positions.append(step.after)
+        steps.append(step)
     return RollOut(
-        sample, np.array(positions), velocity, np.array(seconds), FRAME / substeps, steps, cloth.energies,
-        cloth.explicit,
-    )  # fmt: skip
+        sample, np.array(positions), velocity, np.array(seconds), dt, steps, cloth.energies, cloth.explicit
+    )
 
 
 @cache

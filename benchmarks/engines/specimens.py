@@ -58,7 +58,7 @@ def thrown() -> Specimen:
 
 def hanging() -> Specimen:
     """Return the square held by two corners, horizontal at frame 0."""
-    cloth = _sheet(lambda x: (np.abs(x[:, 0]) > 0.499) & (x[:, 2] < -0.499))
+    cloth = _sheet(held=True)
     return Specimen(cloth, cloth.rest_positions, np.zeros_like(cloth.rest_positions))
 
 
@@ -70,11 +70,12 @@ def strip() -> Specimen:
     return Specimen(cloth, x, np.zeros_like(x), REST)
 
 
-def _sheet(held: object = None) -> Cloth:
+def _sheet(held: bool = False) -> Cloth:
+    """Return the horizontal square, free or held by the two corners of negative z."""
     points, faces = rectangle("union_jack", CELLS, CELLS, 1.0, 1.0)
     x = np.stack([points[:, 0] - 0.5, np.zeros(len(points)), points[:, 1] - 0.5], axis=1)
-    pins = np.flatnonzero(held(x)).tolist() if callable(held) else []
-    return Cloth(x, faces, Material(), pins=pins)
+    corners = (np.abs(x[:, 0]) > 0.499) & (x[:, 2] < -0.499)
+    return Cloth(x, faces, Material(), pins=np.flatnonzero(corners).tolist() if held else [])
 
 
 SPECIMENS = {"falling": falling, "thrown": thrown, "hanging": hanging, "strip": strip}
