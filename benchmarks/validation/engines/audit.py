@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
-from functools import cache
+from dataclasses import replace
+from functools import cache, wraps
+from typing import Any
 
 from benchmarks.engines import laws
 from benchmarks.engines.engine import ITERATIONS, Engine
@@ -21,78 +22,80 @@ REFERENCE_SUBSTEPS = (1, 4, 16, 64, 256)  # per frame
 Answer = tuple[float | None, str]  # value and remark
 
 
-def law(engine: str, name: str, sample: str) -> Measurement:
+def measured(measure: Callable[..., Answer]) -> Callable[..., Measurement]:
+    """Name the engine's version beside the answer; an absent engine is skipped, one that diverges says so."""
+
+    @wraps(measure)
+    def measurement(engine: str, **options: Any) -> Measurement:
+        declared = find_engine(engine)
+        if declared.absent:
+            return Measurement(value=None, status="skipped", reason=declared.absent)
+        try:
+            value, remark = measure(declared, **options)
+        except EngineDiverged as error:
+            return Measurement(value=None, status="diverged", reason=f"{declared.version}; {error}")
+        reason = "; ".join(filter(None, [declared.version, declared.settings, remark]))
+        return Measurement(value=value, status="skipped" if value is None else "ok", reason=reason)
+
+    return measurement
+
+
+@measured
+def law(engine: Engine, name: str, sample: str) -> Answer:
     """Evaluate a function of benchmarks.engines.laws on the engine's default roll-out of a specimen."""
-
-    def measure(found: Engine) -> Answer:
-        value: float | None = getattr(laws, name)(cached_roll_out(engine, sample))
-        return value, "" if value is not None else "it does not tell velocities, or its energy"
-
-    return measurement(engine, measure)
+    value: float | None = getattr(laws, name)(cached_roll_out(engine.name, sample))
+    return value, "" if value is not None else "it does not tell velocities, or its energy"
 
 
-def distance(engine: str, factor: int) -> Measurement:
+@measured
+def distance(engine: Engine, factor: int) -> Answer:
     """Return the distance of a budget's roll-out from the engine's own limit [%]."""
-    return _of_budget(
-        engine, factor, lambda runs, remark: (laws.distance(runs[factor], runs[max(runs)]), remark)
-    )
+    runs, remark = ladder(engine.name)
+    if factor not in runs:
+        return None, _left_out(runs)
+    return laws.distance(runs[factor], runs[max(runs)]), remark
 
 
-def milliseconds(engine: str, factor: int) -> Measurement:
+@measured
+def milliseconds(engine: Engine, factor: int) -> Answer:
     """Return the processor time of a frame of the hanging sheet at that budget [ms]."""
-    return _of_budget(engine, factor, lambda runs, _: (runs[factor].milliseconds, ""))
+    runs, _ = ladder(engine.name)
+    return (runs[factor].milliseconds, "") if factor in runs else (None, _left_out(runs))
 
 
-def _of_budget(engine: str, factor: int, number: Callable[[dict[int, RollOut], str], Answer]) -> Measurement:
-    """Evaluate a number of the engine's ladder and its remark, where the ladder has that budget."""
-
-    def measure(found: Engine) -> Answer:
-        runs, remark = ladder(engine)
-        if factor not in runs:
-            return None, f"nothing moved any more at {max(runs)} times the default"
-        return number(runs, remark)
-
-    return measurement(engine, measure)
+def _left_out(runs: dict[int, RollOut]) -> str:
+    return f"nothing moved any more at {max(runs)} times the default"
 
 
-def converged_budget(engine: str) -> Measurement:
+@measured
+def converged_budget(engine: Engine) -> Answer:
     """Return the least multiple of the default budget that is within CONVERGED of the engine's limit."""
-
-    def measure(found: Engine) -> Answer:
-        runs, remark = ladder(engine)
-        factor = _within(runs, CONVERGED)
-        return factor, remark if factor is not None else f"no budget is within {CONVERGED:g} %{remark}"
-
-    return measurement(engine, measure)
+    runs, remark = ladder(engine.name)
+    factor = _within(runs, CONVERGED)
+    return factor, remark if factor is not None else f"no budget is within {CONVERGED:g} %{remark}"
 
 
-def last_move(engine: str) -> Measurement:
+@measured
+def last_move(engine: Engine) -> Answer:
     """Return how far the last fourfold budget still moved the hanging sheet [%]."""
-
-    def measure(found: Engine) -> Answer:
-        runs, remark = ladder(engine)
-        *_, before, last = sorted(runs)
-        return laws.distance(runs[before], runs[last]), remark
-
-    return measurement(engine, measure)
+    runs, remark = ladder(engine.name)
+    *_, before, last = sorted(runs)
+    return laws.distance(runs[before], runs[last]), remark
 
 
-def reference_milliseconds(engine: str) -> Measurement:
+@measured
+def reference_milliseconds(engine: Engine) -> Answer:
     """Return the time of a frame by the reference, where it is as near its own limit as CONVERGED [ms].
 
     Of an engine that iterates more: the reference takes the engine's time step, and fewer iterations of
     Newton's method. Of one that takes smaller steps: the reference takes smaller steps.
     """
-
-    def measure(found: Engine) -> Answer:
-        runs = reference_ladder(found)
-        count = _within(runs, CONVERGED)
-        if count is None:
-            return None, f"the reference is not within {CONVERGED:g} % at {sorted(runs)[-2]} steps a frame"
-        what = "iterations a step" if found.grows == ITERATIONS else "steps a frame"
-        return runs[count].milliseconds, f"{count} {what}"
-
-    return measurement(engine, measure)
+    iterates = engine.grows == ITERATIONS
+    runs = reference_ladder(engine.substeps if iterates else None)
+    count = _within(runs, CONVERGED)
+    if count is None:
+        return None, f"the reference is not within {CONVERGED:g} % at {sorted(runs)[-2]} steps a frame"
+    return runs[count].milliseconds, f"{count} {'iterations a step' if iterates else 'steps a frame'}"
 
 
 @cache
@@ -116,29 +119,20 @@ def ladder(engine: str) -> tuple[dict[int, RollOut], str]:
     return runs, f"its last two budgets differ by {moved:.2g} %, so its limit is not reached"
 
 
-def reference_ladder(engine: Engine) -> dict[int, RollOut]:
-    """Return iterations or sub-steps -> roll-out of the hanging sheet by the reference."""
-    if engine.grows == ITERATIONS:
-        return _reference_iterations(engine.substeps)
-    return _reference_substeps()
-
-
 @cache
-def _reference_iterations(substeps: int) -> dict[int, RollOut]:
-    runs: dict[int, RollOut] = {}
-    for count in (*REFERENCE_ITERATIONS, REFERENCE.iterations):
-        runs[count] = _reference(substeps, count)
-    return runs
+def reference_ladder(substeps: int | None) -> dict[int, RollOut]:
+    """Return budget -> roll-out of the hanging sheet by the reference.
 
-
-@cache
-def _reference_substeps() -> dict[int, RollOut]:
-    return {count: _reference(count, REFERENCE.iterations) for count in REFERENCE_SUBSTEPS}
-
-
-def _reference(substeps: int, iterations: int) -> RollOut:
-    engine = dataclasses.replace(REFERENCE, substeps=substeps, iterations=iterations)
-    return roll_out(engine, specimen("hanging"))
+    The budget is iterations of steps of which `substeps` make a frame; where it is None, sub-steps.
+    """
+    if substeps is None:
+        budgets = {count: (count, REFERENCE.iterations) for count in REFERENCE_SUBSTEPS}
+    else:
+        budgets = {count: (substeps, count) for count in (*REFERENCE_ITERATIONS, REFERENCE.iterations)}
+    return {
+        count: roll_out(replace(REFERENCE, substeps=steps, iterations=iterations), specimen("hanging"))
+        for count, (steps, iterations) in budgets.items()
+    }
 
 
 def _within(runs: dict[int, RollOut], percent: float) -> int | None:
@@ -153,16 +147,3 @@ def _within(runs: dict[int, RollOut], percent: float) -> int | None:
             break
         least = budget
     return least
-
-
-def measurement(engine: str, measure: Callable[[Engine], Answer]) -> Measurement:
-    """Measure, or say why not: an absent engine is skipped, one that diverges says so."""
-    found = find_engine(engine)
-    if found.absent:
-        return Measurement(value=None, status="skipped", reason=found.absent)
-    try:
-        value, remark = measure(found)
-    except EngineDiverged as error:
-        return Measurement(value=None, status="diverged", reason=f"{found.version}; {error}")
-    reason = "; ".join(filter(None, [found.version, found.settings, remark]))
-    return Measurement(value=value, status="skipped" if value is None else "ok", reason=reason)
