@@ -32,11 +32,3 @@ class DeadLoad(Energy):
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the energy [J] and its gradient -f (V, 3) [N]."""
         return -float(np.vdot(self.forces, x)), -self.forces
-
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return zeros (V, 3, 3)."""
-        return np.zeros((len(self.stencils), 3, 3))
-
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return no block: the energy is linear."""
-        return np.arange(0), np.zeros((0, 3, 3))

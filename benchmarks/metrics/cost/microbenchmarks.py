@@ -22,8 +22,8 @@ def _metric(name: str, unit: str, title: str, definition: str, lower_is_better: 
     )
 
 
-def _clocked(name: str, unit: str, title: str, definition: str, lower_is_better: bool = True) -> Metric:
-    return replace(_metric(name, unit, title, definition, lower_is_better), of="machine")
+def _clocked(name: str, unit: str, title: str, definition: str) -> Metric:
+    return replace(_metric(name, unit, title, definition), of="machine")
 
 
 def _size(name: str, title: str, definition: str) -> Metric:

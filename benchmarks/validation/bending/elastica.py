@@ -7,6 +7,7 @@ shape at large ones; the spread of D over the families is a number of its own, t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -70,24 +71,14 @@ def slenderness(gamma: float, columns: int) -> float:
     return float((ours[1] / ours[0]) / (exact[1] / exact[0]))
 
 
-def heavy(gamma: float) -> float:
-    """Return the tip's distance to the elastica under weight, over its length, worst of four families."""
-    return max(_tip_distance(family, gamma, 0.0) for family in SYMMETRIC)
+def tip_distance(weight: float = 0.0, load: float = 0.0, families: Sequence[str] = SYMMETRIC) -> float:
+    """Return the tip's distance to the elastica, over its length, worst of the families.
 
-
-def end_loaded(load: float) -> float:
-    """Return the distance of the tip to the elastica's under a force at the end, worst of four families."""
-    return max(_tip_distance(family, 0.0, load) for family in SYMMETRIC)
-
-
-def one_sided_diagonals(gamma: float) -> float:
-    """Return the tip's distance where all diagonals lean one way: such a strip twists, no elastica."""
-    return _tip_distance("right", gamma, 0.0)
-
-
-def _tip_distance(family: str, weight: float, load: float) -> float:
-    ours, exact = bent_strip(family, weight, load)
-    return float(np.linalg.norm(ours - exact))
+    It bends under a weight, Gamma, or under a force at the end. Where all diagonals lean one way, as in
+    family "right", the strip twists and is no elastica.
+    """
+    bent = (bent_strip(family, weight, load) for family in families)
+    return max(float(np.linalg.norm(ours - exact)) for ours, exact in bent)
 
 
 def stiffness_spread(scaling: str) -> float:

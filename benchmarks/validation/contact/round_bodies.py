@@ -32,6 +32,7 @@ START = 0.3  # [rad] from the top
 HARD = 1e11  # [J/m^5] of the sphere, so that the point never lags behind its resting depth
 DRUM = 0.2  # [m] radius of the cylinder
 SLACK = 0.1  # [m] of each end of the strip below the axis
+PULL = 2.0  # [N/m] at its ends, about, so that it never hangs slack
 
 
 class RoundBody:
@@ -122,39 +123,38 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
     Without friction only weight changes the tension N along the strip: dN/ds = w dy/ds, and an arc of radius
     R under tension N presses with N/R + w cos phi, where phi is the angle from the top.
     """
-    # A hundred times stiffer than cotton: the strip keeps its length, the exact formulas need no stretch.
-    material = Material(young_modulus=7e6, poisson_ratio=0.0)
-    weight = material.areal_density * GRAVITY
-    pull, columns = 2.0, 120  # [N/m] at the ends, about, so that the strip never hangs slack
-    contact_depth = np.sqrt(pull / DRUM / (3 * DEFAULT_STIFFNESS))
-    radius = DRUM + DEFAULT_MARGIN - contact_depth
-    length = np.pi * radius + 2 * SLACK
-    width = 2 * length / columns
-    points, faces = right_grid(2, columns, width, length)
-    rest = in_space(points)[:, [0, 2, 1]]
-    ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > length - 1e-9))
-    cloth = Cloth(rest, faces[:, ::-1], material, pins=ends)
-    start = wrapped(rest, radius, length, 1 + pull / material.membrane_modulus)
+    cloth, points, x = strip_over_drum(120, DEFAULT_STIFFNESS)
     contact = ContactPenalty(cloth, samples="vertices")
     potential = Potential([StretchStVK(cloth), Gravity(cloth), contact])
-    x, body = start, RoundBody(DRUM, axis=2)
+    body = RoundBody(DRUM, axis=2)
     for _ in range(6):  # the planes follow the strip until both agree
         still: Any = Step(previous=x, velocity=np.zeros_like(x), guess=x, dt=1 / 30, obstacle=body)  # type: ignore[arg-type]
         contact.prepare(still)
         result = minimise(potential, x, tolerance=1e-9)
         x = result.positions
     demand_converged(result, "the strip")
-    return _profiles(cloth, contact, x, points, weight)
+    return _profiles(cloth, contact, x, points, cloth.material.areal_density * GRAVITY)
 
 
-def wrapped(rest: np.ndarray, radius: float, length: float, stretch: float) -> np.ndarray:
-    """Return the strip on a circle of `radius` about z, both ends hanging straight down."""
-    s = (rest[:, 0] - length / 2) * stretch
+def strip_over_drum(columns: int, stiffness: float) -> tuple[Cloth, np.ndarray, np.ndarray]:
+    """Return a strip held at both ends, its points in the plane (V,2), and on the drum (V,3) [m].
+
+    It is pulled by PULL, and its ends hang straight down. stiffness: of contact [J/m^5], by which it lies in
+    the margin. The strip is a hundred times stiffer than cotton: it keeps its length, and the exact formulas
+    need no stretch.
+    """
+    material = Material(young_modulus=7e6, poisson_ratio=0.0)
+    radius = DRUM + DEFAULT_MARGIN - np.sqrt(PULL / DRUM / (3 * stiffness))
+    length = np.pi * radius + 2 * SLACK
+    points, faces = right_grid(2, columns, 2 * length / columns, length)
+    rest = in_space(points)[:, [0, 2, 1]]
+    ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > length - 1e-9))
+    s = (rest[:, 0] - length / 2) * (1 + PULL / material.membrane_modulus)
     angle = np.clip(s / radius, -np.pi / 2, np.pi / 2)
     below = np.abs(s) - np.pi / 2 * radius
     x = np.stack([radius * np.sin(angle), radius * np.cos(angle), rest[:, 2]], axis=1)
     x[:, 1] -= np.maximum(below, 0.0)
-    return x
+    return Cloth(rest, faces[:, ::-1], material, pins=ends), points, x
 
 
 def _profiles(

@@ -14,7 +14,6 @@ from benchmarks.scenes import hanging_sheet
 from benchmarks.validation.convergence import demand_converged
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
@@ -158,31 +157,21 @@ def _thrown_sheet() -> tuple[Trajectory, Cloth]:
     return demand_converged(trajectory, "the simulation"), cloth
 
 
-def unique_step() -> float:
-    """Return the largest distance [m] of one step from two random starts, under the convexity bound.
+def step_distance(share: float | None) -> float:
+    """Return the largest distance [m] of the ends of one step, thrown into disorder, from two far guesses.
 
     The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter than
     h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
+
+    Args:
+        share: of that bound; None: the step is 1/30 s, far above it, where two valid solvers may differ.
     """
-    first, second = _step_from_random_starts(0.9)
-    return float(np.linalg.norm(first - second, axis=1).max())
-
-
-def ambiguous_step() -> float:
-    """Return that distance [m] at 1/30 s, far above the bound: how much two valid solvers may differ."""
     material = Material()
     bound = SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
-    first, second = _step_from_random_starts(DT / bound)
-    return float(np.linalg.norm(first - second, axis=1).max())
-
-
-def _step_from_random_starts(share: float) -> list[np.ndarray]:
-    """Return ends of one step of `share` times the bound, thrown into disorder, from two far guesses."""
-    material = Material()
+    dt = DT if share is None else share * bound
     cells = 12
     points, faces = right_grid(cells, cells, cells * SPACING, cells * SPACING)
     cloth = Cloth(in_space(points), faces, material)
-    dt = share * SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
     inertia = Inertia(cloth, dt)
     random = np.random.default_rng(5)
     inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
@@ -191,7 +180,7 @@ def _step_from_random_starts(share: float) -> list[np.ndarray]:
     for _ in range(2):
         start = random.uniform(-SPACING * cells, SPACING * cells, cloth.rest_positions.shape)
         ends.append(demand_converged(minimise(potential, start, tolerance=1e-12), "the step").positions)
-    return ends
+    return float(np.linalg.norm(ends[0] - ends[1], axis=1).max())
 
 
 def energy_inequality() -> float:
@@ -202,17 +191,12 @@ def energy_inequality() -> float:
     """
     scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10)
     trajectory = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=20, start=scene.start)
-    demand_converged(trajectory, "the simulation")
-    return _largest_rise(trajectory, scene.cloth, scene.energies, scene.dt)
-
-
-def _largest_rise(trajectory: Trajectory, cloth: Cloth, energies: tuple[Energy, ...], dt: float) -> float:
-    potential = Potential(energies)
-    x = trajectory.positions
+    x, masses = demand_converged(trajectory, "the simulation").positions, scene.cloth.masses
+    potential = Potential(scene.energies)
     phi = np.array([potential.value(frame) for frame in x])
-    v = np.concatenate([np.zeros_like(x[:1]), np.diff(x, axis=0) / dt])
-    kinetic = 0.5 * np.einsum("v,tvi,tvi->t", cloth.masses, v, v)
+    v = np.concatenate([np.zeros_like(x[:1]), np.diff(x, axis=0) / scene.dt])
+    kinetic = 0.5 * np.einsum("v,tvi,tvi->t", masses, v, v)
     change = np.diff(v, axis=0)
-    lost = 0.5 * np.einsum("v,tvi,tvi->t", cloth.masses, change, change)
+    lost = 0.5 * np.einsum("v,tvi,tvi->t", masses, change, change)
     rise = phi[1:] + lost - phi[:-1] - kinetic[:-1]
     return float(np.maximum(rise, 0.0).max() / kinetic.max())

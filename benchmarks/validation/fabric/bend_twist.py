@@ -78,32 +78,24 @@ def critical_gamma(curvature: float, stiffness_ratio: float, clamp: float = 0.0)
     return 1 / largest if largest > 1e-9 else np.inf
 
 
-def hanging_arc(curvature: float, slender: float = 0.02) -> float:
-    """Return the weight at which a simulated arc gives way, over that of the rod.
-
-    Args:
-        curvature: kappa L.
-        slender: width over length.
+def hanging_arc(curvature: float) -> float:
+    """Return the weight at which a simulated arc gives way, over that of the rod, by its kappa L.
 
     The free edges lack half a hinge, an error of first order in the cell: two meshes are extrapolated.
     """
-    coarse, fine = (_ratio(rows, curvature, slender) for rows in ROWS)
+    cloths = (arc(rows, curvature, 0.02) for rows in ROWS)
+    coarse, fine = (buckling_factor(cloth, _weight(cloth, curvature)) for cloth in cloths)
     return 2 * fine - coarse
 
 
-def _ratio(rows: int, curvature: float, slender: float) -> float:
-    cloth = arc(rows, curvature, slender)
-    return buckling_factor(cloth, _weight(cloth, curvature))
-
-
-def leaves_plane(curvature: float, slender: float = 0.04) -> float:
+def leaves_plane(curvature: float) -> float:
     """Return the weight from which on the minimiser takes an arc out of its plane, over that of its mesh.
 
     That of the mesh is where its tangent stiffness becomes singular; both sides of it are minimised.
 
     Raises RuntimeError where an arc does not come to rest.
     """
-    cloth = arc(ROWS[0], curvature, slender)
+    cloth = arc(ROWS[0], curvature, 0.04)
     weight = _weight(cloth, curvature)
     weight *= buckling_factor(cloth, weight)
     start = cloth.rest_positions.copy()
@@ -129,7 +121,10 @@ def _weight(cloth: Cloth, curvature: float) -> np.ndarray:
 
 
 def arc(rows: int, curvature: float, slender: float) -> Cloth:
-    """Return an arc of length 1 m in the plane z = 0, clamped at the origin and heading downwards there."""
+    """Return an arc of length 1 m in the plane z = 0, clamped at the origin and heading downwards there.
+
+    slender: its width over its length.
+    """
     columns = round(rows * ROW / slender)
     h = 1 / (columns - 0.5)  # the clamp lies half-way between the two pinned columns
     points, faces = rectangle("equilateral", columns, rows, columns * h, rows * h * ROW)

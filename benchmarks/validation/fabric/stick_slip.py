@@ -33,6 +33,7 @@ from reference_sim.potential import Potential
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory.trajectory import Trajectory
 
+COLUMNS = 60  # cells along the strip
 CLAMPED_AND_HINGED = 4.4934  # tan k = k: the column's buckling load is k^2 D / L^2
 HARD = 3.4e8  # [J/m^5]: the tip stands less than 1e-4 m deep in the margin
 DT = 100.0  # [s]: inertia is nothing
@@ -75,20 +76,20 @@ def critical_strain(mu: float) -> float:
     return float(brentq(lambda strain: critical_friction(strain) - mu, 0.01, 0.3, xtol=1e-8))
 
 
-def force_ratio(strain: float, columns: int = 60) -> float:
+def force_ratio(strain: float) -> float:
     """Return |T| / N of a simulated strip that sticks, over the elastica's."""
-    pressed = Pressed(columns)
+    pressed = Pressed()
     x = demand_converged(pressed.lowered(strain, 2 * critical_friction(strain), 4), "the strip").positions[-1]
     aside, normal = pressed.floor_force(x)
     return float(abs(aside / normal) / critical_friction(pressed.strain(x)))
 
 
-def breaking_loose(mu: float, columns: int = 60) -> float:
+def breaking_loose(mu: float) -> float:
     """Return the strain at which a simulated strip breaks loose, over the elastica's.
 
     Raises RuntimeError where it does not, or a step before does not converge.
     """
-    pressed, critical = Pressed(columns), critical_strain(mu)
+    pressed, critical = Pressed(), critical_strain(mu)
     frames = round(0.12 * critical / STEP)
     moved = pressed.lowered(critical - STEP * 0.85 * frames, mu, frames, STEP)
     tips = moved.positions[:, pressed.strip.tip, 0].mean(axis=1)
@@ -101,8 +102,8 @@ def breaking_loose(mu: float, columns: int = 60) -> float:
 class Pressed:
     """Strip of 1 m upright over a floor, in the plane z = 0."""
 
-    def __init__(self, columns: int) -> None:
-        self.strip: Strip = clamped_strip(FAMILY, columns, 1.0, MATERIAL)
+    def __init__(self) -> None:
+        self.strip: Strip = clamped_strip(FAMILY, COLUMNS, 1.0, MATERIAL)
         self.energies = [StretchStVK(self.strip.cloth), BendHinge(self.strip.cloth)]
 
     def lowered(self, strain: float, mu: float, frames: int, step: float = 0.0) -> Trajectory:

@@ -16,19 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.meshes import in_space, right_grid
-from benchmarks.validation.contact.round_bodies import DRUM, SLACK, RoundBody, wrapped
+from benchmarks.validation.contact.round_bodies import DRUM, RoundBody, strip_over_drum
 from benchmarks.validation.convergence import demand_converged, fitted_order
-from reference_sim.cloth import Cloth
 from reference_sim.energies.contact_friction import ContactFriction
-from reference_sim.energies.contact_penalty.definition import DEFAULT_MARGIN, ContactPenalty
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
-from reference_sim.material import Material
 from reference_sim.obstacle import Planes
 from reference_sim.time_loop import simulate
 
 HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep in the margin as on a body
-PULL = 2.0  # [N/m], about
 TURN = 0.02  # [rad] of the drum in a step
 
 
@@ -69,13 +65,8 @@ def order() -> float:
 
 def _excess(mu: float, stiffness: float, columns: int) -> float:
     """Return the logarithm of the ratio of the pulls, less mu times the angle from first to last cell."""
-    material = Material(young_modulus=7e6, poisson_ratio=0.0)  # stiff: exact formulas need no stretch
-    radius = DRUM + DEFAULT_MARGIN - np.sqrt(PULL / DRUM / (3 * stiffness))
-    length = np.pi * radius + 2 * SLACK
-    points, faces = right_grid(2, columns, 2 * length / columns, length)
-    rest = in_space(points)[:, [0, 2, 1]]
-    left, right = points[:, 0] < 1e-9, points[:, 0] > length - 1e-9
-    cloth = Cloth(rest, faces[:, ::-1], material, pins=np.flatnonzero(left | right))
+    cloth, points, start = strip_over_drum(columns, stiffness)
+    ends = points[:, 0] < 1e-9, points[:, 0] > points[:, 0].max() - 1e-9
     contact = ContactPenalty(cloth, samples="vertices", stiffness=stiffness)
     friction = ContactFriction(contact, coefficient=mu, speed=1e-3 * DRUM * TURN)
     body: Any = TurningDrum(DRUM, TURN)
@@ -85,14 +76,14 @@ def _excess(mu: float, stiffness: float, columns: int) -> float:
         dt=1.0,
         frames=40,
         obstacle=body,
-        start=wrapped(rest, radius, length, 1 + PULL / material.membrane_modulus),
+        start=start,
         guess="previous",
         quasi_static=True,
         tolerance=1e-9,
     )
     x = demand_converged(trajectory, "the strip").positions[-1]
     strain = StretchStVK(cloth).value_and_gradient(x)[1]
-    pulls = [float(np.linalg.norm(strain[end].sum(axis=0))) for end in (left, right)]
+    pulls = [float(np.linalg.norm(strain[end].sum(axis=0))) for end in ends]
     line = x.reshape(3, columns + 1, 3).mean(axis=0)
     first, last = line[1] - line[0], line[-1] - line[-2]
     wrap = np.arccos(first @ last / np.linalg.norm(first) / np.linalg.norm(last))

@@ -26,18 +26,13 @@ CELLS = 32
 GOLD_CELLS = 24
 
 
-def force() -> tuple[float, float]:
-    """Return the pull on a clamp [N], ours and theirs."""
-    return _ours()[0], _gold()[0]
-
-
-def neck() -> tuple[float, float]:
-    """Return the width [m] half-way between the clamps, ours and theirs."""
-    return _ours()[1], _gold()[1]
+def stretched(what: str) -> tuple[float, float]:
+    """Return the "force" [N] on a clamp, or the width [m] of the "neck" half-way, ours and theirs."""
+    return _ours()[what], _gold()[what]
 
 
 @cache
-def _ours() -> tuple[float, float]:
+def _ours() -> dict[str, float]:
     points, faces = jittered_patch(CELLS)
     clamps = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
     cloth = Cloth(in_space(points), faces, MATERIAL, pins=np.flatnonzero(clamps))
@@ -46,12 +41,11 @@ def _ours() -> tuple[float, float]:
     result = demand_converged(minimise(potential, stretched, tolerance=1e-9), "the sheet")
     pull = potential.gradient(result.positions)[points[:, 0] > 1 - 1e-9, 0].sum()
     middle = (np.abs(points[:, 0] - 0.5) < 1e-9) & (np.abs(points[:, 1] - 0.5) > 0.5 - 1e-9)
-    return float(pull), float(np.ptp(result.positions[middle, 1]))
+    return {"force": float(pull), "neck": float(np.ptp(result.positions[middle, 1]))}
 
 
 @cache
-def _gold() -> tuple[float, float]:
-
+def _gold() -> dict[str, float]:
     lam, mu = MATERIAL.lame_lambda, MATERIAL.lame_mu
     # Graded towards the corners of the clamps, where the stress is singular.
     line = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, GOLD_CELLS + 1))
@@ -94,4 +88,4 @@ def _gold() -> tuple[float, float]:
     pulled = basis.get_dofs(lambda X: np.isclose(X[0], 1)).all(["u^1"])
     middle = np.flatnonzero(np.abs(mesh.p[0] - 0.5) < 1e-9)
     heights = x[basis.nodal_dofs[1, middle]]
-    return float(r[pulled].sum()), float(np.ptp(heights))
+    return {"force": float(r[pulled].sum()), "neck": float(np.ptp(heights))}

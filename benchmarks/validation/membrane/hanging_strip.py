@@ -56,8 +56,8 @@ def _hanging(rows: int) -> float:
     return float(-x[points[:, 1] < -1 + 1e-9, 1].mean())
 
 
-def exact_catenary() -> tuple[float, float]:
-    """Return the horizontal force per width [N/m] and the sag [m] of the elastic catenary.
+def exact_catenary() -> dict[str, float]:
+    """Return the horizontal "force" per width on an end [N/m] and the "sag" [m] of the elastic catenary.
 
     X is measured from the lowest point.
     """
@@ -70,26 +70,21 @@ def exact_catenary() -> tuple[float, float]:
         return quad(share, 0, 0.5, epsabs=1e-13)[0]
 
     force = brentq(lambda H: 2 * over_half(H, False) - SPAN, 0.01, 10.0, xtol=1e-14)
-    return force, over_half(force, True)
+    return {"force": force, "sag": over_half(force, True)}
 
 
-def catenary_sag() -> tuple[float, float]:
-    """Return the depth [m] of the middle below the ends, measured and exact."""
-    return _catenary(ROWS[-1])[1], exact_catenary()[1]
-
-
-def catenary_force() -> tuple[float, float]:
-    """Return the horizontal force per width on an end [N/m], measured and exact."""
-    return _catenary(ROWS[-1])[0], exact_catenary()[0]
+def catenary(what: str) -> tuple[float, float]:
+    """Return the "force" [N/m] or the "sag" [m] of the catenary, measured and exact."""
+    return _catenary(ROWS[-1])[what], exact_catenary()[what]
 
 
 def catenary_order() -> float:
     """Return the order at which the sag converges."""
-    exact = exact_catenary()[1]
-    return fitted_order([abs(_catenary(rows)[1] - exact) for rows in ROWS], [1 / rows for rows in ROWS])
+    exact = exact_catenary()["sag"]
+    return fitted_order([abs(_catenary(rows)["sag"] - exact) for rows in ROWS], [1 / rows for rows in ROWS])
 
 
-def _catenary(columns: int) -> tuple[float, float]:
+def _catenary(columns: int) -> dict[str, float]:
     width = 2.0 / columns
     points, faces = right_grid(2, columns, width, 1.0)
     rest = in_space(points)[:, [0, 2, 1]]
@@ -101,7 +96,7 @@ def _catenary(columns: int) -> tuple[float, float]:
     left = points[:, 0] < 1e-9
     middle = np.abs(points[:, 0] - 0.5) < 1e-9
     force = -potential.gradient(x)[left, 0].sum() / width
-    return float(force), float(-x[middle, 1].mean())
+    return {"force": float(force), "sag": float(-x[middle, 1].mean())}
 
 
 def _at_rest(cloth: Cloth, start: np.ndarray) -> tuple[Potential, np.ndarray]:

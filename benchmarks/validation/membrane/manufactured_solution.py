@@ -46,19 +46,13 @@ def gradient(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     )
 
 
-def mean_square_order() -> float:
-    """Return the order of the error of positions in the mean square."""
-    return fitted_order([_errors(cells)[0] for cells in CELLS], [1 / cells for cells in CELLS])
-
-
-def gradient_order() -> float:
-    """Return the order of the error of the deformation gradient in the mean square."""
-    return fitted_order([_errors(cells)[1] for cells in CELLS], [1 / cells for cells in CELLS])
+def order(of: str) -> float:
+    """Return the order of the error of "positions", or of the deformation "gradient", in the mean square."""
+    return fitted_order([_errors(cells)[of] for cells in CELLS], [1 / cells for cells in CELLS])
 
 
 @cache
-def _errors(cells: int) -> tuple[float, float]:
-
+def _errors(cells: int) -> dict[str, float]:
     material = Material()
     lam, mu = material.lame_lambda, material.lame_mu
     points, faces = jittered_patch(cells)
@@ -88,6 +82,5 @@ def _errors(cells: int) -> tuple[float, float]:
     state = np.zeros(basis.N)
     state[numbers.ravel()] = result.positions.ravel()
     field = basis.interpolate(state)
-    squares = (form.assemble(basis, field=field) for form in (position_error, gradient_error))
-    position, slope = (float(np.sqrt(square)) for square in squares)
-    return position, slope
+    forms = {"positions": position_error, "gradient": gradient_error}
+    return {name: float(np.sqrt(form.assemble(basis, field=field))) for name, form in forms.items()}

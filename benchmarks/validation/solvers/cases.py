@@ -7,7 +7,7 @@ from benchmarks.validation.case import known_answer
 DERIVATIVES = tuple(
     known_answer(f"{kind}_of_{term}",
         f"{kind} of the term {term} beside differences of {of}, relative error",
-        "solvers.derivatives", f"{kind}_error", options={"term": term}, expected=0.0, tolerance=1e-7,
+        "solvers.derivatives", "error", options={"kind": kind, "term": term}, expected=0.0, tolerance=1e-7,
         reason="round-off over a step of 1e-3, and its fourth power")
     for kind, of in (("gradient", "the energy"), ("hessian", "the gradient"))
     for term in ("strain", "spring", "bending", "gravity", "inertia", "collision", "area_barrier")

@@ -18,6 +18,7 @@ import torch
 from benchmarks.validation.case import Measurement
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.energy import Energy
+from reference_sim.geometry.topology import corner_areas
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
@@ -145,17 +146,10 @@ def undetermined_energy(potential: Potential, x: np.ndarray) -> float:
     """
     corner = x[potential.cloth.faces]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    area = areas(potential, x)
+    area = corner_areas(corner)
     round_off = ANGLE_ROUND_OFF * np.finfo(float).eps * np.abs(x).max()
     share = np.divide(round_off * longest, 2.0 * area, out=np.ones(len(area)), where=area > 0.0)
     return float((collapse_energies(potential)[1] * np.minimum(share, 1.0)).sum())
-
-
-def areas(potential: Potential, x: np.ndarray) -> np.ndarray:
-    """Return the areas (F,) [m^2] of the triangles at x (V, 3)."""
-    corner = x[potential.cloth.faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return 0.5 * np.linalg.norm(normal, axis=1)
 
 
 def collapse_reason(potential: Potential, x: np.ndarray) -> str:
@@ -167,7 +161,8 @@ def collapse_reason(potential: Potential, x: np.ndarray) -> str:
     names = [energy.name for energy in potential.energies]
     if "bending" not in names:
         return ""
-    lost = int((areas(potential, x) < COLLAPSED * potential.cloth.areas).sum())
+    cloth = potential.cloth
+    lost = int((corner_areas(x[cloth.faces]) < COLLAPSED * cloth.areas).sum())
     text = ""
     if lost:
         plural = "s have" if lost > 1 else " has"

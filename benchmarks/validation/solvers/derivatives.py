@@ -24,26 +24,16 @@ STEP = 1e-3  # times a random direction of some hundredths of a metre
 WEIGHTS = np.array([1, -8, 8, -1]) / 12  # at -2, -1, 1 and 2 steps
 
 
-def gradient_error(term: str) -> float:
-    """Return the largest relative error of the slope of the energy along random directions."""
+def error(kind: str, term: str) -> float:
+    """Return the largest relative error of the "gradient" or the "hessian" along random directions."""
     energy, x = _in_disorder(term)
+    claimed = Potential([energy]).hessian(x) if kind == "hessian" else energy.value_and_gradient(x)[1].ravel()
+    of = 1 if kind == "hessian" else 0  # differences are of the gradient, or of the energy
 
-    def value(at: np.ndarray) -> np.ndarray:
-        return np.array(energy.value_and_gradient(at)[0])
+    def differentiated(at: np.ndarray) -> np.ndarray:
+        return np.ravel(energy.value_and_gradient(at)[of])
 
-    gradient = energy.value_and_gradient(x)[1]
-    return max(_error(value, x, d, np.vdot(gradient, d)) for d in _directions(x))
-
-
-def hessian_error(term: str) -> float:
-    """Return the largest relative error of the change of the gradient along random directions."""
-    energy, x = _in_disorder(term)
-
-    def force(at: np.ndarray) -> np.ndarray:
-        return energy.value_and_gradient(at)[1].ravel()
-
-    hessian = Potential([energy]).hessian(x)
-    return max(_error(force, x, d, hessian @ d.ravel()) for d in _directions(x))
+    return max(_error(differentiated, x, d, claimed @ d.ravel()) for d in _directions(x))
 
 
 def _error(
