@@ -6,11 +6,10 @@ curvature from all eigenvalues of the dense Hessian. A claim that does not hold 
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import torch
@@ -34,6 +33,8 @@ TIMEOUT = 20.0  # [s] that the solver gives itself
 COLLAPSED = 1e-3  # share of its area below which a triangle has collapsed
 STATUS = {"converged": "ok", "max_iterations": "stalled"}
 
+lbfgs_then_newton = partial(minimise, method="lbfgs")  # as the simulator minimises
+
 
 @dataclass(frozen=True)
 class StressStep:
@@ -54,24 +55,20 @@ class CheckedResult(Measurement):
 
     iterations: int
 
-    @property
-    def counted(self) -> Measurement:
-        """The same row with the number of iterations as its value."""
-        return dataclasses.replace(self, value=float(self.iterations))
 
+def solve_and_check(
+    step: StressStep, solve: Callable[..., Result] = minimise, *, counted: bool = False
+) -> CheckedResult:
+    """Minimise, keep the points on the way, and check the result.
 
-def solve_and_check(step: StressStep, solve: Callable[..., Result] = minimise) -> CheckedResult:
-    """Minimise, keep the points on the way, and check the result."""
+    counted: the value of the row is the number of iterations.
+    """
     kept: list[np.ndarray] = []
     result = solve(
         step.potential, step.guess, tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT, observe=kept.append
     )
-    return check_result(step, result, kept)
-
-
-def lbfgs_then_newton(potential: Potential, x0: np.ndarray, **options: Any) -> Result:
-    """Minimise as the simulator does: L-BFGS, finished by Newton's method."""
-    return minimise(potential, x0, method="lbfgs", **options)
+    checked = check_result(step, result, kept)
+    return replace(checked, value=float(checked.iterations)) if counted else checked
 
 
 def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = ()) -> CheckedResult:

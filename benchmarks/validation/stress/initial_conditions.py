@@ -43,39 +43,28 @@ def _folded(angle: float) -> Start:
     return start
 
 
-def _pleated(angle: float) -> Start:
-    """Return a start of a row of folds, up and down by turns, each of `angle` [rad] to the horizontal."""
-
-    def start(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        columns = np.round((x[:, 0] / np.ptp(x[:, 0]) + 0.5) * 8)
-        x[:, 1] = 0.05 * np.sin(angle) * (columns % 2)
-        x[:, 0] *= np.cos(angle)
-        return x + random.normal(0, PERTURBATION, x.shape)
-
-    return start
+def pleated(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return a row of folds, up and down by turns, each of 89 degrees to the horizontal, perturbed."""
+    angle = np.deg2rad(89.0)
+    columns = np.round((x[:, 0] / np.ptp(x[:, 0]) + 0.5) * 8)
+    x[:, 1] = 0.05 * np.sin(angle) * (columns % 2)
+    x[:, 0] *= np.cos(angle)
+    return x + random.normal(0, PERTURBATION, x.shape)
 
 
-def _rolled(turns: float) -> Start:
-    """Return a start rolled up tightly around the z axis, through itself."""
-
-    def start(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        angle = 2 * np.pi * turns * x[:, 0] / np.ptp(x[:, 0])
-        radius = np.ptp(x[:, 0]) / (2 * np.pi * turns)
-        x[:, 0], x[:, 1] = radius * np.sin(angle), radius * (1 - np.cos(angle))
-        return x + random.normal(0, PERTURBATION, x.shape)
-
-    return start
+def rolled_up(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return positions rolled up tightly in three turns around the z axis, through itself, perturbed."""
+    angle = 2 * np.pi * 3.0 * x[:, 0] / np.ptp(x[:, 0])
+    radius = np.ptp(x[:, 0]) / (2 * np.pi * 3.0)
+    x[:, 0], x[:, 1] = radius * np.sin(angle), radius * (1 - np.cos(angle))
+    return x + random.normal(0, PERTURBATION, x.shape)
 
 
-def _twisted(turns: float) -> Start:
-    """Return a start turned about the x axis, by more and more along it."""
-
-    def start(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        angle = 2 * np.pi * turns * (x[:, 0] / np.ptp(x[:, 0]) + 0.5)
-        x[:, 1], x[:, 2] = x[:, 2] * np.sin(angle), x[:, 2] * np.cos(angle)
-        return x + random.normal(0, PERTURBATION, x.shape)
-
-    return start
+def twisted(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return positions turned about the x axis, by more and more along it up to two turns, perturbed."""
+    angle = 2 * np.pi * 2.0 * (x[:, 0] / np.ptp(x[:, 0]) + 0.5)
+    x[:, 1], x[:, 2] = x[:, 2] * np.sin(angle), x[:, 2] * np.cos(angle)
+    return x + random.normal(0, PERTURBATION, x.shape)
 
 
 def spike(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -114,9 +103,9 @@ INITIAL_POSITIONS: dict[str, Start] = {
     "line": lambda x, random: x * [1.0, 1.0, 0.0] + random.normal(0, PERTURBATION, x.shape),
     "folded by 180": _folded(np.pi),
     "folded past 180": _folded(np.pi * 1.03),
-    "pleated by 89": _pleated(np.deg2rad(89.0)),
-    "rolled up": _rolled(3.0),
-    "twisted": _twisted(2.0),
+    "pleated by 89": pleated,
+    "rolled up": rolled_up,
+    "twisted": twisted,
     "spike": spike,
     "shuffled": shuffled,
     "collapsed triangle": collapsed_triangle,

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.meshes import sphere, square_sheet
-from benchmarks.validation.case import Measurement
 from benchmarks.validation.solvers.convergence_check import (
     CheckedResult,
     StressStep,
@@ -39,14 +38,9 @@ PINS = {"corners": (0, CELLS), "none": (), "side": tuple(range(CELLS + 1))}
 MARGIN = 4e-3  # [m] of the contact penalty
 
 
-def solve_sheet(**options: Any) -> CheckedResult:
+def solve_sheet(*, counted: bool = False, **options: Any) -> CheckedResult:
     """Solve the step of a sheet as a simulation does, and check it; options: see `sheet_step`."""
-    return solve_and_check(sheet_step(**options), lbfgs_then_newton)
-
-
-def sheet_iterations(**options: Any) -> Measurement:
-    """Solve the step of a sheet; the value of the row is the number of iterations."""
-    return solve_sheet(**options).counted
+    return solve_and_check(sheet_step(**options), lbfgs_then_newton, counted=counted)
 
 
 @cache

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.validation.case import Measurement
 from benchmarks.validation.solvers.convergence_check import (
     CheckedResult,
     StressStep,
@@ -36,14 +35,9 @@ ARMS = 4.0  # [degrees] that both arms go down in an ordinary step
 SHOULDERS = {"left_shoulder": -1.0, "right_shoulder": 1.0}
 
 
-def solve_shirt(**options: Any) -> CheckedResult:
+def solve_shirt(*, counted: bool = False, **options: Any) -> CheckedResult:
     """Solve the step of the shirt as a simulation does, and check it; options: see `shirt_step`."""
-    return solve_and_check(shirt_step(**options), lbfgs_then_newton)
-
-
-def shirt_iterations(**options: Any) -> Measurement:
-    """Solve the step of the shirt; the value of the row is the number of iterations."""
-    return solve_shirt(**options).counted
+    return solve_and_check(shirt_step(**options), lbfgs_then_newton, counted=counted)
 
 
 def shirt_step(

@@ -46,7 +46,7 @@ def test_there_are_enough_cases_and_each_can_be_built():
 
 
 def test_a_point_of_a_map_counts_iterations_and_names_its_place():
-    case = next(case for case in MAPS["map_sheet"] if case.options == {"stiffness": 1.0, "dt": 1 / 30})
+    case = next(case for case in MAPS["map_sheet"] if case.map_point == (1.0, 1 / 30))
     row = case.run()
     assert row.status == "ok" and row.value == solve_and_check(sheet_step(), lbfgs_then_newton).iterations
     assert (row.scene, row.metric, row.unit) == ("map_sheet", "map/1/0.0333", "iterations")
