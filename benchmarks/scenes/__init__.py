@@ -24,41 +24,20 @@ from benchmarks.scene import Scene
 from benchmarks.scenes.textile_tests import TEXTILE_TESTS
 from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 
-SHEET = ("sheet_cells", "sheet_frames")
+
+def _sheet(name: str, description: str, *, obstacle: bool = False) -> Scene:
+    module, sizes = f"benchmarks.scenes.{name}", ("sheet_cells", "sheet_frames")
+    return Scene(name=name, description=description, module=module, sizes=sizes, obstacle=obstacle)
+
 
 SCENES = (
-    Scene(
-        name="hanging_sheet",
-        description="a square sheet pinned at two corners, let go from the horizontal; no obstacle",
-        module="benchmarks.scenes.hanging_sheet",
-        sizes=SHEET,
-    ),
-    Scene(
-        name="sheet_on_sphere",
-        description="a square sheet dropped onto a resting sphere; contact without a body",
-        module="benchmarks.scenes.sheet_on_sphere",
-        sizes=SHEET,
-        obstacle=True,
-    ),
-    Scene(
-        name="flag",
-        description="a flag whose pole is swung to and fro; handles that move, no obstacle",
-        module="benchmarks.scenes.flag",
-        sizes=SHEET,
-    ),
-    Scene(
-        name="twisted_strip",
-        description="a strip whose two ends turn against each other, one turn in all; no obstacle",
-        module="benchmarks.scenes.twisted_strip",
-        sizes=SHEET,
-    ),
-    Scene(
-        name="free_fall",
-        description="a thrown sheet with no pins and its weight alone; the exact answer is known",
-        module="benchmarks.scenes.free_fall",
-        sizes=SHEET,
-    ),
-)
+    _sheet("hanging_sheet", "a square sheet pinned at two corners, let go from the horizontal; no obstacle"),
+    _sheet("sheet_on_sphere", "a square sheet dropped onto a resting sphere; contact without a body",
+           obstacle=True),
+    _sheet("flag", "a flag whose pole is swung to and fro; handles that move, no obstacle"),
+    _sheet("twisted_strip", "a strip whose two ends turn against each other, one turn in all; no obstacle"),
+    _sheet("free_fall", "a thrown sheet with no pins and its weight alone; the exact answer is known"),
+)  # fmt: skip
 FURTHER_SCENES = (
     *OUT_OF_DISTRIBUTION,
     *{scene.name: scene for preset in PRESETS for scene in meshes_and_steps(preset.dependence)}.values(),

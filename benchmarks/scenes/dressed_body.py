@@ -8,7 +8,7 @@ with the positions and velocities that a simulation from the motion's own first 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -55,7 +55,9 @@ def build(
         if before is None:
             return settled(cloth, terms, assets, garment, motion, settle_frames, shape)
         start = settled(cloth, terms, assets, garment, before, settle_frames, shape)
-        return moved_along(cloth, terms, body, garment, before.followed_by(motion.cut(0, 1)), start, shape)
+        way, aim = before.followed_by(motion.cut(0, 1)), "reach the first frame of the clip"
+        x = _simulated(cloth, terms, body, garment, way, start, shape, aim)
+        return np.stack([x[-1], (x[-1] - x[-2]) * way.fps])
 
     def settle_uncrossed() -> np.ndarray:
         return settle(apart())
@@ -66,25 +68,34 @@ def build(
         return with_self_contact(energies)
 
     cloth = garment.cloth()
-    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
     energies = declared_energies(cloth)
-    # Which faces a vertex may touch is a matter of the body that the garment was made for.
-    obstacle = Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped())
-    dressed = Dressed(body, garment, motion, shape, before=before)
-    return BuiltScene(
-        name=scene.name,
+    return worn(
+        scene,
+        assets,
+        Dressed(body, garment, motion, shape, before=before),
         cloth=cloth,
         energies=energies,
-        dt=1.0 / motion.fps,
-        frames=motion.frames,
         settle=settle_uncrossed if scene.self_contact else lambda: settle(energies),
         minimised=apart() if scene.self_contact else (),
         settle_uncrossed=settle_uncrossed,
-        obstacle=obstacle,
+        warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
+    )
+
+
+def worn(scene: Scene, assets: Assets, dressed: Dressed, **further: Any) -> BuiltScene:
+    """Return the scene of a garment on a moving body, with further fields of BuiltScene."""
+    body, garment, motion, shape = dressed.body, dressed.garment, dressed.motion, dressed.betas
+    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
+    return BuiltScene(
+        name=scene.name,
+        dt=1.0 / motion.fps,
+        frames=motion.frames,
+        # Which faces a vertex may touch is a matter of the body that the garment was made for.
+        obstacle=Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped()),
         origin_heights=dressed.pelvis[:, 1],
         dressed=dressed,
-        warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
+        **further,
     )
 
 
@@ -130,24 +141,6 @@ def settled(
         demand_uncrossed(start, energies, f"garment {garment.name}")
     way = replace(motion, poses=poses, translations=translations)
     return _simulated(cloth, energies, body, garment, way, start, betas, "come to rest in the first pose")[-1]
-
-
-def moved_along(
-    cloth: Cloth,
-    energies: tuple[Energy, ...],
-    body: Body,
-    garment: Garment,
-    motion: Motion,
-    start: np.ndarray,
-    betas: np.ndarray | None = None,
-) -> np.ndarray:
-    """Simulate the motion; return positions and velocities (2,V,3) [m, m/s] at its last frame.
-
-    start: (V,3) [m] at rest in the first frame. Raises RuntimeError when the simulation did not stay finite.
-    """
-    aim = "reach the first frame of the clip"
-    positions = _simulated(cloth, energies, body, garment, motion, start, betas, aim)
-    return np.stack([positions[-1], (positions[-1] - positions[-2]) * motion.fps])
 
 
 def _simulated(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import StoredRollOut, read_rest_mesh, read_roll_out
+from benchmarks.external.roll_out_files import read_rest_mesh, read_roll_out
 from benchmarks.external.roll_out_option import RollOutFileError, RollOutOption
 from benchmarks.fingerprint.digest import digest
 from benchmarks.scene import BuiltScene, Scene
@@ -66,7 +66,9 @@ def build(
             )
         cloth = Cloth(to_metres_y_up(rest.positions, units=units, up=up), rest.faces, Material())
         _demand_a_size(cloth.rest_positions, rest_mesh, units)
-        obstacle = _obstacle(stored, units, up)
+        obstacle = None
+        if stored.obstacle is not None and stored.obstacle_faces is not None:  # cloth may touch all of it
+            obstacle = Obstacle(to_metres_y_up(stored.obstacle, units=units, up=up), stored.obstacle_faces)
     except MeshError as error:
         raise RollOutFileError(f"{path} with {rest_mesh}: {error}") from None
     energies: list[Energy] = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
@@ -90,10 +92,3 @@ def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> No
         raise RollOutFileError(
             f"{rest_mesh}: the cloth is {across:.3g} m across in --units {units}: say {' or '.join(fit)}"
         )
-
-
-def _obstacle(stored: StoredRollOut, units: str, up: str) -> Obstacle | None:
-    """Return the obstacle of the file, or None; cloth may touch all of it."""
-    if stored.obstacle is None or stored.obstacle_faces is None:
-        return None
-    return Obstacle(to_metres_y_up(stored.obstacle, units=units, up=up), stored.obstacle_faces)

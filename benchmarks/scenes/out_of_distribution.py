@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.scene import BuiltScene, Dressed, Scene
-from benchmarks.scenes.dressed_body import declared_energies, settled, shape_of
-from reference_sim.obstacle import Obstacle
+from benchmarks.scenes.dressed_body import declared_energies, settled, shape_of, worn
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, transition
@@ -49,7 +48,6 @@ def build(
     changed = {name: factor * getattr(garment.material, name) for name, factor in (material or {}).items()}
     cloth = garment.cloth(replace(garment.material, **changed))
     energies = declared_energies(cloth)
-    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
 
     def settle() -> np.ndarray:
         if shape is None:
@@ -57,19 +55,14 @@ def build(
         root = body.transforms(motion.poses[:1], motion.translations[:1], shape)[0, 0]
         return garment.rest_for(body, shape) @ root[:, :3].T + root[:, 3]
 
-    return BuiltScene(
-        name=scene.name,
+    return worn(
+        scene,
+        assets,
+        Dressed(body, garment, motion, shape),
         cloth=cloth,
         energies=energies,
-        dt=1.0 / motion.fps,
-        frames=motion.frames,
         settle=settle,
-        # Which faces a vertex may touch is a matter of the body that the shirt was made for.
-        obstacle=Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped()),
-        origin_heights=body.joints(shape)[0, 1] + motion.translations[:, 1],
-        dressed=Dressed(body, garment, motion, shape),
         glitch=GLITCH if change in ("root_jumps", "limb_flips") else None,
-        pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )
 
 
