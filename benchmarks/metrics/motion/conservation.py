@@ -152,19 +152,10 @@ def law_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[LawSer
     Args:
         scene: its terms; pins have forces that nobody knows.
         trajectories: positions (T,V,3) [m] each, T at least 3.
-
-    Raises:
-        ValueError: another scene, or a trajectory too short.
     """
     from reference_sim.potential import Potential  # loads numba
 
-    if len(scene.cloth.pins):
-        raise ValueError(f"scene {scene.name}: laws of a cloth with pins need the pins' forces")
-    if scene.substeps > 1:
-        raise ValueError(f"scene {scene.name}: laws of {scene.substeps} steps a frame need all of their ends")
     frames = [len(positions) for positions in trajectories]
-    if frames and min(frames) <= FIRST_FULL_FRAME:
-        raise ValueError(f"scene {scene.name}: a law needs {FIRST_FULL_FRAME + 1} frames, not {min(frames)}")
     potentials = [Potential(copied_terms(scene)) for _ in trajectories]
     # Angular momentum is taken about the pelvis, or the origin where there is no body.
     pivots = np.zeros((scene.frames, 3)) if scene.dressed is None else scene.dressed.pelvis
