@@ -19,7 +19,7 @@ same for every method of a scene. Each method is judged from its own history, wh
 blur: a small gap says that a step was solved, not that the past was right; it does not measure dynamics.
 
 All judged frames are looked at or, of more than the preset's `gap_samples`, as many, evenly spread, as
-bring the standard error of the gap below PRECISION of it, or below LEAST of the scale; that error is the
+bring the standard error of the gap below PRECISION of it, or below NEGLIGIBLE of the scale; that error is the
 uncertainty of its row. Planes are frozen at the frame in the first `gap_samples` of them.
 """
 
@@ -55,6 +55,9 @@ SAME_MINIMUM = 1e-9  # of the scale: minima this near are one
 PRECISION = 0.1  # standard error of the gap, as a share of it
 NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3
+MEANS = (
+    "gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curvature", "gradient/norm",
+)  # fmt: skip
 
 _metric = partial(Metric, lower_is_better=True)
 
@@ -137,17 +140,12 @@ def gap_scale(group: SceneRollOuts) -> float | None:
 class Optimality:
     """Numbers of the sampled frames, of `judged` in all.
 
-    found_by: number of frames whose lowest minimum each found; of equals the first in FINDERS. refrozen: at
-    the first of these frames alone. away: frame -> (V,) [mm] from y_t.
+    values: of each of MEANS, gap/refrozen at the first of these frames alone. found_by: number of frames
+    whose lowest minimum each found; of equals the first in FINDERS. away: frame -> (V,) [mm] from y_t.
     """
 
     judged: int = 0
-    gaps: list[float] = field(default_factory=list)
-    local: list[float] = field(default_factory=list)
-    refrozen: list[float] = field(default_factory=list)
-    distances: list[float] = field(default_factory=list)
-    curvatures: list[float] = field(default_factory=list)
-    gradients: list[float] = field(default_factory=list)
+    values: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in MEANS})
     found_by: dict[str, int] = field(default_factory=lambda: dict.fromkeys(FINDERS, 0))
     away: dict[int, Floats] = field(default_factory=dict)
 
@@ -162,19 +160,14 @@ class Optimality:
 
     def metrics(self) -> dict[str, float | Estimate]:
         """Return gap/*, step/* and gradient/norm; empty without a frame."""
-        if not self.gaps:
+        if not self.values["gap/energy"]:
             return {}
-        means = {
-            "gap/energy": self.gaps, "gap/local": self.local, "gap/refrozen": self.refrozen,
-            "step/distance": self.distances, "step/curvature": self.curvatures,
-            "gradient/norm": self.gradients,
-        }  # fmt: skip
-        estimates: dict[str, float | Estimate] = {name: self.estimate(v) for name, v in means.items() if v}
-        return estimates | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
+        means: dict[str, float | Estimate] = {name: self.estimate(v) for name, v in self.values.items() if v}
+        return means | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
 
     def precise(self, scale: float) -> bool:
         """Return whether the standard error of the gap is small enough."""
-        gap = self.estimate(self.gaps)
+        gap = self.estimate(self.values["gap/energy"])
         return gap.uncertainty <= max(PRECISION * abs(gap.value), NEGLIGIBLE * scale)
 
 
@@ -197,6 +190,7 @@ def optimality(
 
     frames = _judged(scene, positions)
     numbers, potential = Optimality(judged=len(frames)), _potential(scene)
+    values = numbers.values
     minimiser = LBFGS(potential, max_iterations=ITERATIONS)
     inner = ~boundary_mask(scene.cloth.faces, scene.cloth.vertex_count)
     for frame in spread_evenly(frames):
@@ -204,8 +198,8 @@ def optimality(
         guess = freeze_step(scene, potential, positions, frame)
         here, gradient = potential.value_and_gradient(x)
         if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
-            numbers.gaps, numbers.local, numbers.gradients = [np.nan], [np.nan], [np.nan]
-            numbers.refrozen, numbers.distances, numbers.curvatures, numbers.away = [], [], [], {}
+            numbers.values = {name: [np.nan] for name in ("gap/energy", "gap/local", "gradient/norm")}
+            numbers.away = {}
             return numbers
         below = minimiser.minimise(x)
         energies = {"simulator": minimiser.minimise(guess).energy, "from_frame": below.energy, "frame": here}
@@ -213,19 +207,19 @@ def optimality(
         best = min(energy for energy in energies.values() if np.isfinite(energy))
         alike = SAME_MINIMUM * (scale or abs(here))
         numbers.found_by[next(name for name in FINDERS if energies[name] <= best + alike)] += 1
-        numbers.gaps.append(here - best)
-        numbers.local.append(here - min(here, below.energy))
-        numbers.gradients.append(float(np.abs(gradient[scene.cloth.free]).max()) / mean_weight(potential))
+        values["gap/energy"].append(here - best)
+        values["gap/local"].append(here - min(here, below.energy))
+        largest = float(np.abs(gradient[scene.cloth.free]).max())
+        values["gradient/norm"].append(largest / mean_weight(potential))
         y = below.positions
         numbers.away[frame] = MM * np.linalg.norm(x - y, axis=1)
-        numbers.distances.append(float(np.sqrt((numbers.away[frame] ** 2).mean())))
-        numbers.curvatures.append(_curvature_error(x, y, scene.cloth.faces, inner))
-        if scene.obstacle is not None and len(numbers.refrozen) < samples:
+        values["step/distance"].append(float(np.sqrt((numbers.away[frame] ** 2).mean())))
+        values["step/curvature"].append(_curvature_error(x, y, scene.cloth.faces, inner))
+        if scene.obstacle is not None and len(values["gap/refrozen"]) < samples:
             freeze_step(scene, potential, positions, frame, guess=x)
-            numbers.refrozen.append(
-                potential.value(x) - min(potential.value(x), minimiser.minimise(x).energy)
-            )
-        if len(numbers.gaps) >= samples and numbers.precise(scale or 0.0):
+            again = potential.value(x)
+            values["gap/refrozen"].append(again - min(again, minimiser.minimise(x).energy))
+        if len(values["gap/energy"]) >= samples and numbers.precise(scale or 0.0):
             break
     return numbers
 

@@ -210,7 +210,7 @@ def test_every_judged_frame_counts_and_those_of_the_warm_up_do_not():
     x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=9, start=scene.start).positions.copy()
     x[4] += 1e-3
     all_of = optimality(scene, x, samples=99)
-    assert len(all_of.gaps) == 7 and all_of.metrics()["gap/energy"].uncertainty == 0.0
+    assert len(all_of.values["gap/energy"]) == 7 and all_of.metrics()["gap/energy"].uncertainty == 0.0
     import dataclasses
 
     later = dataclasses.replace(scene, warm_up=7)  # frames 4 to 6 feel the moved one; 7 and 8 do not
@@ -230,13 +230,14 @@ def test_frames_are_sampled_evenly_and_until_the_mean_is_known(monkeypatch):
     few = optimality(scene, x, samples=4)
     whole = optimality(scene, x, samples=99)
     known, asked = few.metrics()["gap/energy"], whole.metrics()["gap/energy"]
-    assert 4 <= len(few.gaps) <= len(whole.gaps) == 38 and asked.uncertainty == 0.0
+    gaps, all_gaps = few.values["gap/energy"], whole.values["gap/energy"]
+    assert 4 <= len(gaps) <= len(all_gaps) == 38 and asked.uncertainty == 0.0
     assert known.uncertainty <= module.PRECISION * known.value
     assert abs(known.value - asked.value) <= 4 * known.uncertainty
     monkeypatch.setattr(module, "PRECISION", 10.0)
     rough = optimality(scene, x, samples=4)
-    assert len(rough.gaps) == 4
-    expected = np.std(rough.gaps, ddof=1) * np.sqrt((1 - 4 / 38) / 4)
+    assert len(rough.values["gap/energy"]) == 4
+    expected = np.std(rough.values["gap/energy"], ddof=1) * np.sqrt((1 - 4 / 38) / 4)
     assert rough.metrics()["gap/energy"].uncertainty == pytest.approx(expected)
 
 
@@ -269,7 +270,7 @@ def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypat
     still = np.repeat(scene.start[None], 3, axis=0)
     monkeypatch.setattr(replayed_step, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
     found = optimality(scene, still, samples=1)
-    assert found.gaps[0] >= 0.0 and sum(found.found_by.values()) == 1
+    assert found.values["gap/energy"][0] >= 0.0 and sum(found.found_by.values()) == 1
     nowhere = still.copy()
     nowhere[2] = 1e200
     assert np.isnan(values(optimality(scene, nowhere, samples=1).metrics())["gap/energy"])

@@ -99,8 +99,9 @@ def test_the_simulation_ends_each_step_in_its_minimum_also_where_frames_are_jump
     """Frames are taken from all over the trajectory in turn, and again with planes at the frame itself."""
     scene, trajectory = judged
     found = optimality(scene, trajectory.positions, samples=FRAMES)
-    assert len(found.gradients) == len(found.refrozen) == FRAMES - 2 and max(found.gradients) <= 1e-6
-    assert max(found.local) <= 1e-12
+    gradients = found.values["gradient/norm"]
+    assert len(gradients) == len(found.values["gap/refrozen"]) == FRAMES - 2 and max(gradients) <= 1e-6
+    assert max(found.values["gap/local"]) <= 1e-12
 
 
 def test_laws_hold_for_the_simulation_beside_another(judged):
