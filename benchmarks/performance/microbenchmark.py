@@ -23,28 +23,19 @@ class Settings:
     """Settings of a run that a measuring function reads.
 
     Attributes:
-        method: of the rows.
         repeats: of what is timed.
-        chosen: the training of the network: kind and recipe.
+        training: that of the network, kind and recipe; None for a method that is no network.
         device, steps: of its training.
         files: to be left behind.
         key: equal where an interrupted training may go on.
     """
 
-    method: str
     repeats: int
-    chosen: Training | None = None
+    training: Training | None = None
     device: str = "cpu"
     steps: int = 0
     files: tuple[Path, ...] = ()
     key: str = ""
-
-    @property
-    def training(self) -> Training:
-        """Training of the network. Raises ValueError for a method that is no network."""
-        if self.chosen is None:
-            raise ValueError(f"{self.method} is no network: it has no training")
-        return self.chosen
 
 
 @dataclass(frozen=True, kw_only=True)

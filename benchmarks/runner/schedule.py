@@ -289,9 +289,9 @@ class Schedule:
     def microbenchmark(self, benchmark: Microbenchmark) -> RunMicrobenchmark:
         """Return the task of a microbenchmark."""
         name, method = flat(benchmark.label.replace(" ", "-")), benchmark.method
-        chosen = TRAININGS.get(method)
-        inputs: dict[str, Any] = {"declared": declared(benchmark), "training": chosen}
-        settings = Settings(method=method, repeats=benchmark.repeats, chosen=chosen)
+        training = TRAININGS.get(method)
+        inputs: dict[str, Any] = {"declared": declared(benchmark), "training": training}
+        settings = Settings(repeats=benchmark.repeats, training=training)
         if benchmark.trains:
             steps = self.preset.steps_of(method, method)
             settings = dataclasses.replace(settings, device=self.plan.device, steps=steps)
