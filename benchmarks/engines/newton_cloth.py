@@ -94,7 +94,7 @@ def build_model(cloth: Cloth, solver: str) -> Any:
     edges = np.array(builder.edge_indices)
     rest_angle = builder.edge_rest_angle
     rest_angle[:] = [0.0] * len(rest_angle)  # what BendHinge takes by default
-    length, areas = np.array(builder.edge_rest_length), _two_areas(cloth, edges)
+    length, areas = np.array(builder.edge_rest_length), areas_beside(cloth, edges[:, 2:])
     stiffness = cloth.material.bending_stiffness * length**2 / (4 * areas)  # and this
     stiffness = stiffness / (length if solver == "VBD" else areas)
     stiffness = np.where((edges >= 0).all(axis=1), stiffness, 0.0)
@@ -145,30 +145,19 @@ def _set_masses(builder: Any, cloth: Cloth) -> None:
         builder.particle_mass[pin] = 0.0
 
 
-def _two_areas(cloth: Cloth, edges: np.ndarray) -> np.ndarray:
-    """Return A1 + A2 (E,) [m^2] of newton's edges (opposite, opposite, start, end); 1 for a boundary edge."""
-    x = cloth.rest_positions
-    inner = (edges >= 0).all(axis=1)
-    a, b, start, end = edges[inner].T
-    e = x[end] - x[start]
-    double = [np.linalg.norm(np.cross(e, x[tip] - x[start]), axis=1) for tip in (a, b)]
-    areas = np.ones(len(edges))
-    areas[inner] = 0.5 * (double[0] + double[1])
-    return areas
-
-
 def spring_stiffness(cloth: Cloth) -> np.ndarray:
     """Return E2 (A1 + A2)/l0^2 (E,) [N/m] of `cloth.edges`, near an isotropic sheet of modulus E2.
 
     The area-weighted springs of Van Gelder (1998). They cannot have our Poisson ratio.
     """
-    n = cloth.vertex_count
-    corners = np.sort(
-        np.stack([cloth.faces, np.roll(cloth.faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1
-    )
-    edges = np.sort(cloth.edges, axis=1)
-    key = edges[:, 0] * n + edges[:, 1]
-    order = np.argsort(key)
-    place = order[np.searchsorted(key[order], corners[:, 0] * n + corners[:, 1])]
-    area = np.bincount(place, weights=np.repeat(cloth.areas, 3), minlength=len(edges))
-    return cloth.material.membrane_modulus * area / cloth.edge_lengths**2
+    areas = areas_beside(cloth, cloth.edges)
+    return cloth.material.membrane_modulus * areas / cloth.edge_lengths**2
+
+
+def areas_beside(cloth: Cloth, edges: np.ndarray) -> np.ndarray:
+    """Return the area (E,) [m^2] of the one or two faces beside each of some edges (E, 2) of the cloth."""
+    key = np.array([cloth.vertex_count, 1])
+    ends = np.sort(np.stack([cloth.faces, np.roll(cloth.faces, -1, axis=1)], axis=-1), axis=-1)
+    places = np.searchsorted(cloth.edges @ key, (ends @ key).ravel())
+    areas = np.bincount(places, weights=np.repeat(cloth.areas, 3), minlength=len(cloth.edges))
+    return areas[np.searchsorted(cloth.edges @ key, np.sort(edges, axis=1) @ key)]
