@@ -73,13 +73,8 @@ def build_data_set(options: argparse.Namespace, command_line: Sequence[str]) -> 
 
 def plan_sequences(options: argparse.Namespace, command_line: Sequence[str]) -> tuple[Plan, MethodEntry]:
     """Return the plan of these motions, and the method that simulates them. Raises ValueError, one line."""
-    for name, least in (
-        ("sequences", 1),
-        ("frames", FEWEST_FRAMES),
-        ("vertices", 1),
-        ("settle", 2),
-        ("workers", 1),
-    ):
+    fewest = {"sequences": 1, "frames": FEWEST_FRAMES, "vertices": 1, "settle": 2, "workers": 1}
+    for name, least in fewest.items():
         value = getattr(options, name)
         if value is not None and not least <= value <= LONGEST:
             raise PlanError(f"--{name} {value}: give a whole number from {least} to {LONGEST}")
