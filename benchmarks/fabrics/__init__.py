@@ -4,8 +4,7 @@
 | --- | --- |
 | fabric | density and flexural rigidity of a fabric; those of the suite |
 | measured | a user's file of measured fabrics |
-| gauge | the textile experiments of a user's copy of GAUGE |
-| markers | markers on a sheet: curvature, and how far repeated trials differ |
+| gauge | fabrics of a user's copy of GAUGE |
 | elastica | exact shape of a strip under its weight; bending length from its angle |
 | strip | clamped strip: cantilever of ASTM D1388 |
 | disc | specimen of Cusick's drapemeter and its drape coefficient |

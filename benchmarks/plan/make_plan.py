@@ -115,12 +115,9 @@ def tests_of_fabrics(request: Request, suites: Sequence[str]) -> dict[str, Any]:
         sample += [replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)]
         cases += percentiles(fabrics)
     if request.gauge is not None:
-        from benchmarks.fabrics.gauge import read_tasks  # loads numpy
-        from benchmarks.validation.fabric.cases import gauge_repeatability
+        from benchmarks.fabrics.gauge import read_gauge
 
-        tasks = read_tasks(request.gauge)
-        sample += [replace(fabric, name=f"gauge/{fabric.name}") for fabric in tasks[0].fabrics]
-        cases += gauge_repeatability(request.gauge, tasks)
+        sample += [replace(fabric, name=f"gauge/{fabric.name}") for fabric in read_gauge(request.gauge)]
     return {"fabric_scenes": textile_tests(sample), "fabric_cases": tuple(cases)}
 
 
@@ -211,9 +208,8 @@ def check_scheduler_fits(request: Request) -> None:
         raise PlanError(
             f"--device {request.device}: on a cluster networks train on cpu; leave out --scheduler"
         )
-    for option, given in (("--rollout", request.roll_outs), ("--gauge", request.gauge)):
-        if given:
-            raise PlanError(f"{option}: its files lie on this machine alone; leave out --scheduler")
+    if request.roll_outs:
+        raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
     from benchmarks.process.cluster_address import check_scheduler  # loads dask
 
     check_scheduler(request.scheduler)

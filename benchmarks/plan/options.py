@@ -100,8 +100,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--fabrics", metavar="FILE",
         help="measured fabrics, a CSV of density and bending, for suite fabric (docs/fabric.md)")  # fmt: skip
     add("--gauge", metavar="DIR",
-        help="a copy of GAUGE-Dataset, for suite fabric: its fabrics, and how well its experiments repeat "
-        "(docs/fabric.md)")  # fmt: skip
+        help="a copy of GAUGE-Dataset, whose fabrics suite fabric tests too (docs/fabric.md)")  # fmt: skip
     add("--seeds", default="0", metavar="N,...", help="seeds of training (default 0)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where networks train (default cpu)")
     add("--trained", nargs="?", const=FOLDER, metavar="DIR", help="measure without training: networks of the "

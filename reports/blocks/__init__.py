@@ -52,7 +52,6 @@ BLOCKS: tuple[Block, ...] = (
     TableBlock("fabric_order", most=40),
     TableBlock("fabric_drape"),
     TableBlock("fabric_bands"),
-    TableBlock("fabric_repeatability"),
     Heading("Engines"),
     TableBlock("engine_audit"),
     TableBlock("engine_laws"),

@@ -18,7 +18,6 @@ from reports.tables.fabric.textile_tests import (
     fabric_bands,
     fabric_drape,
     fabric_order,
-    fabric_repeatability,
 )
 from reports.tables.findings import (
     errors_in_spreads,
@@ -52,7 +51,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     fabric_order,
     fabric_drape,
     fabric_bands,
-    fabric_repeatability,
     engine_audit,
     engine_laws,
     validation,

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from benchmarks.fabrics.fabric import FABRICS, Fabric
 from benchmarks.validation.case import Case, known_answer
-
-if TYPE_CHECKING:
-    from benchmarks.fabrics.gauge import Task
 
 GAMMAS = tuple(round(10 ** (power / 2), 2) for power in range(-2, 7))  # four decades
 COLUMNS = (80, 160, 320)
@@ -161,44 +157,3 @@ def percentiles(fabrics: Sequence[Fabric]) -> tuple[Case, ...]:
             options={"length": fabric.bending_length, "lengths": lengths})
         for fabric, title in ((snug["snug"], "as scaled"), (snug["snug_printed"], "as printed"))
     )  # fmt: skip
-
-
-# Table 3 of GAUGE, satin: mean and standard deviation over the trials of their deviation. No unit is stated;
-# errors of bending reach 19.9 times 1.92, which 14 markers cannot have in radians.
-GAUGE_BASELINES = {"stretching": (0.21, 0.42), "bending": (1.92, 0.69)}  # [degrees]
-
-
-def gauge_repeatability(folder: Path, tasks: Sequence[Task]) -> tuple[Case, ...]:
-    """Return the cases of how well each experiment in a copy of GAUGE repeats, where it has the trials.
-
-    Raises:
-        GaugeFileError: a first trial that is not understood, or trials elsewhere than they are expected.
-        OSError: a file that cannot be read.
-    """
-    from benchmarks.fabrics.gauge import GaugeFileError, read_trial, trial_files, version
-
-    cases = []
-    for task in tasks:
-        for fabric in task.fabrics:
-            if not (files := trial_files(folder, task.name, fabric.name)):
-                continue
-            read_trial(files[0], task)
-            published = GAUGE_BASELINES[task.name] if fabric.name == "satin" else (None, None)
-            options = {
-                "folder": str(folder.resolve()), "task": task.name, "fabric": fabric.name,
-                "digest": version(folder, task.name, fabric.name),
-            }  # fmt: skip
-            for function, expected in zip(("repeatability", "spread"), published):
-                name = f"gauge_{function}_{task.name}_{fabric.name}"
-                title = {"repeatability": "mean", "spread": "standard deviation"}[function]
-                cases.append(_case(
-                    name, f"{title} over {len(files)} trials of their deviation from the mean trial, "
-                    f"files {options['digest']}", "fabric.repeatability", function, unit="degrees",
-                    options=options, expected=expected, reason=REPORTED, smoke=True,
-                ))  # fmt: skip
-    if (folder / "data").is_dir() and not cases:
-        raise GaugeFileError(
-            f"--gauge {folder}: no trial 'data/textile/textile {tasks[0].name}/json/"
-            f"{tasks[0].fabrics[0].name}/1.json' or the like: put them there, or leave out data"
-        )
-    return tuple(cases)

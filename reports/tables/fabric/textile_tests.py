@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-from pandas import isna
-
 from reports.run.finished_run import Run
 from reports.statistics.fabric.order import APART, ERROR, order, readings, rows_of_test
 from reports.statistics.means_and_spreads import means
@@ -14,7 +12,6 @@ from reports.tables.table import METHOD, Cell, Column, Table, table
 
 DRAPE_CASE = re.compile(r"drape_(?P<fabric>\w+)_(?P<rings>\d+)_rings_(?P<rate>\d+)_steps")
 BAND_CASE = re.compile(r"drape_band_(?P<fabric>\w+)_(?P<end>least|largest)")
-GAUGE_CASE = re.compile(r"gauge_(?P<what>repeatability|spread)_(?P<task>[a-z]+)_(?P<fabric>.+)")
 BENDING_LENGTH = re.compile(r"bending length ([\d.]+) mm")
 COEFFICIENT = re.compile(r"([\d.]+) %$")
 
@@ -66,33 +63,6 @@ def fabric_bands(run: Run) -> list[Table]:
         "of one density."
     )
     return table("fabric_bands", columns, lines, caption)
-
-
-def fabric_repeatability(run: Run) -> list[Table]:
-    """Tabulate how far trials of GAUGE's experiments are from their mean, beside what was published."""
-    rows = run.suite("fabric")
-    found: dict[tuple[str, str], dict[str, tuple[Cell, Cell]]] = {}
-    for name, value, expected in rows[rows["usable"]][["case", "value", "expected"]].itertuples(index=False):
-        if match := GAUGE_CASE.fullmatch(str(name)):
-            published = None if isna(expected) else float(expected)
-            found.setdefault((match["task"], match["fabric"]), {})[match["what"]] = (float(value), published)
-    lines: list[tuple[Cell, ...]] = [
-        (*which, *numbers["repeatability"], *numbers["spread"])
-        for which, numbers in found.items()
-        if len(numbers) == 2
-    ]
-    columns = (
-        Column("task", "Task", text=True), Column("fabric", "Fabric", text=True),
-        Column("mean", "Mean deviation", "degrees"), Column("mean_published", "Published", "degrees"),
-        Column("spread", "Standard deviation", "degrees"),
-        Column("spread_published", "Published", "degrees"),
-    )  # fmt: skip
-    caption = (
-        "Repeatability of GAUGE's experiments: deviation of the markers' curvature from the mean trial, "
-        "mean and standard deviation over the trials. Where published values differ, files or markers are "
-        "read in another way than GAUGE does."
-    )
-    return table("fabric_repeatability", columns, lines, caption)
 
 
 def _cases(run: Run) -> list[tuple[str, str, float]]:

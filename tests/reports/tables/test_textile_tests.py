@@ -5,12 +5,7 @@ from __future__ import annotations
 import pytest
 
 from reports.figures.fabric.textile_errors import TextileErrors
-from reports.tables.fabric.textile_tests import (
-    fabric_bands,
-    fabric_drape,
-    fabric_order,
-    fabric_repeatability,
-)
+from reports.tables.fabric.textile_tests import fabric_bands, fabric_drape, fabric_order
 from tests.reports.report_folder import row, run_of
 
 READ = {"cantilever": ("fabric/bending_length", "mm"), "drape": ("fabric/drape_coefficient", "%")}
@@ -70,20 +65,3 @@ def test_cases_make_the_tables_of_the_reference():
     (drape,), (bands,) = fabric_drape(run), fabric_bands(run)
     assert drape.rows == (("limp", 14.0, 43.5, 42.5, 39.3),)
     assert bands.rows == (("silk", 20.0, 40.0, 9.3, 14.3),)
-
-
-def test_an_experiment_s_repeatability_stands_beside_what_was_published():
-    read = {
-        "gauge_repeatability_bending_satin": (1.9, 1.92), "gauge_spread_bending_satin": (0.7, 0.69),
-        "gauge_repeatability_bending_nylon_2": (1.1, None), "gauge_spread_bending_nylon_2": (0.2, None),
-        "gauge_repeatability_stretching_satin": (0.2, 0.21),  # its spread was not found
-    }  # fmt: skip
-    rows = [
-        row(name, "simulation", "check", value, suite="fabric", expected=expected)
-        for name, (value, expected) in read.items()
-    ]
-    (table,) = fabric_repeatability(run_of(rows, cases={name: {"scene": name} for name in read}))
-    assert table.rows == (
-        ("bending", "satin", 1.9, 1.92, 0.7, 0.69),
-        ("bending", "nylon_2", 1.1, None, 0.2, None),
-    )
