@@ -15,8 +15,6 @@ from benchmarks.external.scene_files import write_obj
 from benchmarks.fingerprint.digest import digest
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
 from benchmarks.plan.plan_roll_out import NO_REFERENCE
 from benchmarks.presets import find_preset
@@ -24,6 +22,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
+from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import (
     run_in_this_process,
     small_scene,
@@ -149,8 +148,8 @@ def test_without_a_reference_the_reason_is_said(made, tmp_path, monkeypatch):
 
 
 def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_changed(made, tmp_path):
-    def planned() -> Cell:
-        plan = make_plan(request_of_run(make_parser().parse_args(words), words))
+    def of_mine() -> Cell:
+        plan = planned(*words)
         (stored,) = (cell for cell in plan.cells if cell.method == "mine")  # the flag has no file
         return digest(Schedule(plan).cell(stored).inputs), stored
 
@@ -158,14 +157,14 @@ def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_chang
     np.savez(tmp_path / "hanging_sheet.npz", positions=frames)
     words = ["--preset", "smoke", "--scenes", "hanging_sheet,flag", "--suite", "speed", "-o", str(made.path)]
     words += ["--methods", "simulation,newton-1", "--rollout", f"mine={tmp_path}/{{scene}}.npz,ms=1"]
-    key, stored = planned()
+    key, stored = of_mine()
     assert stored.scene.name == "hanging_sheet" and stored.suites == ("speed",) and not stored.timed
-    assert planned()[0] == key
+    assert of_mine()[0] == key
     np.savez(tmp_path / "hanging_sheet.npz", positions=frames + 1e-3)
-    assert planned()[0] != key
+    assert of_mine()[0] != key
     words[-1] = f"mine={tmp_path}/hanging_sheet.npz"
     with pytest.raises(PlanError, match="2 are asked for: name it with"):
-        planned()
+        of_mine()
 
 
 def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, monkeypatch, capsys):

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.inputs import InputError, read_inputs
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan_roll_out import plan_roll_out
 from benchmarks.runner.execute_plan import check_roll_outs
 from benchmarks.score import make_parser as score_parser
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
+from tests.benchmarks.plan.planned import planned
 
 
 class Openings:
@@ -75,13 +74,13 @@ def test_each_file_of_a_run_is_opened_once_before_its_tasks(tmp_path, openings):
     motions = write_motions(mine / "clips", "sway")
     scenes = ["--scenes", "top/sway", "--methods", "skinning", "--suite", "garments", "--preset", "smoke"]
     words = [*scenes, "--body", body, "--garment", garment, "--motions", motions, "--test-motions", "sway"]
-    empty = make_plan(request_of_run(make_parser().parse_args([*words, "-o", str(tmp_path / "run")]), words))
+    empty = planned(*words, "-o", str(tmp_path / "run"))
     scene = empty.scenes[0].build(empty.open_assets())
     positions = np.zeros((scene.frames, scene.cloth.vertex_count, 3))
     np.savez(mine / "out.npz", positions=positions, faces=scene.cloth.faces)
     openings.clear()
     words += ["--rollout", f"out={mine}/out.npz", "-o", str(tmp_path / "run")]
-    plan = make_plan(request_of_run(make_parser().parse_args(words), words))
+    plan = planned(*words)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "benchmarks.methods.outside.stored_roll_out.fit_to_scene", lambda stored, *_: (stored, [])

@@ -7,8 +7,6 @@ import torch
 
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
@@ -16,12 +14,13 @@ from snug.networks.architectures import ARCHITECTURES
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import ABLATIONS, RECIPES
 from snug.recipes.recipe import TERMS
+from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress
 
 
 def plan(*words):
-    return make_plan(request_of_run(make_parser().parse_args(["--suite", "garments", *words]), words))
+    return planned("--suite", "garments", *words)
 
 
 def methods(*words):

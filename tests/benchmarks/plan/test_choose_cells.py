@@ -8,12 +8,11 @@ import pytest
 
 from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan.choose_cells import Selection, choose_cells
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import Motions, PlanError
 from benchmarks.presets import find_preset
 from benchmarks.validation.stress.cases import MAPS
+from tests.benchmarks.plan.planned import planned
 
 SMOKE = find_preset("smoke")
 
@@ -233,8 +232,7 @@ def test_own_clips_that_are_cut_are_named_and_frames_measures_more(tmp_path):
     )
 
     def plan_of(*words: str):
-        line = ["--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *words]
-        return make_plan(request_of_run(make_parser().parse_args(line), line))
+        return planned("--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *words)
 
     assert plan_of().cut_motions == {"long": "the first 150 of 200 frames"}
     assert plan_of("--frames", "200").cut_motions == {} and plan_of("--frames", "180").preset.frames == 180

@@ -7,14 +7,13 @@ from dataclasses import asdict
 import pytest
 
 from benchmarks import run as run_command
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
 from snug.garments.templates import tailor_tshirt
+from tests.benchmarks.plan.planned import planned
 from tests.snug.garments.garment_files import own_chart, saved
 from tests.snug.training.dressing import tube_dress
 
@@ -23,10 +22,6 @@ from tests.snug.training.dressing import tube_dress
 def tube():
     """150 vertices, made in milliseconds."""
     return tube_dress().garment
-
-
-def planned(*words):
-    return make_plan(request_of_run(make_parser().parse_args(words), words))
 
 
 def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, tube):

@@ -9,8 +9,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import runs
 from benchmarks.provenance import commit
 from benchmarks.publish import __main__ as command
@@ -19,6 +17,7 @@ from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.run_folder import RunFolder
 from reports.figures import FIGURES
 from reports.pictures import PICTURES
+from tests.benchmarks.plan.planned import planned
 
 FALL = "--preset smoke --suite speed --scenes free_fall --methods "
 
@@ -26,8 +25,7 @@ FALL = "--preset smoke --suite speed --scenes free_fall --methods "
 @pytest.mark.parametrize("name", RUNS)
 def test_every_published_command_can_be_planned(name, tmp_path):
     for folder, line in command.commands(name, RUNS[name], tmp_path).items():
-        words = line[3:]
-        plan = make_plan(request_of_run(make_parser().parse_args(words), words))
+        plan = planned(*line[3:])
         assert plan.folder == folder and (plan.scenes or plan.cases)
         assert {cell.scene.name for cell in plan.cells if runs(cell)} == {scene.name for scene in plan.scenes}
 

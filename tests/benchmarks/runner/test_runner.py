@@ -13,8 +13,6 @@ import pytest
 from benchmarks import run
 from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
@@ -26,6 +24,7 @@ from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.task import Outcome
 from benchmarks.tasks.training import TrainNetwork
+from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.misbehaving import interrupt_at
 from tests.benchmarks.tasks.test_cell_tasks import TINY, found_of, plan_of
 
@@ -187,6 +186,6 @@ def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
 
 def test_the_longest_training_begins_first(tmp_path):
     words = ["--suite", "garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path)]
-    plan = make_plan(request_of_run(make_parser().parse_args(words), words))
+    plan = planned(*words)
     trainings = [task for task in tasks_of(plan) if isinstance(task, TrainNetwork)]
     assert [batch[0].training for batch in _batches(trainings)] == ["ncs", "snug", "pbns", "handles-20"]

@@ -26,6 +26,7 @@ from benchmarks.scenes.variations import SHAPES, shapes
 from reference_sim import simulate
 from snug.body.parametric_body import Body
 from snug.motion.library import make_motion
+from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
 
 SMOKE = find_preset("smoke")
@@ -245,13 +246,6 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
 def key_of(task) -> str:
     """Equal where nothing that the task depends on has changed."""
     return json.dumps(dependencies(task), sort_keys=True)
-
-
-def planned(*words):
-    from benchmarks.plan.make_plan import make_plan
-    from benchmarks.plan.options import make_parser, request_of_run
-
-    return make_plan(request_of_run(make_parser().parse_args(list(words)), words))
 
 
 def test_a_clip_is_the_liveliest_part_and_what_is_not_judged_before_it():
