@@ -69,6 +69,13 @@ def motion_of(scene, walk):
     return out_of_distribution.CHANGES[scene.options["change"]](walk, **options)
 
 
+def plan_of(folder, cells):
+    return Plan(
+        preset=SMOKE, suites=("extremes",), cells=cells, cases=(), seeds=(0,), device="cpu", folder=folder,
+        command="",
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("scene", CASES, ids=lambda scene: scene.name)
 def test_a_hard_motion_starts_where_the_shirt_has_settled(scene, walk):
     motion = motion_of(scene, walk)
@@ -221,11 +228,7 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(positions, tmp_path, m
         ("cell", cell.name): Outcome(*own, result={"frames": 5}, files=("x",)),
         ("metrics", cell.name): Outcome(*ended, result=values),
     }
-    plan = Plan(
-        preset=SMOKE, suites=("extremes",), cells=(cell,), cases=(), seeds=(0,), device="cpu",
-        folder=tmp_path, command="",
-    )  # fmt: skip
-    rows = list(rows_of_cell(cell, plan, {}, outcomes))
+    rows = list(rows_of_cell(cell, plan_of(tmp_path, (cell,)), {}, outcomes))
     assert {row.status for row in rows} == {expected} and len(rows) == len(values) >= 4
     lost = "a vertex came 0.7 m away from the skinned shirt"
     assert {row.reason for row in rows} == {own[1] or (lost if expected == "diverged" else "")}
@@ -265,10 +268,7 @@ def test_a_network_does_hard_motions_under_its_own_name_alone():
 
 def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_path, monkeypatch):
     found = cells(scenes=("*splits", "*girth_+5"), methods=("simulation",))
-    plan = Plan(
-        preset=SMOKE, suites=("extremes",), cells=found,
-        cases=(), seeds=(0,), device="cpu", folder=tmp_path, command="",
-    )  # fmt: skip
+    plan = plan_of(tmp_path, found)
     starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
     ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
     assert list(starts) == [ordinary, splits, "out_of_distribution-girth_+5"]
@@ -288,10 +288,7 @@ def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_pat
 
 def test_cells_that_nobody_times_run_beside_others(tmp_path):
     found = cells(scenes=("*walk_x4",))
-    plan = Plan(
-        preset=SMOKE, suites=("extremes",), cells=found, cases=(), seeds=(0,), device="cpu", folder=tmp_path,
-        command="",
-    )  # fmt: skip
+    plan = plan_of(tmp_path, found)
     tasks = [task for task in tasks_of(plan) if task.kind in ("cell", "batch", "repeat", "quasi-static")]
     assert {task.kind for task in tasks} == {"cell"} and len(tasks) == len(found)
     assert not any(task.process for task in tasks)

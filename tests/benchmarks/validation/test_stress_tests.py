@@ -1,4 +1,4 @@
-"""Stress tests: their cases, their map in the report, and that the solver copes."""
+"""Stress tests: their cases, and that the solver copes."""
 
 from __future__ import annotations
 
@@ -53,9 +53,6 @@ def test_a_point_of_a_map_counts_iterations_and_names_its_place():
     task = RunCase(name=case.name, label=case.name, case=case, inputs={}, modules=(case.module,))
     (ended,) = task.rows(Outcome("timeout", "no answer within 60 s", failed=True))
     assert (ended.status, ended.value, ended.unit, ended.scene) == ("failed", None, "iterations", "map_sheet")
-
-
-# --- the report's part ----------------------------------------------------------------------------------
 
 
 # --- the solver's part ----------------------------------------------------------------------------------
