@@ -14,8 +14,6 @@ from benchmarks.scene import BuiltScene, Scene
 from benchmarks.tasks.task import Context, Outcome, Task
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from benchmarks.assets.assets import Assets
     from reference_sim.energies import Energy
 
@@ -122,6 +120,7 @@ def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> 
     """Gradient and Hessian against central differences of value and gradient."""
     import numpy as np
 
+    from reference_sim import Potential
     from reference_sim.energies import Step
 
     cloth, random = scene.cloth, np.random.default_rng(0)
@@ -153,7 +152,7 @@ def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> 
             f"differences say {slope:.6g} N",
         )
     turned = (ahead[1] - behind[1]) / (2.0 * DIFFERENCE_STEP)
-    product = _times_hessian(energy, x, direction)
+    product = (Potential([energy]).hessian(x) @ direction.ravel()).reshape(x.shape)
     off, most = float(np.abs(turned - product).max()), float(np.abs(turned).max())
     findings.demand(
         off
@@ -162,17 +161,3 @@ def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> 
         f"{what} Hessian is not the derivative of its gradient: off by {off:.3g} of {most:.3g} N/m; leave it "
         "to automatic differentiation, or mend it",
     )
-
-
-def _times_hessian(energy: Energy, x: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return the Hessian times a direction (V, 3) [N]."""
-    import numpy as np
-
-    if energy.dynamic:
-        return (energy.sparse_hessian(x) @ direction.ravel()).reshape(x.shape)
-    elements, blocks = energy.active_hessian_blocks(x)
-    corners = energy.stencils[elements]
-    local = np.einsum("nij,nj->ni", blocks, direction[corners].reshape(len(corners), blocks.shape[-1]))
-    product = np.zeros_like(x)
-    np.add.at(product, corners.ravel(), local.reshape(-1, 3))
-    return product

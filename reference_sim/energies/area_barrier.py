@@ -54,10 +54,6 @@ class AreaBarrier(Energy):
         gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, gradient), gradient
 
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (N, 9, 9) [N/m] of each face at x (V, 3) [m]."""
-        return self.expanded(*self.active_hessian_blocks(x))
-
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the blocks, see Energy: E'' grad q grad q^T, and E' Hess q reduced by `convexity`."""
         return _hessian(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, convexity)

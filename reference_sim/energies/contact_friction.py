@@ -114,10 +114,6 @@ class ContactFriction(Energy):
         state = (self._known_forces(), self.anchors, self.normals, self.threshold)
         return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
 
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (N, 9, 9) [N/m] of each sample at x (V, 3) [m]."""
-        return self.expanded(*self.active_hessian_blocks(x))
-
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the samples (n,) with second derivatives, and these (n, 9, 9) [N/m]; see Energy."""
         forces = self._known_forces()

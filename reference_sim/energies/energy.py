@@ -128,12 +128,6 @@ class Energy:
         zero = torch.zeros_like(u)
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
 
-    def expanded(self, elements: np.ndarray, active: np.ndarray) -> np.ndarray:
-        """Return blocks (N, 3k, 3k) of all elements: `active` (n, 3k, 3k) of some (n,), zero elsewhere."""
-        blocks = np.zeros((len(self.stencils), *active.shape[1:]))
-        blocks[elements] = active
-        return blocks
-
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k) [N/m].
 

@@ -54,10 +54,6 @@ class Gravity(Energy):
         gradient[:, 1] = self.weights
         return float(self.weights @ (x[:, 1] - self.origin_height)), gradient
 
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (N, 3, 3) [N/m] of each vertex at x (V, 3) [m]."""
-        return np.zeros((len(self.stencils), 3, 3))
-
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices (n,) with second derivatives, and these (n, 3, 3) [N/m]; see Energy."""
         return np.arange(0), np.zeros((0, 3, 3))

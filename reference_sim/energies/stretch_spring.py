@@ -46,10 +46,6 @@ class StretchSpring(Energy):
         gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.rest_lengths, self.stiffness, gradient), gradient
 
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (N, 6, 6) [N/m] of each edge at x (V, 3) [m]."""
-        return self.active_hessian_blocks(x)[1]
-
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return +-2k [n n^T + (1 - l0/l)(I - n n^T)], see Energy.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isqrt
 
 import numpy as np
 
@@ -24,18 +25,12 @@ class BlockPlaces:
     stride: np.ndarray
     size: int
 
-    @classmethod
-    def one_by_one(cls, count: int, corners: int) -> BlockPlaces:
-        """Return the places of `count` elements whose matrices (3k, 3k) lie in a row, by columns."""
-        a, b = np.divmod(np.arange(corners**2), corners)
-        width = 3 * corners
-        base = (width**2 * np.arange(count)[:, None] + 3 * width * b + 3 * a).ravel()
-        slots = np.arange(count * corners**2).reshape(count, -1)
-        return cls(slots, base, np.full(len(base), width), 3)
-
     def add(self, elements: np.ndarray, blocks: np.ndarray, data: np.ndarray) -> None:
         """Add the matrices (n, size k, size k) of some elements (n,)."""
-        corners = blocks.shape[1] // self.size
+        corners = isqrt(self.slots.shape[1])
+        expected = (len(elements), self.size * corners, self.size * corners)
+        if blocks.shape != expected:
+            raise ValueError(f"matrices of elements have shape {blocks.shape}: expected {expected}")
         _add(elements, blocks, self.slots, corners, self.size, self.base, self.stride, data)
 
 

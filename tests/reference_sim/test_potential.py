@@ -150,6 +150,16 @@ def test_energies_of_different_cloths_are_refused():
         Potential([StretchStVK(bent_cloth()), Gravity(bent_cloth())])
 
 
+def test_second_derivatives_of_another_shape_are_refused():
+    class Flat(Gravity):
+        def active_hessian_blocks(self, x, convexity=0.0):
+            return np.arange(len(x)), np.zeros((len(x), 2, 2))
+
+    cloth = bent_cloth()
+    with pytest.raises(ValueError, match=r"shape \(25, 2, 2\): expected \(25, 3, 3\)"):
+        Potential([Flat(cloth)]).hessian(cloth.rest_positions)
+
+
 def test_a_potential_without_terms_is_refused():
     with pytest.raises(ValueError, match="at least one energy"):
         Potential([])

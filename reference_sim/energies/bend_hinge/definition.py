@@ -18,12 +18,13 @@ import numpy as np
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.fingerprint import fingerprint
-from reference_sim.kernels.block_indices import BlockPlaces
 from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks, arctan2
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from torch import Tensor
+
+    from reference_sim.kernels.block_indices import BlockPlaces
 
 SCALINGS = ("length_area", "none")
 BLOCKS = 39  # rows of lanes before those of the blocks, in _hessian
@@ -100,16 +101,6 @@ class BendHinge(Energy):
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.stiffness, self.rest_angles, gradient), gradient
-
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (N, 12, 12) [N/m] of each hinge at x (V, 3) [m]."""
-        return self.active_hessian_blocks(x)[1]
-
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the blocks, see Energy: grad theta grad theta^T, and Hess theta reduced by `convexity`."""
-        blocks = np.zeros((len(self.stencils), 12, 12))
-        self.add_hessian(x, convexity, BlockPlaces.one_by_one(len(blocks), 4), blocks.reshape(-1))
-        return np.arange(len(blocks)), blocks
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
         """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix."""

@@ -140,16 +140,6 @@ class ContactPenalty(Energy):
         value = _gradient(x, self.stencils, self.weights, self.stiffness, self.margin, *planes, gradient)
         return value, gradient
 
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (N, 9, 9) [N/m] of each sample at x (V, 3) [m]."""
-        return self.expanded(*self.active_hessian_blocks(x))
-
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the samples (n,) with second derivatives, and these (n, 9, 9) [N/m]; see Energy."""
-        elements, curvatures = self._curvatures(x)
-        along = (self.weights[elements, :, None] * self.normals[elements, None, :]).reshape(-1, 9)
-        return elements, curvatures[:, None, None] * along[:, :, None] * along[:, None, :]
-
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
         """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix."""
         _add_hessian(

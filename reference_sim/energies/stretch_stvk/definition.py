@@ -16,13 +16,13 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
-from reference_sim.kernels.block_indices import BlockPlaces
 from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from reference_sim.kernels.block_indices import BlockPlaces
 
 BLOCKS = 29  # rows of lanes before those of the blocks, in _hessian
 
@@ -74,18 +74,8 @@ class StretchStVK(Energy):
         value = _gradient(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, gradient)
         return value, gradient
 
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (N, 9, 9) [N/m] of each face at x (V, 3) [m]."""
-        return self.active_hessian_blocks(x)[1]
-
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the blocks, see Energy; compressive stress alone is negative and reduced by `convexity`."""
-        blocks = np.zeros((len(self.stencils), 9, 9))
-        self.add_hessian(x, convexity, BlockPlaces.one_by_one(len(blocks), 3), blocks.reshape(-1))
-        return np.arange(len(blocks)), blocks
-
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
-        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix."""
+        """Add the second derivatives at x (V, 3) [m]; compressive stress alone is negative, see Energy."""
         stress = self._predicted_stress
         if stress is None:
             stress = self._stress(x, np.zeros_like(x))

@@ -42,8 +42,7 @@ class SquaredContact(ContactPenalty):
     """
 
     value_and_gradient = Energy.value_and_gradient
-    hessian_blocks = Energy.hessian_blocks
-    active_hessian_blocks = Energy.active_hessian_blocks
+    add_hessian = Energy.add_hessian
     scalar_stiffness = Energy.scalar_stiffness
     power = 2
 

@@ -164,8 +164,6 @@ def test_the_check_uses_no_kernel(solved, monkeypatch):
     step, result = solved
     before = optimality_of(step, result.positions)
     monkeypatch.setattr(StretchStVK, "value_and_gradient", None)
-    monkeypatch.setattr(StretchStVK, "active_hessian_blocks", None)
-    monkeypatch.setattr(StretchStVK, "hessian_blocks", None)
     monkeypatch.setattr(StretchStVK, "add_hessian", None)
     assert optimality_of(step, result.positions) == before
 

@@ -27,6 +27,7 @@ from reference_sim.energies import (
     StretchSpring,
     StretchStVK,
 )
+from tests.reference_sim.element_blocks import blocks_of
 from tests.reference_sim.meshes import patch, random_rotation
 
 
@@ -147,7 +148,7 @@ def test_closed_gradient_is_that_of_the_definition(case):
 @every_case
 def test_closed_hessian_is_that_of_the_definition_element_by_element(case):
     energy, x = case()
-    blocks = energy.hessian_blocks(x)
+    blocks = blocks_of(energy, x)
     expected = Energy.hessian_blocks(energy, x)
     assert blocks.shape == expected.shape == (len(energy.stencils), *2 * [3 * energy.stencils.shape[1]])
     sizes = np.abs(expected).max(axis=(1, 2))
@@ -163,21 +164,11 @@ def test_closed_hessian_is_that_of_the_definition_element_by_element(case):
 
 
 @every_case
-def test_active_blocks_are_the_non_zero_ones(case):
-    energy, x = case()
-    elements, active = energy.active_hessian_blocks(x)
-    whole = np.zeros((len(energy.stencils), *active.shape[1:]))
-    whole[elements] = active
-    assert (whole == energy.hessian_blocks(x)).all()
-    assert len(np.unique(elements)) == len(elements)
-
-
-@every_case
 def test_what_is_declared_constant_is_the_same_everywhere(case):
     energy, x = case()
     other = 1.1 * x + 0.01
     if 3 in energy.constant:
-        assert np.array_equal(energy.hessian_blocks(x), energy.hessian_blocks(other))
+        assert np.array_equal(blocks_of(energy, x), blocks_of(energy, other))
     if 1 in energy.constant:
         for one, two in zip(energy.scalar_stiffness(x), energy.scalar_stiffness(other), strict=True):
             assert np.array_equal(one, two)
@@ -186,13 +177,9 @@ def test_what_is_declared_constant_is_the_same_everywhere(case):
 @every_case
 def test_convexity_takes_negative_curvature_out_in_proportion(case):
     energy, x = case()
-    elements, true = energy.active_hessian_blocks(x)
-    again, half = energy.active_hessian_blocks(x, 0.5)
-    _, convex = energy.active_hessian_blocks(x, 1.0)
-    assert (again == elements).all() and (true == energy.hessian_blocks(x)[elements]).all()
-    size = np.abs(true).max(initial=0.0)
-    if size == 0:
-        assert np.abs(convex).max(initial=0.0) == 0
+    true, half, convex = (blocks_of(energy, x, convexity) for convexity in (0.0, 0.5, 1.0))
+    if not true.any():
+        assert not convex.any()
         return
     # Round-off of eigenvalues of the largest block, about 1e-15 of it each.
     assert np.linalg.eigvalsh(convex).min() > -1e-12 * np.abs(convex).max()
@@ -241,7 +228,7 @@ def test_contact_without_planes_is_no_contact_in_both_forms():
     energy = ContactPenalty(cloth)
     x = cloth.rest_positions
     value, gradient = energy.value_and_gradient(x)
-    assert value == 0 and (gradient == 0).all() and len(energy.active_hessian_blocks(x)[0]) == 0
+    assert value == 0 and (gradient == 0).all() and not blocks_of(energy, x).any()
     assert (energy.energy(torch.as_tensor(x)) == 0).all()
 
 

@@ -171,7 +171,7 @@ def test_friction_without_the_step_before_is_refused():
         friction.prepare(step)
 
     prepare(5)
-    for evaluate in (friction.value_and_gradient, friction.hessian_blocks, friction.scalar_stiffness):
+    for evaluate in (friction.value_and_gradient, friction.active_hessian_blocks, friction.scalar_stiffness):
         with pytest.raises(ValueError, match="step of the frame before"):
             evaluate(x[0])
     prepare(6)
