@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 USES = {
     "vertex_inertia": "(V,) [N/m] of a pull towards term.x_hat: early-stopped L-BFGS, block descent, XPBD",
     "vertex_weights": "(V,) [N] of a constant pull along -y: early-stopped L-BFGS, block descent, XPBD",
-    "float32_lanes": "kernels.float32_lanes.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS",
+    "float32_lanes": "kernels.float32_layout.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS",
     "vertex_block": "kernels.element_sweeps.VertexBlocks: vertex block descent",
     "constraint": "kernels.element_sweeps.Constraints: XPBD",
     "training_batch": "kernels.training_lanes.BatchKernel: the loss of trainings on a CPU",

@@ -1,6 +1,6 @@
 """Hinges in float32, LANES_FLOAT32 at a time: the kernel of early-stopped L-BFGS.
 
-See kernels.float32_lanes for the layout.
+See kernels.float32_layout for the layout.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import numpy as np
 from reference_sim.kernels.float32_layout import (
     FAST,
     HALF,
-    LANES_FLOAT32,
     ONE,
     TINY,
     Float32Lanes,
@@ -20,6 +19,7 @@ from reference_sim.kernels.float32_layout import (
     lay_out,
     set_edges,
 )
+from reference_sim.kernels.float32_layout import LANES_FLOAT32 as L
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -63,38 +63,17 @@ def hinge_gradient(data, u, gradient, s):
     total = 0.0
     for b in range(len(vertices)):
         at, c, e = vertices[b], constants[b], edges[b]
-        for g in range(LANES_FLOAT32):
-            i0, i1, i2, i3 = (
-                at[g],
-                at[LANES_FLOAT32 + g],
-                at[2 * LANES_FLOAT32 + g],
-                at[3 * LANES_FLOAT32 + g],
-            )
+        for g in range(L):
+            i0, i1, i2, i3 = at[g], at[L + g], at[2 * L + g], at[3 * L + g]
             x, y, z = u[i0], u[i0 + 1], u[i0 + 2]
-            s[g], s[LANES_FLOAT32 + g], s[2 * LANES_FLOAT32 + g] = u[i1] - x, u[i1 + 1] - y, u[i1 + 2] - z
-            s[3 * LANES_FLOAT32 + g], s[4 * LANES_FLOAT32 + g], s[5 * LANES_FLOAT32 + g] = (
-                u[i2] - x,
-                u[i2 + 1] - y,
-                u[i2 + 2] - z,
-            )
-            s[6 * LANES_FLOAT32 + g], s[7 * LANES_FLOAT32 + g], s[8 * LANES_FLOAT32 + g] = (
-                u[i3] - x,
-                u[i3 + 1] - y,
-                u[i3 + 2] - z,
-            )
+            s[g], s[L + g], s[2 * L + g] = u[i1] - x, u[i1 + 1] - y, u[i1 + 2] - z
+            s[3 * L + g], s[4 * L + g], s[5 * L + g] = u[i2] - x, u[i2 + 1] - y, u[i2 + 2] - z
+            s[6 * L + g], s[7 * L + g], s[8 * L + g] = u[i3] - x, u[i3 + 1] - y, u[i3 + 2] - z
         energy = np.float32(0.0)
-        for g in range(LANES_FLOAT32):
-            ex, ey, ez = (
-                s[g] + e[g],
-                s[LANES_FLOAT32 + g] + e[LANES_FLOAT32 + g],
-                s[2 * LANES_FLOAT32 + g] + e[2 * LANES_FLOAT32 + g],
-            )
-            px = s[3 * LANES_FLOAT32 + g] + e[3 * LANES_FLOAT32 + g]
-            py = s[4 * LANES_FLOAT32 + g] + e[4 * LANES_FLOAT32 + g]
-            pz = s[5 * LANES_FLOAT32 + g] + e[5 * LANES_FLOAT32 + g]
-            qx = s[6 * LANES_FLOAT32 + g] + e[6 * LANES_FLOAT32 + g]
-            qy = s[7 * LANES_FLOAT32 + g] + e[7 * LANES_FLOAT32 + g]
-            qz = s[8 * LANES_FLOAT32 + g] + e[8 * LANES_FLOAT32 + g]
+        for g in range(L):
+            ex, ey, ez = s[g] + e[g], s[L + g] + e[L + g], s[2 * L + g] + e[2 * L + g]
+            px, py, pz = s[3 * L + g] + e[3 * L + g], s[4 * L + g] + e[4 * L + g], s[5 * L + g] + e[5 * L + g]
+            qx, qy, qz = s[6 * L + g] + e[6 * L + g], s[7 * L + g] + e[7 * L + g], s[8 * L + g] + e[8 * L + g]
             length2 = ex * ex + ey * ey + ez * ez + TINY
             inverse = ONE / np.sqrt(length2)
             length = length2 * inverse
@@ -116,41 +95,28 @@ def hinge_gradient(data, u, gradient, s):
             angle = HALF_PI - angle if size_s > size_c else angle
             angle = PI - angle if cosine < np.float32(0.0) else angle
             angle = -angle if sine < np.float32(0.0) else angle
-            angle -= c[LANES_FLOAT32 + g]
+            angle -= c[L + g]
             angle -= TWO_PI * np.floor((angle + PI) / TWO_PI)
             stiffness = c[g]
             energy += HALF * stiffness * angle * angle
             force = stiffness * angle
             wa, wb = force * (length - foot_a), force * (length - foot_b)
             va, vb = force * foot_a, force * foot_b
-            s[9 * LANES_FLOAT32 + g] = wa * ax - wb * bx
-            s[10 * LANES_FLOAT32 + g] = wa * ay - wb * by
-            s[11 * LANES_FLOAT32 + g] = wa * az - wb * bz
-            s[12 * LANES_FLOAT32 + g] = va * ax - vb * bx
-            s[13 * LANES_FLOAT32 + g] = va * ay - vb * by
-            s[14 * LANES_FLOAT32 + g] = va * az - vb * bz
+            s[9 * L + g] = wa * ax - wb * bx
+            s[10 * L + g] = wa * ay - wb * by
+            s[11 * L + g] = wa * az - wb * bz
+            s[12 * L + g] = va * ax - vb * bx
+            s[13 * L + g] = va * ay - vb * by
+            s[14 * L + g] = va * az - vb * bz
             force *= length
-            s[15 * LANES_FLOAT32 + g], s[16 * LANES_FLOAT32 + g], s[17 * LANES_FLOAT32 + g] = (
-                -force * ax,
-                -force * ay,
-                -force * az,
-            )
-            s[18 * LANES_FLOAT32 + g], s[19 * LANES_FLOAT32 + g], s[20 * LANES_FLOAT32 + g] = (
-                force * bx,
-                force * by,
-                force * bz,
-            )
+            s[15 * L + g], s[16 * L + g], s[17 * L + g] = -force * ax, -force * ay, -force * az
+            s[18 * L + g], s[19 * L + g], s[20 * L + g] = force * bx, force * by, force * bz
         total += float(energy)
-        for g in range(LANES_FLOAT32):
-            i0, i1, i2, i3 = (
-                at[g],
-                at[LANES_FLOAT32 + g],
-                at[2 * LANES_FLOAT32 + g],
-                at[3 * LANES_FLOAT32 + g],
-            )
+        for g in range(L):
+            i0, i1, i2, i3 = at[g], at[L + g], at[2 * L + g], at[3 * L + g]
             for a in range(3):
-                gradient[i0 + a] += s[(9 + a) * LANES_FLOAT32 + g]
-                gradient[i1 + a] += s[(12 + a) * LANES_FLOAT32 + g]
-                gradient[i2 + a] += s[(15 + a) * LANES_FLOAT32 + g]
-                gradient[i3 + a] += s[(18 + a) * LANES_FLOAT32 + g]
+                gradient[i0 + a] += s[(9 + a) * L + g]
+                gradient[i1 + a] += s[(12 + a) * L + g]
+                gradient[i2 + a] += s[(15 + a) * L + g]
+                gradient[i3 + a] += s[(18 + a) * L + g]
     return total

@@ -1,6 +1,6 @@
 """The contact penalty in float32, LANES_FLOAT32 samples at a time: the kernel of early-stopped L-BFGS.
 
-See kernels.float32_lanes for the layout.
+See kernels.float32_layout for the layout.
 """
 
 from __future__ import annotations
@@ -10,15 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reference_sim.contact.closest_point import halved
-from reference_sim.kernels.float32_layout import (
-    FAST,
-    LANES_FLOAT32,
-    THREE,
-    Float32Lanes,
-    empty_state,
-    lay_out,
-    to_blocks,
-)
+from reference_sim.kernels.float32_layout import FAST, THREE, Float32Lanes, empty_state, lay_out, to_blocks
+from reference_sim.kernels.float32_layout import LANES_FLOAT32 as L
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -50,23 +43,15 @@ def _depths(x, order, vertices, constants, points, normals, margin, state):
     """
     deepest = np.full(len(state), np.float32(-np.inf))
     for place in range(len(order)):
-        s, block, lane = order[place], place // LANES_FLOAT32, place % LANES_FLOAT32
-        i, j, k = (
-            vertices[block, lane],
-            vertices[block, LANES_FLOAT32 + lane],
-            vertices[block, 2 * LANES_FLOAT32 + lane],
-        )
-        u, v, w = (
-            constants[block, lane],
-            constants[block, LANES_FLOAT32 + lane],
-            constants[block, 2 * LANES_FLOAT32 + lane],
-        )
+        s, block, lane = order[place], place // L, place % L
+        i, j, k = vertices[block, lane], vertices[block, L + lane], vertices[block, 2 * L + lane]
+        u, v, w = constants[block, lane], constants[block, L + lane], constants[block, 2 * L + lane]
         depth = margin
         for a in range(3):
             sample = u * x[i + a] + v * x[j + a] + w * x[k + a]
             depth -= normals[s, a] * (sample - points[s, a])
-            state[block, a * LANES_FLOAT32 + lane] = normals[s, a]
-        state[block, 3 * LANES_FLOAT32 + lane] = depth
+            state[block, a * L + lane] = normals[s, a]
+        state[block, 3 * L + lane] = depth
         deepest[block] = max(deepest[block], np.float32(depth))
     return deepest
 
@@ -95,37 +80,35 @@ def contact_gradient(data, u, gradient, s):
         if deepest_at_start[b] < height:
             continue
         at, c, n = vertices[b], constants[b], planes[b]
-        for g in range(LANES_FLOAT32):
-            i, j, k = at[g], at[LANES_FLOAT32 + g], at[2 * LANES_FLOAT32 + g]
+        for g in range(L):
+            i, j, k = at[g], at[L + g], at[2 * L + g]
             for a in range(3):
-                s[a * LANES_FLOAT32 + g] = u[i + a]
-                s[(3 + a) * LANES_FLOAT32 + g] = u[j + a]
-                s[(6 + a) * LANES_FLOAT32 + g] = u[k + a]
+                s[a * L + g] = u[i + a]
+                s[(3 + a) * L + g] = u[j + a]
+                s[(6 + a) * L + g] = u[k + a]
         deepest, energy = np.float32(0.0), np.float32(0.0)
-        for g in range(LANES_FLOAT32):
-            w0, w1, w2 = c[g], c[LANES_FLOAT32 + g], c[2 * LANES_FLOAT32 + g]
-            x = w0 * s[g] + w1 * s[3 * LANES_FLOAT32 + g] + w2 * s[6 * LANES_FLOAT32 + g]
-            y = w0 * s[LANES_FLOAT32 + g] + w1 * s[4 * LANES_FLOAT32 + g] + w2 * s[7 * LANES_FLOAT32 + g]
-            z = w0 * s[2 * LANES_FLOAT32 + g] + w1 * s[5 * LANES_FLOAT32 + g] + w2 * s[8 * LANES_FLOAT32 + g]
-            depth = n[3 * LANES_FLOAT32 + g] - (
-                n[g] * x + n[LANES_FLOAT32 + g] * y + n[2 * LANES_FLOAT32 + g] * z
-            )
+        for g in range(L):
+            w0, w1, w2 = c[g], c[L + g], c[2 * L + g]
+            x = w0 * s[g] + w1 * s[3 * L + g] + w2 * s[6 * L + g]
+            y = w0 * s[L + g] + w1 * s[4 * L + g] + w2 * s[7 * L + g]
+            z = w0 * s[2 * L + g] + w1 * s[5 * L + g] + w2 * s[8 * L + g]
+            depth = n[3 * L + g] - (n[g] * x + n[L + g] * y + n[2 * L + g] * z)
             depth = max(depth, np.float32(0.0))
-            stiffness = c[3 * LANES_FLOAT32 + g] * depth * depth
+            stiffness = c[3 * L + g] * depth * depth
             energy += stiffness * depth
-            s[9 * LANES_FLOAT32 + g] = -THREE * stiffness
+            s[9 * L + g] = -THREE * stiffness
             deepest = max(deepest, depth)
         if deepest == np.float32(0.0):
             continue
         total += float(energy)
-        for g in range(LANES_FLOAT32):
-            force = s[9 * LANES_FLOAT32 + g]
+        for g in range(L):
+            force = s[9 * L + g]
             if force == np.float32(0.0):
                 continue
             for corner in range(3):
-                part, i = force * c[corner * LANES_FLOAT32 + g], at[corner * LANES_FLOAT32 + g]
+                part, i = force * c[corner * L + g], at[corner * L + g]
                 for a in range(3):
-                    gradient[i + a] += part * n[a * LANES_FLOAT32 + g]
+                    gradient[i + a] += part * n[a * L + g]
     return total
 
 
@@ -134,15 +117,15 @@ def contact_stiffness(data, values):
     """Add the stiffness [N/m] of the samples that touch at x_0; returns 0."""
     deepest, _, constants, planes, places = data
     for b in np.flatnonzero(deepest > 0.0):
-        for g in range(LANES_FLOAT32):
-            depth = planes[b, 3 * LANES_FLOAT32 + g]
+        for g in range(L):
+            depth = planes[b, 3 * L + g]
             if depth <= 0.0:
                 continue
-            curvature = 6.0 * constants[b, 3 * LANES_FLOAT32 + g] * depth
+            curvature = 6.0 * constants[b, 3 * L + g] * depth
             for i in range(3):
                 for j in range(3):
-                    place = places[b, (3 * i + j) * LANES_FLOAT32 + g]
+                    place = places[b, (3 * i + j) * L + g]
                     if place >= 0:
-                        weights = constants[b, i * LANES_FLOAT32 + g] * constants[b, j * LANES_FLOAT32 + g]
+                        weights = constants[b, i * L + g] * constants[b, j * L + g]
                         values[place] += curvature * weights
     return 0.0

@@ -1,6 +1,6 @@
 """StVK in float32, LANES_FLOAT32 faces at a time: the kernel of early-stopped L-BFGS.
 
-See kernels.float32_lanes for the layout.
+See kernels.float32_layout for the layout.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import numpy as np
 from reference_sim.kernels.float32_layout import (
     FAST,
     HALF,
-    LANES_FLOAT32,
     ONE,
     TWO,
     Float32Lanes,
@@ -20,6 +19,7 @@ from reference_sim.kernels.float32_layout import (
     lay_out,
     set_edges,
 )
+from reference_sim.kernels.float32_layout import LANES_FLOAT32 as L
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -49,31 +49,20 @@ def membrane_gradient(data, u, gradient, s):
     total = 0.0
     for b in range(len(vertices)):
         at, c, e = vertices[b], constants[b], edges[b]
-        for g in range(LANES_FLOAT32):
-            i, j, k = at[g], at[LANES_FLOAT32 + g], at[2 * LANES_FLOAT32 + g]
+        for g in range(L):
+            i, j, k = at[g], at[L + g], at[2 * L + g]
             s[g] = u[j] - u[i]
-            s[LANES_FLOAT32 + g] = u[j + 1] - u[i + 1]
-            s[2 * LANES_FLOAT32 + g] = u[j + 2] - u[i + 2]
-            s[3 * LANES_FLOAT32 + g] = u[k] - u[i]
-            s[4 * LANES_FLOAT32 + g] = u[k + 1] - u[i + 1]
-            s[5 * LANES_FLOAT32 + g] = u[k + 2] - u[i + 2]
+            s[L + g] = u[j + 1] - u[i + 1]
+            s[2 * L + g] = u[j + 2] - u[i + 2]
+            s[3 * L + g] = u[k] - u[i]
+            s[4 * L + g] = u[k + 1] - u[i + 1]
+            s[5 * L + g] = u[k + 2] - u[i + 2]
         energy = np.float32(0.0)
-        for g in range(LANES_FLOAT32):
-            x1, y1, z1 = (
-                s[g] + e[g],
-                s[LANES_FLOAT32 + g] + e[LANES_FLOAT32 + g],
-                s[2 * LANES_FLOAT32 + g] + e[2 * LANES_FLOAT32 + g],
-            )
-            x2 = s[3 * LANES_FLOAT32 + g] + e[3 * LANES_FLOAT32 + g]
-            y2 = s[4 * LANES_FLOAT32 + g] + e[4 * LANES_FLOAT32 + g]
-            z2 = s[5 * LANES_FLOAT32 + g] + e[5 * LANES_FLOAT32 + g]
-            d00, d01, d10, d11 = (
-                c[g],
-                c[LANES_FLOAT32 + g],
-                c[2 * LANES_FLOAT32 + g],
-                c[3 * LANES_FLOAT32 + g],
-            )
-            area = c[4 * LANES_FLOAT32 + g]
+        for g in range(L):
+            x1, y1, z1 = s[g] + e[g], s[L + g] + e[L + g], s[2 * L + g] + e[2 * L + g]
+            x2, y2, z2 = s[3 * L + g] + e[3 * L + g], s[4 * L + g] + e[4 * L + g], s[5 * L + g] + e[5 * L + g]
+            d00, d01, d10, d11 = c[g], c[L + g], c[2 * L + g], c[3 * L + g]
+            area = c[4 * L + g]
             ax, ay, az = x1 * d00 + x2 * d10, y1 * d00 + y2 * d10, z1 * d00 + z2 * d10
             bx, by, bz = x1 * d01 + x2 * d11, y1 * d01 + y2 * d11, z1 * d01 + z2 * d11
             g00 = HALF * (ax * ax + ay * ay + az * az - ONE)
@@ -87,14 +76,14 @@ def membrane_gradient(data, u, gradient, s):
             # P = F S, and the force of a corner P b.
             t00, t01 = d00 * s00 + d01 * s01, d00 * s01 + d01 * s11
             t10, t11 = d10 * s00 + d11 * s01, d10 * s01 + d11 * s11
-            s[6 * LANES_FLOAT32 + g], s[9 * LANES_FLOAT32 + g] = ax * t00 + bx * t01, ax * t10 + bx * t11
-            s[7 * LANES_FLOAT32 + g], s[10 * LANES_FLOAT32 + g] = ay * t00 + by * t01, ay * t10 + by * t11
-            s[8 * LANES_FLOAT32 + g], s[11 * LANES_FLOAT32 + g] = az * t00 + bz * t01, az * t10 + bz * t11
+            s[6 * L + g], s[9 * L + g] = ax * t00 + bx * t01, ax * t10 + bx * t11
+            s[7 * L + g], s[10 * L + g] = ay * t00 + by * t01, ay * t10 + by * t11
+            s[8 * L + g], s[11 * L + g] = az * t00 + bz * t01, az * t10 + bz * t11
         total += float(energy)
-        for g in range(LANES_FLOAT32):
-            i, j, k = at[g], at[LANES_FLOAT32 + g], at[2 * LANES_FLOAT32 + g]
+        for g in range(L):
+            i, j, k = at[g], at[L + g], at[2 * L + g]
             for a in range(3):
-                f1, f2 = s[(6 + a) * LANES_FLOAT32 + g], s[(9 + a) * LANES_FLOAT32 + g]
+                f1, f2 = s[(6 + a) * L + g], s[(9 + a) * L + g]
                 gradient[j + a] += f1
                 gradient[k + a] += f2
                 gradient[i + a] -= f1 + f2
