@@ -41,145 +41,80 @@ def make_parser() -> argparse.ArgumentParser:
         description="Simulate a cloth: backward Euler, every step minimised to a stated tolerance.",
         epilog=EXAMPLES,
     )
-    parser.add_argument("garment", help="triangle mesh at rest: OBJ, PLY, VTK, STL or OFF")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
-    parser.add_argument(
-        "--pc2", type=Path, metavar="OUT.pc2", help="also a point cache, with OUT.obj beside it"
-    )
-    existing = parser.add_mutually_exclusive_group()
-    existing.add_argument(
-        "--resume", action="store_true", help="go on after the last whole frame of OUT.vtkhdf"
-    )
-    existing.add_argument("--overwrite", action="store_true", help="replace outputs that exist")
+    add = parser.add_argument
+    add("garment", help="triangle mesh at rest: OBJ, PLY, VTK, STL or OFF")
+    add("-o", "--output", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
+    add("--pc2", type=Path, metavar="OUT.pc2", help="also a point cache, with OUT.obj beside it")
+    add = parser.add_mutually_exclusive_group().add_argument
+    add("--resume", action="store_true", help="go on after the last whole frame of OUT.vtkhdf")
+    add("--overwrite", action="store_true", help="replace outputs that exist")
 
-    meshes = parser.add_argument_group("meshes")
-    units = ("m", "cm", "mm", "in")
-    meshes.add_argument("--units", choices=units, default="m", help="of all meshes (default m)")
-    meshes.add_argument("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
-    meshes.add_argument(
-        "--rest",
-        choices=("mesh", "uv"),
-        default="mesh",
+    add = parser.add_argument_group("meshes").add_argument
+    add("--units", choices=("m", "cm", "mm", "in"), default="m", help="of all meshes (default m)")
+    add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
+    add("--rest", choices=("mesh", "uv"), default="mesh",
         help="what has no strain: the garment's mesh itself (default), or its UV chart, the sewing pattern",
-    )
-    meshes.add_argument(
-        "--uv-scale", type=_positive, metavar="M", help="metres per unit of the chart (default: as --units)"
-    )
-    meshes.add_argument(
-        "--obstacle",
-        metavar="MESHES",
+    )  # fmt: skip
+    add("--uv-scale", type=_positive, metavar="M", help="metres per unit of the chart (default: as --units)")
+    add("--obstacle", metavar="MESHES",
         help="closed mesh, or one per frame: a folder, a quoted glob, a VTKHDF trajectory (in metres, y up)",
-    )
-    meshes.add_argument(
-        "--obstacle-rest",
-        metavar="MESH",
+    )  # fmt: skip
+    add("--obstacle-rest", metavar="MESH",
         help="the obstacle as the garment was made for it: cloth then meets only what lies near it there",
-    )
-    meshes.add_argument(
-        "--region", type=_positive, default=0.20, metavar="M", help="how near [m] (default 0.20)"
-    )
-    meshes.add_argument(
-        "--pins",
-        metavar="WHICH",
+    )  # fmt: skip
+    add("--region", type=_positive, default=0.20, metavar="M", help="how near [m] (default 0.20)")
+    add("--pins", metavar="WHICH",
         help="vertices held in place: '0,9,12', or 'top', or a box in metres with y up, as in 'y>1.4,x<0.1'",
-    )
+    )  # fmt: skip
 
-    material = parser.add_argument_group("material (default: the cotton of the SNUG paper)")
-    material.add_argument(
-        "--material",
-        type=Path,
-        metavar="FILE",
+    add = parser.add_argument_group("material (default: the cotton of the SNUG paper)").add_argument
+    add("--material", type=Path, metavar="FILE",
         help=".toml or .json of the values below; those given below come first",
-    )
+    )  # fmt: skip
     for parameter in fields(Material):
         unit, meaning = UNITS_OF_MATERIAL[parameter.name]
-        material.add_argument(
-            "--" + parameter.name.replace("_", "-"),
-            type=_number,
-            metavar=unit,
-            help=f"{meaning} (default {parameter.default:g})",
-        )
-    material.add_argument(
-        "--bending-scaling",
-        choices=("length_area", "none"),
-        default="length_area",
+        flag, text = "--" + parameter.name.replace("_", "-"), f"{meaning} (default {parameter.default:g})"
+        add(flag, type=_number, metavar=unit, help=text)
+    add("--bending-scaling", choices=("length_area", "none"), default="length_area",
         help="length_area: k/2 theta^2 times l^2/(4 (A1 + A2)) (default); none: as the SNUG paper prints it, "
         "without",
-    )
-    material.add_argument(
-        "--rest-angles", choices=("flat", "rest"), default="flat", help="hinges at rest (default flat)"
-    )
-    _add_contact_and_time(parser)
-    return parser
+    )  # fmt: skip
+    add("--rest-angles", choices=("flat", "rest"), default="flat", help="hinges at rest (default flat)")
 
-
-def _add_contact_and_time(parser: argparse.ArgumentParser) -> None:
-    contact = parser.add_argument_group("contact")
-    contact.add_argument(
-        "--contact-stiffness", type=_positive, metavar="J_M5", help="of the penalty [J/m^5] (default 3.4e6)"
-    )
-    contact.add_argument(
-        "--contact-margin", type=_positive, metavar="M", help="of the penalty [m] (default 0.004)"
-    )
-    contact.add_argument(
-        "--contact-samples",
-        choices=("all", "vertices"),
+    add = parser.add_argument_group("contact").add_argument
+    add("--contact-stiffness", type=_positive, metavar="J_M5", help="of the penalty [J/m^5] (default 3.4e6)")
+    add("--contact-margin", type=_positive, metavar="M", help="of the penalty [m] (default 0.004)")
+    add("--contact-samples", choices=("all", "vertices"),
         help="all: vertices, edge midpoints and centroids (default)",
-    )
-    contact.add_argument(
-        "--friction", type=_not_negative, default=0.0, metavar="MU", help="coefficient (default 0)"
-    )
-    contact.add_argument(
-        "--barrier",
-        action="store_true",
+    )  # fmt: skip
+    add("--friction", type=_not_negative, default=0.0, metavar="MU", help="coefficient (default 0)")
+    add("--barrier", action="store_true",
         help="IPC's barrier in place of the penalty: nothing passes, twelve times the time (needs ipctk)",
-    )
-    contact.add_argument(
-        "--self-contact",
-        action="store_true",
+    )  # fmt: skip
+    add("--self-contact", action="store_true",
         help="the cloth never crosses itself: a barrier, beside the penalty or with --barrier (needs ipctk)",
-    )
-    contact.add_argument(
-        "--barrier-distance", type=_positive, metavar="M", help="where it begins [m] (default 0.002)"
-    )
-    contact.add_argument(
-        "--barrier-stiffness", type=_positive, metavar="PA", help="its pressure [Pa] (default 100)"
-    )
-    contact.add_argument(
-        "--area-barrier",
-        type=_not_negative,
-        default=0.0,
-        metavar="J_M2",
+    )  # fmt: skip
+    add("--barrier-distance", type=_positive, metavar="M", help="where it begins [m] (default 0.002)")
+    add("--barrier-stiffness", type=_positive, metavar="PA", help="its pressure [Pa] (default 100)")
+    add("--area-barrier", type=_not_negative, default=0.0, metavar="J_M2",
         help="keeps triangles from collapsing [J/m^2]; 100 is enough (default 0: none)",
-    )
+    )  # fmt: skip
 
-    steps = parser.add_argument_group("time and solver")
-    steps.add_argument(
-        "--dt",
-        type=_positive,
-        metavar="S",
+    add = parser.add_argument_group("time and solver").add_argument
+    add("--dt", type=_positive, metavar="S",
         help="time between frames, as 0.02 or 1/60 (default: that of an obstacle's trajectory, or 1/30)",
-    )
-    steps.add_argument(
-        "--frames", type=_count, metavar="N", help=f"default: those of the obstacle, or {DEFAULT_FRAMES}"
-    )
-    steps.add_argument("--substeps", type=_count, default=1, metavar="N", help="steps per frame (default 1)")
-    steps.add_argument(
-        "--tolerance",
-        type=_positive,
-        default=1e-6,
-        metavar="W",
+    )  # fmt: skip
+    add("--frames", type=_count, metavar="N", help=f"default: those of the obstacle, or {DEFAULT_FRAMES}")
+    add("--substeps", type=_count, default=1, metavar="N", help="steps per frame (default 1)")
+    add("--tolerance", type=_positive, default=1e-6, metavar="W",
         help="relative residual: largest force left, in mean vertex weights (default 1e-6)",
-    )
-    steps.add_argument(
-        "--method",
-        choices=("newton", "lbfgs"),
+    )  # fmt: skip
+    add("--method", choices=("newton", "lbfgs"),
         help="lbfgs, finished by newton (default), or newton alone (default with a barrier)",
-    )
-    steps.add_argument(
-        "--max-iterations", type=_count, metavar="N", help="per step (default 300 of newton, 500 of lbfgs)"
-    )
-    steps.add_argument("--quiet", action="store_true", help="no progress bar, no summary")
+    )  # fmt: skip
+    add("--max-iterations", type=_count, metavar="N", help="per step (default 300 of newton, 500 of lbfgs)")
+    add("--quiet", action="store_true", help="no progress bar, no summary")
+    return parser
 
 
 def _number(text: str) -> float:
