@@ -181,8 +181,8 @@ def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 @njit(cache=True, inline="always")
-def _depth(x, stencil, weight, margin, c, n):
-    """Return max(eps - n.(x_s - c), 0)."""
+def sample_depth(x, stencil, weight, margin, c, n):
+    """Return max(eps - n.(x_s - c), 0) of one contact sample [m]."""
     distance = 0.0
     for i in range(3):
         sample = weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
@@ -194,7 +194,7 @@ def _depth(x, stencil, weight, margin, c, n):
 def _gradient(x, stencils, weights, stiffness, margin, points, normals, gradient):
     total = 0.0
     for s in range(len(stencils)):
-        depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
+        depth = sample_depth(x, stencils[s], weights[s], margin, points[s], normals[s])
         if depth > 0.0:
             total += stiffness[s] * depth * depth * depth
             force = -3.0 * stiffness[s] * depth * depth
@@ -209,7 +209,7 @@ def _curvatures(x, stencils, weights, stiffness, margin, points, normals):
     """Return the samples in contact and their curvatures 6 k a_s depth."""
     elements, curvatures, count = np.empty(len(stencils), np.int64), np.empty(len(stencils)), 0
     for s in range(len(stencils)):
-        depth = _depth(x, stencils[s], weights[s], margin, points[s], normals[s])
+        depth = sample_depth(x, stencils[s], weights[s], margin, points[s], normals[s])
         if depth > 0.0:
             elements[count], curvatures[count] = s, 6.0 * stiffness[s] * depth
             count += 1

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reference_sim.energies.contact_penalty.definition import sample_depth
 from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks, whole
 from reference_sim.kernels.kernel_cache import njit
 
@@ -32,23 +33,13 @@ def _arrays(term: ContactPenalty) -> tuple:
     return whole(term.stencils), term.weights, term.stiffness, term.margin, *planes
 
 
-@njit(cache=True, inline="always")
-def depth(x, stencil, weight, margin, point, normal):
-    """Return max(margin - n . (x_s - c), 0) of one contact sample [m]."""
-    distance = 0.0
-    for i in range(3):
-        sample = weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
-        distance += normal[i] * (sample - point[i])
-    return max(margin - distance, 0.0)
-
-
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _add_block(data, x, v, g, H, scratch):
     """Add gradient and block of vertex v."""
     first, corners, stencils, shares, stiffness, margin, points, normals = data
     for at in range(first[v], first[v + 1]):
         e, corner = corners[at] // 3, corners[at] % 3
-        d = depth(x, stencils[e], shares[e], margin, points[e], normals[e])
+        d = sample_depth(x, stencils[e], shares[e], margin, points[e], normals[e])
         if d > 0.0:
             share = shares[e, corner]
             for i in range(3):
@@ -63,7 +54,7 @@ def _solve(data, x, w):
     """Solve one sample after the other."""
     stencils, shares, stiffness, margin, points, normals, force = data
     for e in range(len(stencils)):
-        d = depth(x, stencils[e], shares[e], margin, points[e], normals[e])
+        d = sample_depth(x, stencils[e], shares[e], margin, points[e], normals[e])
         if d > 0.0 or force[e] != 0.0:
             compliance = 1.0 / (2.0 * stiffness[e])
             slope = -1.5 * np.sqrt(d)  # of C along the normal

@@ -111,17 +111,17 @@ class StretchStVK(Energy):
 
 
 @njit(cache=True, inline="always")
-def _deformation(x, face, D, fa, fb):
-    """Return the strain (G00, G11, G01); the columns of F are written into fa and fb."""
+def strain(x, face, D, fa, fb):
+    """Return G00, G11, G01 of the Green strain; the columns of F are written into fa and fb."""
+    p, q, r = face[0], face[1], face[2]
     for i in range(3):
-        e1 = x[face[1], i] - x[face[0], i]
-        e2 = x[face[2], i] - x[face[0], i]
-        fa[i] = e1 * D[0, 0] + e2 * D[1, 0]
-        fb[i] = e1 * D[0, 1] + e2 * D[1, 1]
-    G00 = 0.5 * (fa[0] * fa[0] + fa[1] * fa[1] + fa[2] * fa[2] - 1.0)
-    G11 = 0.5 * (fb[0] * fb[0] + fb[1] * fb[1] + fb[2] * fb[2] - 1.0)
-    G01 = 0.5 * (fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2])
-    return G00, G11, G01
+        first, second = x[q, i] - x[p, i], x[r, i] - x[p, i]
+        fa[i] = first * D[0, 0] + second * D[1, 0]
+        fb[i] = first * D[0, 1] + second * D[1, 1]
+    aa = fa[0] * fa[0] + fa[1] * fa[1] + fa[2] * fa[2]
+    bb = fb[0] * fb[0] + fb[1] * fb[1] + fb[2] * fb[2]
+    ab = fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
+    return 0.5 * (aa - 1.0), 0.5 * (bb - 1.0), 0.5 * ab
 
 
 @njit(cache=True, error_model="numpy")
@@ -206,8 +206,8 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
     """
     fa, fb, da, db = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for f in range(faces.shape[0]):
-        G00, G11, G01 = _deformation(x, faces[f], Dm_inverse[f], fa, fb)
-        _deformation(step, faces[f], Dm_inverse[f], da, db)
+        G00, G11, G01 = strain(x, faces[f], Dm_inverse[f], fa, fb)
+        strain(step, faces[f], Dm_inverse[f], da, db)
         for i in range(3):
             G00 += fa[i] * da[i]
             G11 += fb[i] * db[i]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reference_sim.energies.stretch_stvk.definition import strain
 from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks, whole
 from reference_sim.kernels.kernel_cache import njit
 
@@ -30,20 +31,6 @@ def constraint(term: StretchStVK) -> Constraints:
 def _arrays(term: StretchStVK) -> tuple:
     """Return faces, Dm^-1, areas, lambda and mu."""
     return whole(term.stencils), term.Dm_inverse, term.areas, float(term.lam), float(term.mu)
-
-
-@njit(cache=True, inline="always")
-def strain(x, face, D, fa, fb):
-    """Return G00, G11, G01 of the Green strain; the columns of F are written into fa and fb."""
-    p, q, r = face[0], face[1], face[2]
-    for i in range(3):
-        first, second = x[q, i] - x[p, i], x[r, i] - x[p, i]
-        fa[i] = first * D[0, 0] + second * D[1, 0]
-        fb[i] = first * D[0, 1] + second * D[1, 1]
-    aa = fa[0] * fa[0] + fa[1] * fa[1] + fa[2] * fa[2]
-    bb = fb[0] * fb[0] + fb[1] * fb[1] + fb[2] * fb[2]
-    ab = fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
-    return 0.5 * (aa - 1.0), 0.5 * (bb - 1.0), 0.5 * ab
 
 
 @njit(cache=True, inline="always")

@@ -25,8 +25,8 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.energies.bend_hinge.sweeps import fold
-from reference_sim.energies.contact_penalty.sweeps import depth
-from reference_sim.energies.stretch_stvk.sweeps import strain
+from reference_sim.energies.contact_penalty.definition import sample_depth
+from reference_sim.energies.stretch_stvk.definition import strain
 from reference_sim.kernels.element_sweeps import SCRATCH_SHAPE
 from reference_sim.kernels.fast_kernels import step_terms
 from reference_sim.minimise import Newton, make_minimiser
@@ -81,7 +81,7 @@ def test_the_constraints_of_xpbd_carry_our_energies(touching):
     assert 0.5 * k @ np.square(folds) == pytest.approx(energies["bending"], rel=1e-12)
     stencils, shares, k, margin, points, normals, _ = contacts
     planes = zip(stencils, shares, points, normals)
-    C = np.array([depth(x, s, w, margin, c, n) ** 1.5 for s, w, c, n in planes])
+    C = np.array([sample_depth(x, s, w, margin, c, n) ** 1.5 for s, w, c, n in planes])
     assert 0.5 * (2 * k) @ C**2 == pytest.approx(energies["collision"], rel=1e-12)
 
 
