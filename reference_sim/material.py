@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-import warnings
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -155,16 +154,9 @@ class Material:
     def self_weight_stretch(self, length: float) -> float:
         """Estimate linearly the relative stretch at the top of a strip of `length` [m] under its own weight.
 
-        Warns above 10 %: at that point a unit is usually wrong (the thickness counted twice, say).
+        Above 10 % a unit is usually wrong (the thickness counted twice, say).
         """
-        stretch = self.areal_density * GRAVITY * length / self.membrane_modulus
-        if stretch > 0.1:
-            warnings.warn(
-                f"a strip of {length:g} m stretches by about {100 * stretch:.0f} % under its own weight: "
-                "check the units of young_modulus [Pa], thickness [m] and density [kg/m^3]",
-                stacklevel=2,
-            )
-        return stretch
+        return self.areal_density * GRAVITY * length / self.membrane_modulus
 
 
 def _table(path: Path) -> dict[str, Any]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from reference_sim.command.simulate_inputs import BadInput, print_note, read_cloth, read_obstacle
 from reference_sim.command.simulate_options import DEFAULT_DT, DEFAULT_FRAMES
 from reference_sim.command.simulate_terms import check_terms, make_terms
-from reference_sim.command.summary import predict_stretch, summarise
+from reference_sim.command.summary import summarise
 from reference_sim.files.mesh_files import mesh_paths
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory.point_cache import write_point_cache
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
 
 DONE, NOT_CONVERGED = 0, 1  # exit status
+LARGEST_STRETCH = 0.1  # by its own weight, beyond which a unit is probably wrong
 
 
 def simulate_files(options: Namespace) -> int:
@@ -39,9 +42,14 @@ def simulate_files(options: Namespace) -> int:
     dt = options.dt or obstacle_dt or DEFAULT_DT
     if obstacle_dt and abs(dt - obstacle_dt) > 1e-6 * obstacle_dt:
         print_note(f"{options.obstacle} has {obstacle_dt:.4g} s between frames, and --dt is {dt:.4g}")
-    stretch, note = predict_stretch(cloth)
-    if note:
-        print_note(note)
+    size = np.ptp(cloth.rest_positions, axis=0)
+    length = float(size[1] or size.max())
+    stretch = cloth.material.self_weight_stretch(length)
+    if stretch > LARGEST_STRETCH:
+        print_note(
+            f"a strip of {length:g} m stretches by about {100 * stretch:.0f} % under its own weight: "
+            "check the units of young_modulus [Pa], thickness [m] and density [kg/m^3]"
+        )
     if options.resume and not options.output.exists():
         print_note(f"{options.output} does not exist yet: starting at the beginning")
     given = {"method": options.method, "max_iterations": options.max_iterations}
@@ -64,7 +72,9 @@ def simulate_files(options: Namespace) -> int:
         written += write_point_cache(options.pc2, trajectory)
     if not options.quiet:
         print(summarise(trajectory, obstacle, frames=frames))
-        print(stretch)
+        print(
+            f"stretch    {stretch:.2%} predicted at the top of {length:.3g} m of this cloth under its weight"
+        )
         print(f"wrote      {', '.join(map(str, written))}", flush=True)
     whole = trajectory.frames == frames and trajectory.status == "converged"
     return DONE if whole else NOT_CONVERGED

@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.cloth import Cloth
 from reference_sim.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
-
-
-def predict_stretch(cloth: Cloth) -> tuple[str, str]:
-    """Predict how far a strip as long as this cloth stretches under its own weight.
-
-    Returns:
-        A line in words, and the warning, if there is one.
-    """
-    size = np.ptp(cloth.rest_positions, axis=0)
-    length = float(size[1] or size.max())
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        stretch = cloth.material.self_weight_stretch(length)
-    line = f"stretch    {stretch:.2%} predicted at the top of {length:.3g} m of this cloth under its weight"
-    return line, "".join(str(warning.message) for warning in caught)
 
 
 def summarise(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int) -> str:
