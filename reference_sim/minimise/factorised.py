@@ -8,13 +8,14 @@ from reference_sim.assembly.cholesky import analyse
 from reference_sim.minimise.descent import Descent, Observer, mean_weight
 from reference_sim.potential import Potential
 
+REFERENCE_DT = 1 / 30  # [s], in shifts by M/dt^2 of a potential without inertia
+
 
 class FactorisedHessian:
     """The Hessian over the free vertices: one symbolic analysis serves every step.
 
     Args:
         tolerance: of the relative residual, below which curvature is compared.
-        reference_dt: time [s] in the shift M/dt^2 where the potential has no inertia of its own.
 
     Attributes:
         metric: (3n,) M/dt^2 [N/m], the unit of shifts.
@@ -28,12 +29,12 @@ class FactorisedHessian:
     downward: np.ndarray | None = None
     settled, evidence = True, ""
 
-    def __init__(self, potential: Potential, *, tolerance: float, reference_dt: float) -> None:
+    def __init__(self, potential: Potential, *, tolerance: float) -> None:
         cloth = potential.cloth
         self._pattern = potential.pattern(cloth.free)
         self._analyse()
         self.static = potential.time_step is None
-        self.metric = np.repeat(cloth.masses[cloth.free] / (potential.time_step or reference_dt) ** 2, 3)
+        self.metric = np.repeat(cloth.masses[cloth.free] / (potential.time_step or REFERENCE_DT) ** 2, 3)
         self.flat = tolerance * mean_weight(potential) / float(np.sqrt(cloth.areas.sum()))
 
     def _analyse(self) -> None:

@@ -35,10 +35,10 @@ EXHAUSTED = 1e-12  # residual below which the steps have seen all that the start
 class IterativeHessian(FactorisedHessian):
     """FactorisedHessian whose preconditioner alone is factorised: a solve may meet negative curvature."""
 
-    def __init__(self, potential: Potential, *, tolerance: float, reference_dt: float) -> None:
+    def __init__(self, potential: Potential, *, tolerance: float) -> None:
         self._scalar = ScalarPreconditioner(potential)
         self._weight, self._faces = mean_weight(potential), potential.cloth.faces
-        super().__init__(potential, tolerance=tolerance, reference_dt=reference_dt)
+        super().__init__(potential, tolerance=tolerance)
 
     def _analyse(self) -> None:
         indptr, rows, order = self._pattern.graph

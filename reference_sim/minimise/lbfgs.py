@@ -31,7 +31,8 @@ from reference_sim.potential import Potential
 if TYPE_CHECKING:
     from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
 
-SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals
+SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals at which Newton takes over
+PATIENCE = 100  # iterations after which it does in any case
 LARGEST_COMPILED = 10_000  # vertices: from about here on a package's factorisation is faster
 
 
@@ -43,10 +44,9 @@ class LBFGS:
         tolerance: as in Newton.
         max_iterations: iterations, of Newton's too, before giving up with status max_iterations.
         memory: number of remembered steps; 0 is preconditioned gradient descent.
-        switch: relative residual at which Newton takes over; None is SWITCH, or COMPILED_SWITCH.
-        patience: iterations after which it takes over in any case.
-        finish: whether Newton takes over at all. Without it the result can only be "max_iterations",
-            "stalled", "timeout" or "diverged": nothing but a look at the curvature can say "converged".
+        finish: whether Newton takes over, at SWITCH or COMPILED_SWITCH, or after PATIENCE iterations. Without
+            it the result can only be "max_iterations", "stalled", "timeout" or "diverged": nothing but a look
+            at the curvature can say "converged".
         timeout: seconds, for both together.
         observe: called with every point (V, 3) [m] that either of them kept, the start included; of the
             compiled part with the last.
@@ -63,8 +63,6 @@ class LBFGS:
         tolerance: float = 1e-6,
         max_iterations: int = 500,
         memory: int = 10,
-        switch: float | None = None,
-        patience: int = 100,
         finish: bool = True,
         timeout: float = float("inf"),
         observe: Observer | None = None,
@@ -73,16 +71,14 @@ class LBFGS:
         self.tolerance, self.timeout = tolerance, timeout
         check_tolerance(tolerance)
         self.observe = observe
-        self.max_iterations = min(patience, max_iterations) if finish else max_iterations
+        self.max_iterations = min(PATIENCE, max_iterations) if finish else max_iterations
         small = potential.cloth.vertex_count <= LARGEST_COMPILED
         fast = finish and memory > 0 and small and potential.time_step is not None
         if fast and (slow := terms_without_kernel(potential, "float32_lanes")):
             instead = "every step begins in float64 by numpy (docs/extend.md, An energy)"
             warn_slow_path("LBFGS", "float32 kernel", slow, instead)
             fast = False
-        if switch is None:
-            switch = COMPILED_SWITCH if fast else SWITCH
-        self.switch = max(switch, tolerance) if finish else tolerance
+        self.switch = max(COMPILED_SWITCH if fast else SWITCH, tolerance) if finish else tolerance
         if not any(energy.has_scalar_stiffness for energy in potential.energies):
             raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
         self._compiled = _compiled(potential, self.max_iterations, self.switch) if fast else None

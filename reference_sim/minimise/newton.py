@@ -56,7 +56,6 @@ class Newton:
         max_iterations: iterations before giving up with status max_iterations; every direction solved for is
             one, also one that is taken back.
         timeout: seconds before giving up with status timeout.
-        reference_dt: time [s] in the shift M/dt^2 where the potential has no inertia of its own.
         reuse: whether a factorisation serves further quasi-Newton steps, each of them an iteration.
         start_projected: whether the first iterations take all negative curvature out: one Hessian is then
             assembled where the search for the least projection assembles five.
@@ -73,7 +72,6 @@ class Newton:
         tolerance: float = 1e-6,
         max_iterations: int = 300,
         timeout: float = float("inf"),
-        reference_dt: float = 1 / 30,
         reuse: bool = False,
         start_projected: bool = False,
         observe: Observer | None = None,
@@ -83,7 +81,7 @@ class Newton:
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
         small = 3 * int(potential.cloth.free.sum()) <= LARGEST_FACTORISED
         kind = FactorisedHessian if small else IterativeHessian
-        self.hessian = kind(potential, tolerance=tolerance, reference_dt=reference_dt)
+        self.hessian = kind(potential, tolerance=tolerance)
         self.first_level = len(CONVEXITY) - 1 if start_projected and small else 0
         self.step_tolerance = STEP_TOLERANCE * float(potential.cloth.edge_lengths.mean())
 

@@ -24,7 +24,6 @@ from reference_sim.minimise.newton import Newton, NewtonRun
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 
-REFERENCE_DT = 1.0 / 30.0  # s, in shifts by M/dt^2 of a potential without inertia
 SINGULAR = 1e-9  # of the largest singular value: smaller ones are those of columns that others express
 
 
@@ -123,9 +122,7 @@ class SubspaceNewton(Newton):
         **options: Any,
     ) -> None:
         super().__init__(potential, **{"reuse": True, "start_projected": True} | options)
-        self.hessian: SubspaceHessian = SubspaceHessian(
-            potential, tolerance=self.tolerance, reference_dt=REFERENCE_DT
-        )
+        self.hessian: SubspaceHessian = SubspaceHessian(potential, tolerance=self.tolerance)
         self._basis, self._placements, self._offsets = basis, placements, offsets
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:

@@ -132,7 +132,7 @@ def test_the_factor_solves(cells, pinned):
 @pytest.mark.parametrize("iterations", [1, 5, 10])
 def test_iterations_are_those_of_the_exact_solver(seed, iterations):
     potential, guess = pressed(seed)
-    exact = LBFGS(potential, max_iterations=iterations, finish=False, switch=1e-9).minimise(guess)
+    exact = LBFGS(potential, max_iterations=iterations, finish=False).minimise(guess)
     found = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
     assert found.iterations == iterations == exact.iterations and found.status == "max_iterations"
     start, reached = potential.value(guess), potential.value(found.positions)

@@ -87,7 +87,7 @@ def test_nothing_of_the_size_of_the_hessian_is_analysed(large, monkeypatch):
 
 
 def hessian_at(potential: Potential, x: np.ndarray, convexity: float) -> tuple[IterativeHessian, np.ndarray]:
-    hessian = IterativeHessian(potential, tolerance=1e-6, reference_dt=DT)
+    hessian = IterativeHessian(potential, tolerance=1e-6)
     data = hessian.assemble(x, convexity)
     assert hessian.factorise(data, 0.0)
     return hessian, data
@@ -112,7 +112,7 @@ def test_a_small_right_hand_side_is_solved_as_dense_numpy_does():
 
 def test_a_matrix_that_is_indefinite_along_normals_is_not_factorised():
     potential, x0 = swinging()
-    hessian = IterativeHessian(potential, tolerance=1e-6, reference_dt=DT)
+    hessian = IterativeHessian(potential, tolerance=1e-6)
     data = hessian.assemble(x0, 0.0)
     assert not hessian.factorise(data, 0.0) and hessian.factorise(data, 1e3)
 

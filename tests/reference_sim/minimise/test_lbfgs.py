@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference_sim import minimise
-from reference_sim.minimise import make_minimiser
+from reference_sim.minimise import lbfgs, make_minimiser
 from reference_sim.minimise.lbfgs_history import LBFGSHistory
 from tests.reference_sim.minimise.minima import assert_minimum, hanging
 
@@ -23,11 +23,14 @@ def test_without_a_preconditioner_newton_takes_over_at_once():
 
 def test_lbfgs_and_its_finish_share_iterations_and_clock(monkeypatch):
     potential, x0 = hanging()
-    result = minimise(potential, x0, "lbfgs", max_iterations=30, patience=20)
+    monkeypatch.setattr(lbfgs, "PATIENCE", 20)
+    result = minimise(potential, x0, "lbfgs", max_iterations=30)
     assert (result.status, result.iterations) == ("max_iterations", 30)
     ticks = iter(range(100_000))
     monkeypatch.setattr("time.perf_counter", lambda: float(next(ticks)))  # a second for every look at it
-    cut = minimise(potential, x0, "lbfgs", patience=10, switch=1e-6, timeout=90)
+    monkeypatch.setattr(lbfgs, "PATIENCE", 10)
+    monkeypatch.setattr(lbfgs, "SWITCH", 1e-6)
+    cut = minimise(potential, x0, "lbfgs", timeout=90)
     assert cut.status == "timeout" and cut.iterations > 10
     assert next(ticks) < 90 + 40
 
