@@ -6,26 +6,12 @@ from scipy does the same job several times slower.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 
-class LinearSolver(Protocol):
-    """Factorisations on one fixed pattern."""
-
-    def factorise(self, data: np.ndarray) -> bool:
-        """Factorise the matrix with these values (nnz,) of its pattern; False if not positive definite."""
-        ...
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last factorisation, which succeeded: b (n,) or (n, k), same shape back."""
-        ...
-
-
-def analyse(indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> LinearSolver:
+def analyse(indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> CholmodSolver | SuperLUSolver:
     """Analyse a lower-triangular CSC pattern, with the best package that is installed.
 
     Args:
@@ -108,13 +94,11 @@ class SuperLUSolver:
 
 
 def nested_dissection(adjacency: sp.csr_matrix) -> np.ndarray:
-    """Return a fill-reducing order (n,) of a vertex graph by METIS; reverse Cuthill-McKee without pymetis."""
+    """Return a fill-reducing order (n,) of a vertex graph by METIS."""
     if adjacency.shape[0] < 4:
         return np.arange(adjacency.shape[0])
-    try:
-        import pymetis
-    except ImportError:
-        return sp.csgraph.reverse_cuthill_mckee(adjacency, symmetric_mode=True).astype(np.int64)
+    import pymetis
+
     graph = pymetis.CSRAdjacency(adj_starts=adjacency.indptr, adjacent=adjacency.indices)
     permutation, _ = pymetis.nested_dissection(adjacency=graph)
     return np.asarray(permutation, dtype=np.int64)

@@ -135,10 +135,7 @@ def test_analyse_takes_cholmod_where_it_is_and_superlu_where_it_is_not(monkeypat
     assert isinstance(analyse(*pattern), SuperLUSolver)
 
 
-@pytest.mark.parametrize("metis", [True, False])
-def test_the_order_is_a_permutation_that_saves_fill(metis, monkeypatch):
-    if not metis:
-        monkeypatch.setitem(__import__("sys").modules, "pymetis", None)
+def test_the_order_is_a_permutation_that_saves_fill():
     x, faces = patch(3, cells=16)
     faces = np.random.default_rng(0).permutation(len(x))[faces]  # a numbering without any locality
     graph = sp.csr_matrix((np.ones(3 * len(faces)), (faces.ravel(), np.roll(faces, 1, axis=1).ravel())))
