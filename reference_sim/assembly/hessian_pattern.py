@@ -14,9 +14,8 @@ from reference_sim.energies.energy import Energy
 from reference_sim.kernels.block_indices import BlockPlaces
 from reference_sim.kernels.kernel_cache import njit
 
-SPARE_BLOCKS = (
-    3  # a wider pattern keeps up to this many times the blocks that dynamic terms need at the moment
-)
+# A wider pattern keeps up to this many times the blocks that dynamic terms need at the moment.
+SPARE_BLOCKS = 3
 
 
 class HessianPattern:
@@ -52,18 +51,11 @@ class HessianPattern:
         number = np.full(vertex_count, -1, dtype=np.int64)
         number[self.free] = np.arange(len(self.free))
         n = len(self.free)
-        keys = [np.arange(n) * (n + 1)]
-        for energy in energies:
-            keys.append(np.unique(_block_keys(number[energy.stencils], n)))
-        key = np.unique(np.concatenate(keys))
+        of_terms = [_block_keys(number[energy.stencils], n) for energy in energies]
+        key = np.unique(np.concatenate([np.arange(n) * (n + 1), *map(np.unique, of_terms)]))
         key = key[key >= 0]  # -1 stands for a pinned vertex or the upper triangle
         self._number = number
-        self._slots = [
-            np.searchsorted(key, block_key) if len(key) else block_key
-            for block_key in (_block_keys(number[e.stencils], n) for e in energies)
-        ]
-        for slots, energy in zip(self._slots, energies):
-            slots[_block_keys(number[energy.stencils], n) < 0] = -1
+        self._slots = [np.where(keys < 0, -1, np.searchsorted(key, keys)) for keys in of_terms]
         self._fixed = self
         self._lay_out(key)
 
@@ -83,7 +75,9 @@ class HessianPattern:
         ones = np.ones(off.sum())
         lower = sp.csr_matrix((ones, (row[off], column[off])), shape=(n, n))
         self._adjacency = (lower + lower.T).tocsr()
-        self.diagonal = self._diagonal_places(start)
+        first = start[:-1]  # a diagonal block is the first of its column
+        step = self._stride[first][:, None] + 1
+        self.diagonal = (self._base[first][:, None] + np.arange(block) * step).ravel()
 
     def changing(self, x: np.ndarray, convexity: float = 0.0) -> list[sp.csc_matrix]:
         """Return the Hessians (3V, 3V) of the dynamic terms at x (V, 3)."""
@@ -136,11 +130,6 @@ class HessianPattern:
         """(block n,) fill-reducing order of rows and columns."""
         vertices = nested_dissection(self._adjacency)
         return (self.block * vertices[:, None] + np.arange(self.block)).ravel()
-
-    def _diagonal_places(self, start: np.ndarray) -> np.ndarray:
-        first = start[:-1]  # a diagonal block is the first of its column
-        step = self._stride[first][:, None] + 1
-        return (self._base[first][:, None] + np.arange(self.block) * step).ravel()
 
     def assemble(
         self, x: np.ndarray, changing: Sequence[sp.csc_matrix] = (), *, convexity: float = 0.0
