@@ -15,14 +15,6 @@ import pytest
 from reference_sim.kernels.kernel_cache import KEPT
 
 ROOT = Path(__file__).resolve().parents[3]
-NEAREST = """
-import numpy as np
-from reference_sim.contact.closest_point import FaceSearch
-corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-tree = FaceSearch(np.array([[0, 1, 2]]), corners.mean(axis=0)[None])
-tree.refit(corners)
-print(*tree.nearest(np.array([[0.25, 0.25, 1.0]])).points[0])
-"""
 FILES = {
     "deep.py": "from reference_sim.kernels.kernel_cache import njit\n"
     "@njit(cache=True)\ndef deepest(x):\n    return x + 1\n",
@@ -90,19 +82,14 @@ for line in sys.stdin:
 """
 
 
-def start(code: str, path: Path) -> subprocess.Popen[str]:
-    """Start a process in a folder; no compiled Python is kept, which looks at whole seconds only."""
-    variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
-    variables |= {"PYTHONPATH": os.pathsep.join(map(str, (path, ROOT)))}
-    command = [sys.executable, "-B", "-c", code]
-    return subprocess.Popen(
-        command, env=variables, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=path
-    )
-
-
 @pytest.fixture(scope="module")
 def forking():
-    with start(FORKING, ROOT) as process:
+    """A process that keeps no compiled Python, which looks at whole seconds only."""
+    variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-B", "-c", FORKING]
+    with subprocess.Popen(
+        command, env=variables, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
         yield process
         process.stdin.close()
 
@@ -143,25 +130,6 @@ def edit(path: Path, old: str, new: str) -> None:
     source = path.read_text()
     assert old in source
     path.write_text(source.replace(old, new))
-
-
-def nearest(path: Path) -> str:
-    with start(NEAREST, path) as process:
-        return process.communicate()[0]
-
-
-@pytest.mark.slow
-def test_an_edit_two_files_away_from_the_searching_kernel_is_seen(tmp_path):
-    shutil.copytree(
-        ROOT / "reference_sim", tmp_path / "reference_sim", ignore=shutil.ignore_patterns("__pycache__")
-    )
-    assert nearest(tmp_path) == "0.25 0.25 0.0\n"
-    edit(
-        tmp_path / "reference_sim/geometry/triangle.py",
-        "return best_v, best_w, best",
-        "return 0.0, 1.0, best",
-    )
-    assert nearest(tmp_path) == "0.0 1.0 0.0\n"
 
 
 def test_every_edit_that_changes_the_result_is_seen_and_the_kernel_before_it_stays(project, call):
