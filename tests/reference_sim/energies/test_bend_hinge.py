@@ -11,17 +11,7 @@ from reference_sim.energies import BendHinge, Energy
 from reference_sim.energies.bend_hinge.definition import dihedral_angles
 from reference_sim.kernels.float64_lanes import arctan2
 from tests.reference_sim.element_blocks import blocks_of
-from tests.reference_sim.meshes import patch
-
-
-def curved_cloth() -> Cloth:
-    x, faces = patch(11, cells=4)
-    x[:, 2] = 2 * x[:, 0] * x[:, 1] + x[:, 0] ** 2
-    return Cloth(0.3 * x, faces)
-
-
-def close(found: np.ndarray, expected: np.ndarray, tolerance: float) -> bool:
-    return bool(np.abs(found - expected).max() <= tolerance * np.abs(expected).max())
+from tests.reference_sim.energies.test_derivatives import close, curved_cloth
 
 
 def hinge_at(phi: float) -> np.ndarray:
