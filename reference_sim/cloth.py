@@ -188,14 +188,18 @@ class Cloth:
         return self._edge_table[0]
 
     @cached_property
+    def sides(self) -> np.ndarray:
+        """(F, 3) edge on each side of the faces: between corners 0 and 1, 1 and 2, 2 and 0."""
+        ends = np.sort(self.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+        scale = np.array([self.vertex_count, 1])
+        return np.searchsorted(self.edges @ scale, ends @ scale)
+
+    @cached_property
     def edge_lengths(self) -> np.ndarray:
         """(E,) rest lengths [m]; of an edge whose two faces differ, as on a seam, their mean."""
-        corner, following = self.rest_corners, np.roll(self.faces, -1, axis=1)
-        sides = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).ravel()
-        ends = np.minimum(self.faces, following), np.maximum(self.faces, following)
-        scale = np.array([self.vertex_count, 1])
-        places = np.searchsorted(self.edges @ scale, (np.stack(ends, axis=-1) @ scale).ravel())
-        return np.bincount(places, sides) / np.bincount(places)
+        corner, sides = self.rest_corners, self.sides.ravel()
+        lengths = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).ravel()
+        return np.bincount(sides, lengths) / np.bincount(sides)
 
     @cached_property
     def _inner(self) -> np.ndarray:

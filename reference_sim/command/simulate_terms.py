@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from reference_sim.cloth import Cloth
 from reference_sim.command.simulate_inputs import BadInput
@@ -24,9 +25,8 @@ def check_terms(options: Namespace) -> None:
     """Raise BadInput where flags ask for what they cannot have, with the remedy."""
     barrier = options.barrier or options.self_contact
     penalty = options.obstacle is not None and not options.barrier
-    given = [name for name in PENALTY_FLAGS + BARRIER_FLAGS if getattr(options, name) is not None]
-    penalty_only = [_flag(name) for name in given if name in PENALTY_FLAGS]
-    barrier_only = [_flag(name) for name in given if name in BARRIER_FLAGS]
+    penalty_only = ["--contact-" + name for name in _given(options, PENALTY_FLAGS)]
+    barrier_only = ["--barrier-" + name for name in _given(options, BARRIER_FLAGS)]
     if options.obstacle is None:
         if options.obstacle_rest or (options.friction and not options.self_contact):
             raise BadInput("--obstacle-rest and --friction need an --obstacle, or --friction --self-contact")
@@ -67,12 +67,7 @@ def _penalty(cloth: Cloth, options: Namespace) -> list[Energy]:
     from reference_sim.energies.contact_friction import ContactFriction
     from reference_sim.energies.contact_penalty.definition import ContactPenalty
 
-    values = {
-        name.removeprefix("contact_"): getattr(options, name)
-        for name in PENALTY_FLAGS
-        if getattr(options, name) is not None
-    }
-    contact = ContactPenalty(cloth, **values)
+    contact = ContactPenalty(cloth, **_given(options, PENALTY_FLAGS))
     friction = [ContactFriction(contact, coefficient=options.friction)] if options.friction else []
     return [contact, *friction]
 
@@ -81,15 +76,13 @@ def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
     from reference_sim.energies.barrier_friction import BarrierFriction
     from reference_sim.energies.contact_barrier import ContactBarrier
 
-    values = {
-        name.removeprefix("barrier_"): getattr(options, name)
-        for name in BARRIER_FLAGS
-        if getattr(options, name) is not None
-    }
     beside_penalty = options.obstacle is not None and not options.barrier
     try:
         contact = ContactBarrier(
-            cloth, self_contact=options.self_contact, obstacle=not beside_penalty, **values
+            cloth,
+            self_contact=options.self_contact,
+            obstacle=not beside_penalty,
+            **_given(options, BARRIER_FLAGS),
         )
     except ImportError as error:
         raise ValueError(str(error)) from None
@@ -98,5 +91,7 @@ def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
     return [contact, *friction]
 
 
-def _flag(name: str) -> str:
-    return "--" + name.replace("_", "-")
+def _given(options: Namespace, names: Iterable[str]) -> dict[str, Any]:
+    """Return what was given of these flags, by what stands behind the first word of their names."""
+    given = {name.partition("_")[2]: getattr(options, name) for name in names}
+    return {name: value for name, value in given.items() if value is not None}

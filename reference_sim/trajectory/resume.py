@@ -12,7 +12,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from reference_sim.files.atomic_files import create
 from reference_sim.files.trial import try_out
-from reference_sim.trajectory.trajectory import UNREADABLE_ERRORS, Trajectory, TrajectoryError, read_frames
+from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError, read_frames
 from reference_sim.trajectory.writer import BEFORE_LAST_STEP, END_OF_FILE, FIRST_FAILURE, UNFINISHED
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
         if wrong := try_out(read_whole_frames, path):
             raise ValueError(wrong)
         earlier = read_whole_frames(path)
-    except UNREADABLE_ERRORS as error:
+    except Exception as error:
         raise TrajectoryError(
             f"{path}: nothing to resume: not a readable trajectory ({_one_line(error)}); "
             "remove it, or write elsewhere"
@@ -82,7 +82,7 @@ def read_whole_frames(path: Path) -> PartialRun:
     """Read the frames of a file that are whole; its end may be cut off.
 
     Raises:
-        UNREADABLE_ERRORS: one of these, for a file that is no trajectory or is damaged.
+        Exception: of any kind, for a file that is no trajectory or is damaged.
     """
     with _opened(path) as file:
         return _whole_frames(file)
@@ -131,7 +131,7 @@ def _whole_frames(file: h5py.File) -> PartialRun:
     ended = trajectory.status != UNFINISHED
     if not ended:
         status, reason = json.loads(benchmark.attrs.get(FIRST_FAILURE, '["converged", ""]'))
-        trajectory = trajectory.with_status(status, reason)
+        trajectory = replace(trajectory, status=status, reason=reason)
     return PartialRun(trajectory, before, ended)
 
 

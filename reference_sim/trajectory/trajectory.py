@@ -23,11 +23,6 @@ if TYPE_CHECKING:
 
 TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
 ALWAYS_READ = 1 << 20  # [bytes] that nobody minds
-# What h5py and numpy raise for a file that is none, or is damaged.
-UNREADABLE_ERRORS = (
-    OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, ArithmeticError,
-    MemoryError,
-)  # fmt: skip
 
 
 class TrajectoryError(ValueError):
@@ -114,13 +109,9 @@ class Trajectory:
             return read_file(Path(path))
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
-        except UNREADABLE_ERRORS as error:
+        except Exception as error:  # whatever h5py and numpy raise for a file that is none, or is damaged
             reason = " ".join(str(error).split())
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
-
-    def with_status(self, status: str, reason: str) -> Trajectory:
-        """Return the same frames with another status."""
-        return replace(self, status=status, reason=reason)
 
     def first(self, count: int) -> Trajectory:
         """Return the first `count` frames, or all if there are fewer."""
@@ -140,7 +131,7 @@ def read_file(path: Path) -> Trajectory:
     """Read all whole frames of a file.
 
     Raises:
-        UNREADABLE_ERRORS: one of these, for a file that is no trajectory or is damaged.
+        Exception: of any kind, for a file that is no trajectory or is damaged.
     """
     import h5py
 
@@ -152,7 +143,7 @@ def read_frames(file: h5py.File, *, frames: int | None = None) -> Trajectory:
     """Read the first `frames` frames of an open file, by default all that are whole.
 
     Raises:
-        UNREADABLE_ERRORS: one of these, for a file that is no trajectory or is damaged.
+        Exception: of any kind, for a file that is no trajectory or is damaged.
     """
     benchmark, vtk = file["benchmark"], file["VTKHDF"]
     provenance = json.loads(benchmark.attrs["provenance"])

@@ -171,12 +171,9 @@ def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
     areas = [cloth.vertex_areas]
     if kind == "all":
         edges, faces = cloth.edges, cloth.faces
-        key = edges[:, 0] * cloth.vertex_count + edges[:, 1]
-        half = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-        owner = np.searchsorted(key, half[..., 0] * cloth.vertex_count + half[..., 1])
         stencils += [edges[:, [0, 1, 1]], faces]
         weights += [np.tile([0.5, 0.5, 0.0], (len(edges), 1)), np.full((len(faces), 3), 1 / 3)]
-        areas += [np.bincount(owner.ravel(), np.repeat(cloth.areas / 3, 3), len(edges)), cloth.areas]
+        areas += [np.bincount(cloth.sides.ravel(), np.repeat(cloth.areas / 3, 3), len(edges)), cloth.areas]
     return np.concatenate(stencils), np.concatenate(weights), np.concatenate(areas)
 
 
