@@ -173,25 +173,6 @@ class HessianPattern:
         i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
         data[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += values
 
-    def product(self, data: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return the symmetric (3n, 3n) matrix of these values times p (3n,), of a pattern of blocks of 3."""
-        result = np.zeros_like(p)
-        _multiply(self._key, len(self.free), self._base, self._stride, data, p, result)
-        return result
-
-    def along(self, data: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return the values (m,) of `graph`, with each vertex moving along its own of directions (n, 3)."""
-        values = np.empty(len(self._key))
-        _contract(self._key, len(self.free), self._base, self._stride, data, directions, values)
-        return values
-
-    @property
-    def graph(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Structure (indptr, indices, order) of an (n, n) lower matrix with one entry for each block."""
-        column, row = np.divmod(self._key, len(self.free))
-        indptr = np.searchsorted(column, np.arange(len(self.free) + 1))
-        return indptr, row, self.order[:: self.block] // self.block
-
     def lower(self, data: np.ndarray) -> sp.csc_matrix:
         """Return the values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
         return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.size, self.size))
@@ -219,40 +200,3 @@ def _fill_rows(start, row, block, indices):
                 for r in range(block):
                     indices[at] = block * row[p] + r
                     at += 1
-
-
-@njit(cache=True)
-def _multiply(key, n, base, stride, data, p, result):
-    """Multiply; each block below the diagonal serves twice: for its row, and transposed for its column."""
-    slot = 0
-    while slot < key.shape[0]:
-        column, step = key[slot] // n, stride[slot]
-        j = 3 * column
-        p0, p1, p2 = p[j], p[j + 1], p[j + 2]
-        s0, s1, s2 = 0.0, 0.0, 0.0
-        for k in range(slot, slot + step // 3):
-            i, a = 3 * (key[k] - column * n), base[k]
-            b, c = a + step, a + 2 * step
-            result[i] += data[a] * p0 + data[b] * p1 + data[c] * p2
-            result[i + 1] += data[a + 1] * p0 + data[b + 1] * p1 + data[c + 1] * p2
-            result[i + 2] += data[a + 2] * p0 + data[b + 2] * p1 + data[c + 2] * p2
-            if k > slot:  # the first is the diagonal block
-                s0 += data[a] * p[i] + data[a + 1] * p[i + 1] + data[a + 2] * p[i + 2]
-                s1 += data[b] * p[i] + data[b + 1] * p[i + 1] + data[b + 2] * p[i + 2]
-                s2 += data[c] * p[i] + data[c + 1] * p[i + 1] + data[c + 2] * p[i + 2]
-        result[j] += s0
-        result[j + 1] += s1
-        result[j + 2] += s2
-        slot += step // 3
-
-
-@njit(cache=True)
-def _contract(key, n, base, stride, data, directions, values):
-    for k in range(key.shape[0]):
-        column = key[k] // n
-        row, total = key[k] - column * n, 0.0
-        for j in range(3):
-            at = base[k] + j * stride[k]
-            for i in range(3):
-                total += directions[row, i] * data[at + i] * directions[column, j]
-        values[k] = total

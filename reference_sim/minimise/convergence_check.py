@@ -43,15 +43,11 @@ def convergence_check(
     if run.factorise(data, run.hessian.tiny_shift(data)):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
         small = step <= step_tolerance or residual == 0.0
-        if small and run.hessian.downward is None:
-            run.look_for_negative_curvature()
-        if run.hessian.downward is None:
-            if not small and run.factorise(data, 0.0):
-                return None
-            # Without curvature no step can be told from another.
-            evidence = f"Newton step {step:.1e} m" if small else "a direction without curvature"
-            why = f"{why}, {evidence}{run.hessian.evidence}"
-            return Stop("converged", why, relaxed) if run.hessian.settled else Stop("stalled", why)
+        if not small and run.factorise(data, 0.0):
+            return None
+        # Without curvature no step can be told from another.
+        evidence = f"Newton step {step:.1e} m" if small else "a direction without curvature"
+        return Stop("converged", f"{why}, {evidence}", relaxed)
     if escape_saddle(run, data, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1
         run.show()
@@ -60,12 +56,11 @@ def convergence_check(
 
 
 def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bool:
-    """Step along a direction of negative curvature: the one that was met, or else the most negative one.
+    """Step along the direction of most negative curvature.
 
     length: of the first step tried [m]. Returns whether the energy fell.
     """
-    met = run.hessian.downward
-    v = most_negative(run, data) if met is None else met / np.abs(met).max()
+    v = most_negative(run, data)
     if v is None:
         return False
     v *= -1.0 if dot(v, run.g) > 0 else 1.0
@@ -94,8 +89,5 @@ def most_negative(run: FactorisedDescent, data: np.ndarray) -> np.ndarray | None
     v = np.random.default_rng(0).standard_normal(len(run.g))
     for _ in range(POWER):
         v = run.solve(run.hessian.metric * v)
-        met = run.hessian.downward
-        v = v / np.abs(v).max() if met is None else met / np.abs(met).max()
-        if met is not None:
-            break
+        v = v / np.abs(v).max()
     return v

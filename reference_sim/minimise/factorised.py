@@ -22,12 +22,7 @@ class FactorisedHessian:
         flat: curvature [N/m] below which a direction gains less than the tolerance over the cloth's
             width.
         static: whether the potential has no inertia, so that rigid motions may have no curvature.
-        downward: (3n,) direction along which the last solve or look met no positive curvature, if any.
-        settled, evidence: whether the last look for negative curvature came to an end, and what it found.
     """
-
-    downward: np.ndarray | None = None
-    settled, evidence = True, ""
 
     def __init__(self, potential: Potential, *, tolerance: float) -> None:
         cloth = potential.cloth
@@ -63,13 +58,6 @@ class FactorisedHessian:
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation: b (3n,)."""
         return self._solver.solve(b)
-
-    def precondition(self, r: np.ndarray) -> np.ndarray:
-        """Return a first guess (3n,) of the solution for r (3n,): here the solution."""
-        return self.solve(r)
-
-    def look_for_negative_curvature(self) -> None:
-        """Do nothing: the last factorisation was proof that there is none."""
 
     def stiffest(self, data: np.ndarray) -> float:
         """Return the largest entry of the diagonal [N/m]."""
@@ -110,11 +98,3 @@ class FactorisedDescent(Descent):
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation, as the Hessian does."""
         return self.timed("solve", self.hessian.solve, b)
-
-    def precondition(self, r: np.ndarray) -> np.ndarray:
-        """Return a first guess of a solution, as the Hessian does."""
-        return self.timed("solve", self.hessian.precondition, r)
-
-    def look_for_negative_curvature(self) -> None:
-        """Look for negative curvature, as the Hessian does."""
-        self.timed("solve", self.hessian.look_for_negative_curvature)

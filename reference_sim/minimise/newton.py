@@ -27,7 +27,6 @@ import numpy as np
 from reference_sim.minimise.convergence_check import convergence_check
 from reference_sim.minimise.descent import Descent, Observer, approximate_wolfe, sufficient_decrease
 from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian
-from reference_sim.minimise.iterative import LARGEST_FACTORISED, IterativeHessian
 from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
 from reference_sim.minimise.loop import NOT_FINITE, iterate
 from reference_sim.minimise.result import Result, Stop, check_tolerance
@@ -79,10 +78,8 @@ class Newton:
         check_tolerance(tolerance)
         self.potential, self.reuse, self.observe = potential, reuse, observe
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
-        small = 3 * int(potential.cloth.free.sum()) <= LARGEST_FACTORISED
-        kind = FactorisedHessian if small else IterativeHessian
-        self.hessian = kind(potential, tolerance=tolerance)
-        self.first_level = len(CONVEXITY) - 1 if start_projected and small else 0
+        self.hessian = FactorisedHessian(potential, tolerance=tolerance)
+        self.first_level = len(CONVEXITY) - 1 if start_projected else 0
         self.step_tolerance = STEP_TOLERANCE * float(potential.cloth.edge_lengths.mean())
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
@@ -139,7 +136,7 @@ class Newton:
     def step(self, run: NewtonRun) -> Stop | None:
         """Go on with the last factorisation while it serves, else with the Hessian that was assembled."""
         if run.residuals:
-            if run.quasi_newton_step(run.history, run.precondition):
+            if run.quasi_newton_step(run.history, run.solve):
                 run.quasi_newton_steps += 1
                 run.residuals.append(run.gradient_norm())
                 return None

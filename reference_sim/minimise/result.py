@@ -25,8 +25,7 @@ class Result:
     Attributes:
         positions: (V, 3) [m], the best found.
         status: one of STATUSES. "converged" means: gradient within tolerance, the unregularised Newton step
-            negligible, and no negative curvature left. A factorisation proves the last of these; of meshes
-            too large for one it is an estimate, and the reason says so.
+            negligible, and no negative curvature left, of which a factorisation is the proof.
         reason: one line in words.
         relaxed: whether "converged" holds within round-off alone: the residual, or the round-off in it, is
             above the tolerance; the reason says which.

@@ -30,11 +30,8 @@ class ScalarPreconditioner:
         data[self._pattern.diagonal] += self._floor
         return data
 
-    def factorise(self, data: np.ndarray, shift: float | np.ndarray = 0.0) -> bool:
-        """Factorise the values plus shift [N/m] on the diagonal; False if that is not positive definite."""
-        if np.any(shift):
-            data = data.copy()
-            data[self._pattern.diagonal] += shift
+    def factorise(self, data: np.ndarray) -> bool:
+        """Factorise the matrix with these values (nnz,); False if it is not positive definite."""
         return self._solver.factorise(data)
 
     def solve(self, b: np.ndarray) -> np.ndarray:
