@@ -95,7 +95,8 @@ class MeasureCell(Task):
                 still = folder.quasi_static_path(*cell.key) if len(outcome.files) > 1 else None
                 roll_outs[cell] = RollOut(
                     group, cell.entry, Trajectory.load(folder.trajectory_path(*cell.key)),
-                    status=outcome.status, suites=cell.suites, quasi_static=still and _positions(still),
+                    status=outcome.status, suites=cell.suites,
+                    quasi_static=_positions(still) if still else None,
                 )  # fmt: skip
                 if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
                     group.roll_outs.append(roll_outs[cell])

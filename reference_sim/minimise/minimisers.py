@@ -12,8 +12,6 @@ from reference_sim.minimise.newton import Newton
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 
-MINIMISERS = {"newton": Newton, "lbfgs": LBFGS}
-
 
 class Minimiser(Protocol):
     """Solver bound to one potential, so that symbolic analysis is done once for all steps."""
@@ -21,6 +19,9 @@ class Minimiser(Protocol):
     def minimise(self, x0: np.ndarray) -> Result:
         """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
         ...
+
+
+MINIMISERS: dict[str, Callable[..., Minimiser]] = {"newton": Newton, "lbfgs": LBFGS}
 
 
 def make_minimiser(
