@@ -41,12 +41,11 @@ def build_report(run_dir: str | Path) -> Built:
     >>> print(build_report("reports/runs/first").answer)  # doctest: +SKIP
     """
     # Heavy: not needed for --help.
+    from reports.blocks import FIGURES
     from reports.blocks.block import Report
     from reports.document.typeset import write_pdf
-    from reports.figures import FIGURES
     from reports.figures.figure import draw_figures, remove_figures
     from reports.page.write_page import write_page
-    from reports.pictures import PICTURES
     from reports.run.reading import read_run_with_trainings
     from reports.tables import make_tables, write_tables
     from reports.text.answer import answer
@@ -55,9 +54,8 @@ def build_report(run_dir: str | Path) -> Built:
     run = read_run_with_trainings(folder)
     tables = make_tables(run)
     write_tables(folder.tables, run, tables)
-    figures = (*PICTURES, *FIGURES)
-    remove_figures(folder.figures, figures)
-    report = Report(run, tables, draw_figures(run, folder.figures, figures))
+    remove_figures(folder.figures, FIGURES)
+    report = Report(run, tables, draw_figures(run, folder.figures, FIGURES))
     write_page(folder, report)
     return Built(write_pdf(folder, report), run.problems, answer(run, tables))
 

@@ -2,17 +2,34 @@
 
 The PDF (reports.document) and the page (reports.page) walk the same BLOCKS. A block without content is left
 out, and so is a heading with nothing below it. Blocks before the first heading make page one.
+A new figure is a function in a file of its own and a line here.
 """
 
-from reports.blocks.block import Block, FigureBlock, Heading, SentenceBlock, TableBlock, TablesOfSuite
+from reports.blocks.block import Block, Heading, SentenceBlock, TableBlock, TablesOfSuite
 from reports.blocks.page_one_sentences import headline
 from reports.blocks.printed_tables import failed_checks, not_converged, with_labels
 from reports.blocks.what_went_wrong import unread_files, worst
+from reports.figures.break_even import break_even
+from reports.figures.dots import dots
+from reports.figures.energy_series import energy_series
+from reports.figures.error_against_time import error_of_page_one, errors_of_scene, errors_of_scenes
+from reports.figures.fabric.textile_errors import textile_errors
+from reports.figures.figure import Figure
+from reports.figures.hem import hem
+from reports.figures.histograms import histograms
+from reports.figures.known_answers import known_answers
+from reports.figures.stability_maps import stability_maps
+from reports.figures.training_curves import training_curves
+from reports.pictures.colour_maps import colour_maps
+from reports.pictures.failures import failures
+from reports.pictures.lead_row import lead_row
+from reports.pictures.side_by_side import side_by_side
+from reports.pictures.strip import strip
 
 BLOCKS: tuple[Block, ...] = (
     SentenceBlock(headline),
-    FigureBlock("lead"),
-    FigureBlock("error_against_time"),
+    Figure("lead", lead_row),
+    Figure("error_against_time", error_of_page_one),
     TableBlock("overview"),
     TableBlock("reference_uncertainty"),
     SentenceBlock(worst, small=True),
@@ -28,27 +45,27 @@ BLOCKS: tuple[Block, ...] = (
     Heading("Equal data"),
     TableBlock("equal_data", most=60),
     Heading("Error against run time"),
-    FigureBlock("error_against_time_of_scene"),
-    FigureBlock("error_against_time_scenes"),
+    Figure("error_against_time_of_scene", errors_of_scene),
+    Figure("error_against_time_scenes", errors_of_scenes),
     TableBlock("error_rivals"),
-    FigureBlock("break_even"),
+    Figure("break_even", break_even),
     TableBlock("crossings"),
     Heading("Garments in motion"),
-    FigureBlock("frames"),
-    FigureBlock("strip"),
-    FigureBlock("map"),
-    FigureBlock("failures"),
+    Figure("frames", side_by_side),
+    Figure("strip", strip),
+    Figure("map", colour_maps),
+    Figure("failures", failures),
     Heading("Behind the means"),
-    FigureBlock("dots"),
-    FigureBlock("histograms"),
+    Figure("dots", dots),
+    Figure("histograms", histograms),
     Heading("Dynamics"),
     TableBlock("dynamics"),
-    FigureBlock("hem"),
-    FigureBlock("energy_series"),
+    Figure("hem", hem),
+    Figure("energy_series", energy_series),
     Heading("Body shapes"),
     TableBlock("shapes"),
     Heading("Textile tests"),
-    FigureBlock("textile_errors"),
+    Figure("textile_errors", textile_errors),
     TableBlock("fabric_order", most=40),
     TableBlock("fabric_drape"),
     TableBlock("fabric_bands"),
@@ -56,17 +73,19 @@ BLOCKS: tuple[Block, ...] = (
     TableBlock("engine_audit"),
     TableBlock("engine_laws"),
     Heading("Validation"),
-    FigureBlock("known_answers"),
+    Figure("known_answers", known_answers),
     TableBlock("validation", printed=failed_checks),
     Heading("Stress"),
-    FigureBlock("stability_maps"),
+    Figure("stability_maps", stability_maps),
     TableBlock("extremes", printed=not_converged),
     Heading("Training"),
     TableBlock("trainings"),
-    FigureBlock("training"),
+    Figure("training", training_curves),
     TablesOfSuite("performance"),
     Heading("How cells, checks and stress tests ended"),
     TableBlock("endings"),
     TableBlock("unfinished", printed=with_labels),
     SentenceBlock(unread_files),
 )
+
+FIGURES = tuple(block for block in BLOCKS if isinstance(block, Figure))

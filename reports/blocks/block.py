@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from reports.blocks.printed_tables import of_suite, unchanged
-from reports.figures.figure import Picture
+from reports.figures.figure import Figure, Picture
 from reports.run.finished_run import Run
 from reports.tables.table import Table
 
@@ -47,17 +47,6 @@ class SentenceBlock:
 
 
 @dataclass(frozen=True)
-class FigureBlock:
-    """Pictures of a figure."""
-
-    name: str
-
-    def pictures(self, report: Report) -> list[Picture]:
-        """Return the pictures that were drawn."""
-        return list(report.pictures.get(self.name, ()))
-
-
-@dataclass(frozen=True)
 class TableBlock:
     """A table; printed: gives the part of it that the PDF prints, at most so many lines."""
 
@@ -87,4 +76,4 @@ class TablesOfSuite:
         return table
 
 
-Block = Heading | SentenceBlock | FigureBlock | TableBlock | TablesOfSuite
+Block = Heading | SentenceBlock | Figure | TableBlock | TablesOfSuite

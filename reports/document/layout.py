@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from reports.blocks.block import Block, FigureBlock, Report, SentenceBlock, TableBlock, TablesOfSuite
+from reports.blocks.block import Block, Report, SentenceBlock, TableBlock, TablesOfSuite
 from reports.blocks.printed_tables import shortened
-from reports.figures.figure import Picture
+from reports.figures.figure import Figure, Picture
 from reports.run.finished_run import Run
 from reports.tables.cell_texts import CellText, column_texts, remarks_below
 from reports.tables.number_texts import DASH
@@ -25,8 +25,8 @@ def lay_out(report: Report, block: Block) -> list[Values]:
     if isinstance(block, SentenceBlock):
         sentences = [list(pair) for pair in block.make(report.run)]
         return [{"kind": "sentences", "pairs": sentences, "small": block.small}] if sentences else []
-    if isinstance(block, FigureBlock):
-        return [_figure(picture) for picture in block.pictures(report)]
+    if isinstance(block, Figure):
+        return [_figure(picture) for picture in report.pictures.get(block.name, ())]
     if isinstance(block, TableBlock | TablesOfSuite):
         tables = [block.printed(report.run, table) for table in block.tables(report)]
         tables = [shortened(table, block.most) for table in tables if table.rows]

@@ -50,9 +50,6 @@ class SceneRollOuts:
         return all(STEP in self.series[method].frame_fields for method in methods)
 
 
-PageOne = tuple[SceneRollOuts, tuple[str, ...]]  # and the methods that are shown
-
-
 @dataclass(frozen=True)
 class Motion:
     """Roll-outs of a whole motion, and the few methods that are shown at many frames."""
@@ -68,7 +65,7 @@ class Motion:
 
 
 @lru_cache(maxsize=1)
-def page_one_roll_outs(run: Run) -> PageOne | None:
+def page_one_roll_outs(run: Run) -> tuple[SceneRollOuts, tuple[str, ...]] | None:
     """Return roll-outs of the first compared scene that kept them and a body, and the methods shown."""
     cells, scenes = compared_cells(run)
     for scene in scenes:

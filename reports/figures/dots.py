@@ -10,10 +10,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from benchmarks.results.protocol import SOFTENING
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.method_styles import leading, style
 from reports.figures.plotting import PAGE_WIDTH, arcsinh_axis, grid, log_axis, new_figure, wrapped
 from reports.run.finished_run import Run
@@ -27,49 +26,41 @@ METRICS = (TOTAL, "curvature/error", "penetration/vertices")
 MOST_METHODS = 24  # methods that have room below each other
 
 
-class Dots(Figure[tuple[pd.DataFrame, list[str]]]):
-    """Cells behind the means of the first garment."""
-
-    name = "dots"
-
-    def needs(self, run: Run) -> tuple[pd.DataFrame, list[str]] | None:
-        """Return rows of the first garment with one of METRICS, and their methods."""
-        rows = run.garment_rows
-        rows = rows[(rows["garment"] == run.first_garment) & rows["usable"] & rows["metric"].isin(METRICS)]
-        methods = leading(run, set(rows["method"]))[:MOST_METHODS]
-        return (rows, methods) if run.first_garment and methods else None
-
-    def draw(self, run: Run, data: tuple[pd.DataFrame, list[str]]) -> Iterator[Drawing]:
-        """Draw a panel for each metric, a line for each method."""
-        rows, methods = data
-        rows = with_relative_excess(run, rows)
-        names = [name for name in METRICS if name in set(rows["metric"])]
-        excess = RELATIVE_EXCESS.name if RELATIVE_EXCESS.name in set(rows["metric"]) else ""
-        if excess:
-            names[0] = excess
-        by_method = means(rows, "method", "metric")
-        labels = [wrapped(run.label(method), 28) for method in methods]
-        lines = max(label.count("\n") + 1 for label in labels)
-        figure = new_figure(PAGE_WIDTH, 0.65 + (0.04 + 0.13 * lines) * len(methods))
-        panels = np.atleast_1d(figure.subplots(1, len(names), sharey=True))
-        for axes, name in zip(panels, names):
-            of_methods = [by_method.get((method, name)) for method in methods]
-            bars = [mean and mean.value for mean in of_methods]
-            if name == excess:
-                bars = [known and known.typical for known in (excess_of(run, rows, m) for m in methods)]
-            shown = _draw_panel(axes, run, methods, of_methods, bars)
-            if name == excess:
-                arcsinh_axis(axes, shown, SOFTENING)
-            elif min(shown) > 0.0 and max(shown) > 20.0 * min(shown):
-                axes.set_xlim(min(shown) / 1.3, max(shown) * 1.3)
-                log_axis(axes, "x")
-            axes.set_xlabel((RELATIVE_EXCESS if name == excess else run.metrics[name]).heading)
-            grid(axes, "x")
-        panels[0].set_yticks(range(len(methods)), labels)
-        panels[0].set_ylim(len(methods) - 0.4, -0.6)
-        caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean"
-        caption += ", of the relative excess its typical value." if excess else "."
-        yield Drawing(figure, self.name, caption)
+def dots(run: Run) -> Iterator[Drawing]:
+    """Draw cells behind the means of the first garment, a panel for each metric, a line for each method."""
+    rows = run.garment_rows
+    rows = rows[(rows["garment"] == run.first_garment) & rows["usable"] & rows["metric"].isin(METRICS)]
+    methods = leading(run, set(rows["method"]))[:MOST_METHODS]
+    if not run.first_garment or not methods:
+        return
+    rows = with_relative_excess(run, rows)
+    names = [name for name in METRICS if name in set(rows["metric"])]
+    excess = RELATIVE_EXCESS.name if RELATIVE_EXCESS.name in set(rows["metric"]) else ""
+    if excess:
+        names[0] = excess
+    by_method = means(rows, "method", "metric")
+    labels = [wrapped(run.label(method), 28) for method in methods]
+    lines = max(label.count("\n") + 1 for label in labels)
+    figure = new_figure(PAGE_WIDTH, 0.65 + (0.04 + 0.13 * lines) * len(methods))
+    panels = np.atleast_1d(figure.subplots(1, len(names), sharey=True))
+    for axes, name in zip(panels, names):
+        of_methods = [by_method.get((method, name)) for method in methods]
+        bars = [mean and mean.value for mean in of_methods]
+        if name == excess:
+            bars = [known and known.typical for known in (excess_of(run, rows, m) for m in methods)]
+        shown = _draw_panel(axes, run, methods, of_methods, bars)
+        if name == excess:
+            arcsinh_axis(axes, shown, SOFTENING)
+        elif min(shown) > 0.0 and max(shown) > 20.0 * min(shown):
+            axes.set_xlim(min(shown) / 1.3, max(shown) * 1.3)
+            log_axis(axes, "x")
+        axes.set_xlabel((RELATIVE_EXCESS if name == excess else run.metrics[name]).heading)
+        grid(axes, "x")
+    panels[0].set_yticks(range(len(methods)), labels)
+    panels[0].set_ylim(len(methods) - 0.4, -0.6)
+    caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean"
+    caption += ", of the relative excess its typical value." if excess else "."
+    yield Drawing(figure, "dots", caption)
 
 
 def _draw_panel(

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.plane.curves import SOLVERS, families, of_page_one
 from reports.figures.plane.labels import lay_out
 from reports.figures.plane.points import draw_points, write_labels
@@ -30,48 +30,23 @@ MOST_PANELS, MOST_SCENES = 4, 9  # in the PDF; the page has all
 Scenes = list[tuple[pd.DataFrame, list[tuple[Metric, list[Point]]]]]  # rows and panels of each
 
 
-class ErrorOfPageOne(Figure[Scenes]):
-    """First error of the leading scene, for page one."""
-
-    name = "error_against_time"
-
-    def needs(self, run: Run) -> Scenes:
-        """Return the scenes in which two methods have an error and a run time."""
-        return _scenes(run)
-
-    def draw(self, run: Run, data: Scenes) -> Iterator[Drawing]:
-        """Draw one wide panel."""
-        rows, panels = data[0]
+def error_of_page_one(run: Run) -> Iterator[Drawing]:
+    """Draw the first error of the leading scene in one wide panel."""
+    for rows, panels in _scenes(run)[:1]:
         yield _draw_page_one(run, rows, *panels[0])
 
 
-class ErrorsOfScene(Figure[Scenes]):
-    """All errors of the leading scene."""
-
-    name, files = "error_against_time_of_scene", ("error_against_time_*",)
-
-    def needs(self, run: Run) -> Scenes:
-        """Return the leading scene if it has more than one error."""
-        return [scene for scene in _scenes(run)[:1] if len(scene[1]) > 1]
-
-    def draw(self, run: Run, data: Scenes) -> Iterator[Drawing]:
-        """Draw a panel for each error."""
-        rows, panels = data[0]
-        yield _draw_scene(run, rows, panels[:MOST_PANELS])
+def errors_of_scene(run: Run) -> Iterator[Drawing]:
+    """Draw the errors of the leading scene, where it has more than one."""
+    for rows, panels in _scenes(run)[:1]:
+        if len(panels) > 1:
+            yield _draw_scene(run, rows, panels[:MOST_PANELS])
 
 
-class ErrorsOfScenes(Figure[Scenes]):
-    """First error of every other scene."""
-
-    name = "error_against_time_scenes"
-
-    def needs(self, run: Run) -> Scenes:
-        """Return the scenes behind the leading one."""
-        return _scenes(run)[1:MOST_SCENES]
-
-    def draw(self, run: Run, data: Scenes) -> Iterator[Drawing]:
-        """Draw a small panel for each scene."""
-        yield _draw_scenes(run, [(rows, panels[0]) for rows, panels in data])
+def errors_of_scenes(run: Run) -> Iterator[Drawing]:
+    """Draw the first error of every other scene."""
+    if others := _scenes(run)[1:MOST_SCENES]:
+        yield _draw_scenes(run, [(rows, panels[0]) for rows, panels in others])
 
 
 @lru_cache(maxsize=1)

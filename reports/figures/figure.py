@@ -1,20 +1,17 @@
-"""A figure of the report: declared once as a class, drawn where the run holds what it needs."""
+"""A figure of the report: its name and the function that draws it where the run holds what it needs."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING
 
 from reports.figures.plotting import PAGE_WIDTH, save
 from reports.run.finished_run import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
-
-Data = TypeVar("Data")
 
 
 @dataclass(frozen=True)
@@ -36,32 +33,17 @@ class Picture:
     width: float
 
 
-class Figure(ABC, Generic[Data]):
-    """A figure: a subclass in a file of its own, and one line in FIGURES or PICTURES.
+@dataclass(frozen=True)
+class Figure:
+    """A figure: its name, with which its files begin, and what draws it, in no part, in one or in several."""
 
-    name: for the list of report blocks, and of its file. files: patterns of all its files.
-    """
+    name: str
+    drawings: Callable[[Run], Iterable[Drawing]]
 
-    name: ClassVar[str]
-    files: ClassVar[tuple[str, ...]] = ()
-
-    @classmethod
-    def patterns(cls) -> tuple[str, ...]:
-        """Return the patterns of its files in the folder of figures."""
-        return cls.files or (f"{cls.name}.*",)
-
-    @abstractmethod
-    def needs(self, run: Run) -> Data | None:
-        """Return the data that the figure is drawn from, nothing where the run lacks them."""
-
-    @abstractmethod
-    def draw(self, run: Run, data: Data) -> Iterable[Drawing]:
-        """Draw the figure from its data, in one part or several."""
-
-    def drawings(self, run: Run) -> list[Drawing]:
-        """Draw the figure where the run holds what it needs."""
-        data = self.needs(run)
-        return list(self.draw(run, data)) if data else []
+    @property
+    def patterns(self) -> tuple[str, str]:
+        """Patterns of its files in the folder of figures."""
+        return f"{self.name}.*", f"{self.name}_*"
 
 
 def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, list[Picture]]:
@@ -80,6 +62,6 @@ def save_drawing(folder: Path, drawing: Drawing) -> Picture:
 def remove_figures(folder: Path, figures: Iterable[Figure]) -> None:
     """Remove the files of these figures."""
     for figure in figures:
-        for pattern in figure.patterns():
+        for pattern in figure.patterns:
             for path in folder.glob(pattern):
                 path.unlink()

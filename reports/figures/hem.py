@@ -8,7 +8,7 @@ import numpy as np
 
 from reference_sim.trajectory.trajectory import Trajectory
 from reports.figures.chosen_roll_outs import SceneRollOuts, long_motion
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.method_styles import leading, style
 from reports.figures.plotting import PAGE_WIDTH, file_name, grid, legend_above, new_figure
 from reports.run.finished_run import Run
@@ -21,19 +21,11 @@ BEFORE = 4  # frames before the stop that are shown with what follows it
 STOPPED = "#F3F3F3"
 
 
-class Hem(Figure[SceneRollOuts]):
-    """Yaw of the hem in the root's axes and its distance from where it ends, a curve per method."""
-
-    name, files = "hem", ("hem_*",)
-
-    def needs(self, run: Run) -> SceneRollOuts | None:
-        """Return the motion that is shown at length, if the hem turns in it."""
-        motion = long_motion(run)
-        return motion.roll_outs if motion and hem_turns(run, motion.roll_outs) else None
-
-    def draw(self, run: Run, data: SceneRollOuts) -> Iterator[Drawing]:
-        """Draw that motion."""
-        yield draw_hem(run, data)
+def hem(run: Run) -> Iterator[Drawing]:
+    """Draw the hem in the motion that is shown at length, if it turns there."""
+    motion = long_motion(run)
+    if motion and hem_turns(run, motion.roll_outs):
+        yield draw_hem(run, motion.roll_outs)
 
 
 def _methods_with_hem(run: Run, roll_outs: SceneRollOuts) -> list[str]:

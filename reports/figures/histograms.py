@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.figures.chosen_roll_outs import Motion, long_motion
-from reports.figures.figure import Drawing, Figure
+from reports.figures.chosen_roll_outs import long_motion
+from reports.figures.figure import Drawing
 from reports.figures.method_styles import leading, style
 from reports.figures.plotting import PAGE_WIDTH, grid, legend_above, log_axis, new_figure
 from reports.run.finished_run import Run
@@ -23,21 +23,13 @@ EVERY = 3  # of a roll-out's frames
 RARE = 0.01  # [%] the lowest share that is shown
 
 
-class Histograms(Figure[Motion]):
-    """Histograms over vertices of the mean curvature and change of area, in the motion shown at length."""
-
-    name = "histograms"
-
-    def needs(self, run: Run) -> Motion | None:
-        """Return that motion."""
-        return long_motion(run)
-
-    def draw(self, run: Run, data: Motion) -> Iterator[Drawing]:
-        """Draw the methods whose roll-outs came to their end."""
-        roll_outs = data.roll_outs
-        series = {method: roll_outs.series[method] for method in data.whole}
+def histograms(run: Run) -> Iterator[Drawing]:
+    """Draw histograms of the methods that came to the end of the motion shown at length."""
+    if motion := long_motion(run):
+        roll_outs = motion.roll_outs
+        series = {method: roll_outs.series[method] for method in motion.whole}
         caption = f"{roll_outs.scene}: of all vertices, in one frame of {EVERY}."
-        yield Drawing(draw_histograms(run, series, roll_outs.rest), self.name, caption)
+        yield Drawing(draw_histograms(run, series, roll_outs.rest), "histograms", caption)
 
 
 def draw_histograms(run: Run, series: Mapping[str, Trajectory], rest: np.ndarray | None) -> Canvas:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH, grid, log_axis, new_figure
 from reports.run.finished_run import Run
 from reports.statistics.outcomes import checks, tolerances_away
@@ -16,29 +16,22 @@ from reports.tables.number_texts import number
 LOWEST = 1e-6  # tolerances away: what is nearer is drawn here
 
 
-class KnownAnswers(Figure[list[float]]):
-    """Every check as a mark, in order."""
-
-    name = "known_answers"
-
-    def needs(self, run: Run) -> list[float] | None:
-        """Return in order how many tolerances two checks or more lie from their answers."""
-        away = [tolerances_away(row) for row in checks(run).itertuples()]
-        known = sorted(float(x) for x in away if x is not None and math.isfinite(x))
-        return known if len(known) > 1 else None
-
-    def draw(self, run: Run, data: list[float]) -> Iterator[Drawing]:
-        """Draw the distances in order."""
-        figure = new_figure(PAGE_WIDTH, 1.75)
-        axes = figure.subplots()
-        heights = np.maximum(data, LOWEST)
-        axes.plot(range(1, len(data) + 1), heights, "o", color="#0072B2", markersize=3)
-        axes.axhline(1.0, color="#D55E00", linewidth=1.2)
-        axes.annotate("tolerance", (1, 1.0), (0, 3), textcoords="offset points", fontsize=8, color="#B04A00")
-        axes.set_ylim(LOWEST / 2.0, max(3.0, 2.0 * heights[-1]))
-        axes.set(xlabel="checks, in order", ylabel="tolerances away")
-        log_axis(axes, "y")
-        grid(axes)
-        caption = f"{len(data)} checks with a known answer: distance from it over the tolerance"
-        caption += f"; {number(LOWEST, 1)} stands for all that is less."
-        yield Drawing(figure, self.name, caption)
+def known_answers(run: Run) -> Iterator[Drawing]:
+    """Draw in order how many tolerances two checks or more lie from their answers."""
+    away = [tolerances_away(row) for row in checks(run).itertuples()]
+    known = sorted(float(x) for x in away if x is not None and math.isfinite(x))
+    if len(known) < 2:
+        return
+    figure = new_figure(PAGE_WIDTH, 1.75)
+    axes = figure.subplots()
+    heights = np.maximum(known, LOWEST)
+    axes.plot(range(1, len(known) + 1), heights, "o", color="#0072B2", markersize=3)
+    axes.axhline(1.0, color="#D55E00", linewidth=1.2)
+    axes.annotate("tolerance", (1, 1.0), (0, 3), textcoords="offset points", fontsize=8, color="#B04A00")
+    axes.set_ylim(LOWEST / 2.0, max(3.0, 2.0 * heights[-1]))
+    axes.set(xlabel="checks, in order", ylabel="tolerances away")
+    log_axis(axes, "y")
+    grid(axes)
+    caption = f"{len(known)} checks with a known answer: distance from it over the tolerance"
+    caption += f"; {number(LOWEST, 1)} stands for all that is less."
+    yield Drawing(figure, "known_answers", caption)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.method_styles import STATUS_COLOURS
 from reports.figures.plotting import PAGE_WIDTH, new_figure, power_text
 from reports.run.finished_run import Run
@@ -21,37 +21,31 @@ FEW, MANY = 2.0, 300.0  # iterations at the ends of the colour scale
 PALE, DEEP = (0.90, 0.95, 0.99), (0.03, 0.27, 0.49)
 
 
-class StabilityMaps(Figure[dict[str, pd.DataFrame]]):
-    """All maps side by side: a cell per step, coloured by its iterations or by how it failed."""
-
-    name = "stability_maps"
-
-    def needs(self, run: Run) -> dict[str, pd.DataFrame]:
-        """Return scene -> rows of its map, with their factor on the stiffness and time step."""
-        rows, points = run.suite("extremes"), map_points(run)
-        rows = rows[rows["case"].isin(points)]
-        rows = rows.assign(
-            factor=rows["case"].map(lambda case: points[case][0]),
-            dt=rows["case"].map(lambda case: points[case][1]),
-        )
-        return {str(scene): of_scene for scene, of_scene in rows.groupby("scene", sort=False)}
-
-    def draw(self, run: Run, data: dict[str, pd.DataFrame]) -> Iterator[Drawing]:
-        """Draw a panel for each scene."""
-        widths = [of_scene["dt"].nunique() for of_scene in data.values()]
-        height = max(of_scene["factor"].nunique() for of_scene in data.values())
-        figure = new_figure(PAGE_WIDTH if len(data) > 1 else 0.55 * PAGE_WIDTH, 1.0 + 0.27 * height)
-        panels = figure.subplots(1, len(data), squeeze=False, width_ratios=widths)[0]
-        for axes, (scene, of_scene) in zip(panels, data.items()):
-            _panel(axes, of_scene)
-            axes.set_title(scene.replace("_", " "))
-        panels[0].set_ylabel("stiffness, as a multiple of cotton's")
-        caption = (
-            "Stiffness and time step: one step from a noisy start. Blue: converged, with its number of "
-            "iterations, deeper for more. Other colours: not converged, by how it ended; "
-            "a cross: a false claim, a crash or a hang."
-        )
-        yield Drawing(figure, self.name, caption)
+def stability_maps(run: Run) -> Iterator[Drawing]:
+    """Draw all maps side by side: a cell per step, coloured by its iterations or by how it failed."""
+    rows, points = run.suite("extremes"), map_points(run)
+    rows = rows[rows["case"].isin(points)]
+    rows = rows.assign(
+        factor=rows["case"].map(lambda case: points[case][0]),
+        dt=rows["case"].map(lambda case: points[case][1]),
+    )
+    maps = {str(scene): of_scene for scene, of_scene in rows.groupby("scene", sort=False)}
+    if not maps:
+        return
+    widths = [of_scene["dt"].nunique() for of_scene in maps.values()]
+    height = max(of_scene["factor"].nunique() for of_scene in maps.values())
+    figure = new_figure(PAGE_WIDTH if len(maps) > 1 else 0.55 * PAGE_WIDTH, 1.0 + 0.27 * height)
+    panels = figure.subplots(1, len(maps), squeeze=False, width_ratios=widths)[0]
+    for axes, (scene, of_scene) in zip(panels, maps.items()):
+        _panel(axes, of_scene)
+        axes.set_title(scene.replace("_", " "))
+    panels[0].set_ylabel("stiffness, as a multiple of cotton's")
+    caption = (
+        "Stiffness and time step: one step from a noisy start. Blue: converged, with its number of "
+        "iterations, deeper for more. Other colours: not converged, by how it ended; "
+        "a cross: a false claim, a crash or a hang."
+    )
+    yield Drawing(figure, "stability_maps", caption)
 
 
 def _panel(axes: Axes, rows: pd.DataFrame) -> None:

@@ -6,31 +6,22 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.method_styles import leading, style
 from reports.figures.plotting import PAGE_WIDTH, file_name, grid, legend_above, log_axis, new_figure
 from reports.run.finished_run import Run
 from reports.run.training_histories import PANELS, History
 
 
-class TrainingCurves(Figure[Sequence[History]]):
-    """Loss of every training, a figure for each garment."""
-
-    name, files = "training", ("training.*", "training_*")
-
-    def needs(self, run: Run) -> Sequence[History]:
-        """Return the histories that models of the run carry."""
-        return run.histories
-
-    def draw(self, run: Run, data: Sequence[History]) -> Iterator[Drawing]:
-        """Draw the garments, the first under the plain name."""
-        for place, garment in enumerate(dict.fromkeys(history.garment for history in data)):
-            name = f"{self.name}_{file_name(garment)}" if place else self.name
-            histories = [history for history in data if history.garment == garment]
-            shown = leading(run, {history.method for history in histories})
-            histories = [history for history in histories if history.method in shown]
-            if histories:
-                yield _draw_garment(run, name, garment, histories)
+def training_curves(run: Run) -> Iterator[Drawing]:
+    """Draw the loss of every training, a figure for each garment, the first under the plain name."""
+    for place, garment in enumerate(dict.fromkeys(history.garment for history in run.histories)):
+        name = f"training_{file_name(garment)}" if place else "training"
+        histories = [history for history in run.histories if history.garment == garment]
+        shown = leading(run, {history.method for history in histories})
+        histories = [history for history in histories if history.method in shown]
+        if histories:
+            yield _draw_garment(run, name, garment, histories)
 
 
 def _draw_garment(run: Run, name: str, garment: str, histories: Sequence[History]) -> Drawing:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.figures.chosen_roll_outs import SceneRollOuts, read_scene
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH, wrapped
 from reports.pictures.sheets import FRONT, sheet, shots
 from reports.run.finished_run import Run
@@ -30,25 +30,19 @@ class Failure:
     text: str
 
 
-class Failures(Figure[list[Failure]]):
-    """Trained networks with most strain over the simulation's, where their roll-outs are on disk."""
-
-    name = "failures"
-
-    def needs(self, run: Run) -> list[Failure]:
-        """Return these roll-outs."""
-        return worst_failures(run)
-
-    def draw(self, run: Run, data: list[Failure]) -> Iterator[Drawing]:
-        """Draw them side by side."""
-        wide = PAGE_WIDTH / max(len(data), 4)
-        tile = (wide, 1.1 * wide)
-        images = [shots(f.roll_outs, [f.method], f.frame, FRONT, tile)[0] for f in data]
-        names = [f"{run.label(f.method)}: {f.roll_outs.scene.rpartition('/')[2]}" for f in data]
-        heads = [wrapped(name, round(14 * wide)) for name in names]
-        figure = sheet([images], tile, heads, below=[[f.text for f in data]])
-        caption = "The worst of trained networks by strain over the simulation's: each at its worst frame."
-        yield Drawing(figure, self.name, caption, vector=False)
+def failures(run: Run) -> Iterator[Drawing]:
+    """Draw trained networks with most strain over the simulation's, where their roll-outs are on disk."""
+    worst = worst_failures(run)
+    if not worst:
+        return
+    wide = PAGE_WIDTH / max(len(worst), 4)
+    tile = (wide, 1.1 * wide)
+    images = [shots(f.roll_outs, [f.method], f.frame, FRONT, tile)[0] for f in worst]
+    names = [f"{run.label(f.method)}: {f.roll_outs.scene.rpartition('/')[2]}" for f in worst]
+    heads = [wrapped(name, round(14 * wide)) for name in names]
+    figure = sheet([images], tile, heads, below=[[f.text for f in worst]])
+    caption = "The worst of trained networks by strain over the simulation's: each at its worst frame."
+    yield Drawing(figure, "failures", caption, vector=False)
 
 
 def worst_failures(run: Run) -> list[Failure]:

@@ -8,8 +8,8 @@ from typing import TypeVar
 
 import pandas as pd
 
-from reports.figures.chosen_roll_outs import PageOne, page_one_roll_outs
-from reports.figures.figure import Drawing, Figure
+from reports.figures.chosen_roll_outs import page_one_roll_outs
+from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH
 from reports.pictures.colour_scales import scales
 from reports.pictures.sheets import BAR, FRONT, heads_of, sheet, shots
@@ -23,36 +23,30 @@ MOST = 5  # pictures in a row
 BELOW = ("step/distance", "distance/rms")  # the number below a picture: the first that is known
 
 
-class LeadRow(Figure[PageOne]):
-    """Methods of page one, coloured by one-step error where it is known; their error below each."""
-
-    name = "lead"
-
-    def needs(self, run: Run) -> PageOne | None:
-        """Return roll-outs of a compared scene that kept them and its body."""
-        return page_one_roll_outs(run)
-
-    def draw(self, run: Run, data: PageOne) -> Iterator[Drawing]:
-        """Draw the row."""
-        roll_outs, methods = data
-        frame, _ = roll_outs.chosen_frame(methods, run.reference)
-        name, scale = next(iter(scales(roll_outs, methods, frame, run.reference).items()), ("", None))
-        columns = len(in_rows(methods)[0])
-        tile = (wide := (PAGE_WIDTH - BAR) / max(columns, 3), 1.55 if columns == len(methods) else 1.2)
-        cells, _ = compared_cells(run)
-        rows = cells[cells["scene"] == roll_outs.scene]
-        heads, below = heads_of(run, methods, wide), [error_below(run, rows, method) for method in methods]
-        if columns < len(methods):  # heads stand over the first row alone
-            heads, below = [], ["\n".join(filter(None, texts)) for texts in zip(heads, below)]
-        pictures = shots(roll_outs, methods, frame, FRONT, tile, scale)
-        figure = sheet(in_rows(pictures), tile, heads, below=in_rows(below), bar=scale)
-        colour = {
-            "step": "distance from the minimum of the frame's own time step; below: mean over frames",
-            "distance": "distance from the simulation's vertex; below: mean over frames",
-        }.get(name, scale.title if scale else "none")
-        time = float(roll_outs.series[methods[0]].times[frame])
-        caption = f"{roll_outs.scene} at {number(time)} s. Colour: {colour}."
-        yield Drawing(figure, self.name, caption, vector=False)
+def lead_row(run: Run) -> Iterator[Drawing]:
+    """Draw the methods of page one, coloured by one-step error where it is known; their error below each."""
+    page_one = page_one_roll_outs(run)
+    if not page_one:
+        return
+    roll_outs, methods = page_one
+    frame, _ = roll_outs.chosen_frame(methods, run.reference)
+    name, scale = next(iter(scales(roll_outs, methods, frame, run.reference).items()), ("", None))
+    columns = len(in_rows(methods)[0])
+    tile = (wide := (PAGE_WIDTH - BAR) / max(columns, 3), 1.55 if columns == len(methods) else 1.2)
+    cells, _ = compared_cells(run)
+    rows = cells[cells["scene"] == roll_outs.scene]
+    heads, below = heads_of(run, methods, wide), [error_below(run, rows, method) for method in methods]
+    if columns < len(methods):  # heads stand over the first row alone
+        heads, below = [], ["\n".join(filter(None, texts)) for texts in zip(heads, below)]
+    pictures = shots(roll_outs, methods, frame, FRONT, tile, scale)
+    figure = sheet(in_rows(pictures), tile, heads, below=in_rows(below), bar=scale)
+    colour = {
+        "step": "distance from the minimum of the frame's own time step; below: mean over frames",
+        "distance": "distance from the simulation's vertex; below: mean over frames",
+    }.get(name, scale.title if scale else "none")
+    time = float(roll_outs.series[methods[0]].times[frame])
+    caption = f"{roll_outs.scene} at {number(time)} s. Colour: {colour}."
+    yield Drawing(figure, "lead", caption, vector=False)
 
 
 def in_rows(items: Sequence[Item]) -> list[Sequence[Item]]:

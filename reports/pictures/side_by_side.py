@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from reports.figures.chosen_roll_outs import Motion, SceneRollOuts, long_motion
-from reports.figures.figure import Drawing, Figure
+from reports.figures.chosen_roll_outs import SceneRollOuts, long_motion
+from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH, file_name
 from reports.pictures.sheets import BACK, FRONT, SIDE, heads_of, sheet, shots
 from reports.run.finished_run import Run
@@ -14,18 +14,10 @@ from reports.tables.number_texts import number
 MOST = 6  # methods side by side
 
 
-class SideBySide(Figure[Motion]):
-    """Methods that came to the end of the motion shown at length, at one of its frames."""
-
-    name, files = "frames", ("frames_*",)
-
-    def needs(self, run: Run) -> Motion | None:
-        """Return that motion."""
-        return long_motion(run)
-
-    def draw(self, run: Run, data: Motion) -> Iterator[Drawing]:
-        """Draw a row from the front and one from behind."""
-        yield draw_side_by_side(run, data.roll_outs, run.ordered(data.whole)[:MOST])
+def side_by_side(run: Run) -> Iterator[Drawing]:
+    """Draw methods that came to the end of the motion shown at length, at one frame, front and back."""
+    if motion := long_motion(run):
+        yield draw_side_by_side(run, motion.roll_outs, run.ordered(motion.whole)[:MOST])
 
 
 def draw_side_by_side(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]) -> Drawing:

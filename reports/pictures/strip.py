@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from reports.figures.chosen_roll_outs import FEW, Motion, SceneRollOuts, long_motion
-from reports.figures.figure import Drawing, Figure
+from reports.figures.chosen_roll_outs import FEW, SceneRollOuts, long_motion
+from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH, file_name, wrapped
 from reports.pictures.sheets import FRONT, SIDE, count_lines, sheet, shots
 from reports.run.finished_run import Run
@@ -17,20 +16,12 @@ from reports.tables.number_texts import number
 FRAMES = 6  # side by side
 
 
-class Strip(Figure[Motion]):
-    """The motion that is shown at length."""
-
-    name, files = "strip", ("strip_*",)
-
-    def needs(self, run: Run) -> Motion | None:
-        """Return that motion, with those of its few methods that came to its end."""
-        motion = long_motion(run)
-        few = [method for method in motion.few if method in motion.whole][:FEW] if motion else []
-        return replace(motion, few=tuple(few)) if motion and few else None
-
-    def draw(self, run: Run, data: Motion) -> Iterator[Drawing]:
-        """Draw that motion."""
-        yield draw_strip(run, data.roll_outs, data.few)
+def strip(run: Run) -> Iterator[Drawing]:
+    """Draw the motion shown at length, of its few methods those that came to its end."""
+    motion = long_motion(run)
+    few = [method for method in motion.few if method in motion.whole][:FEW] if motion else []
+    if motion and few:
+        yield draw_strip(run, motion.roll_outs, few)
 
 
 def draw_strip(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]) -> Drawing:

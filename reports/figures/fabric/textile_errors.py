@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from reports.figures.figure import Drawing, Figure
+from reports.figures.figure import Drawing
 from reports.figures.plane.curves import families
 from reports.figures.plane.labels import lay_out
 from reports.figures.plane.points import draw_points, write_labels
@@ -21,39 +21,38 @@ PANELS = {
 VARIANTS = ("reference-variant",)  # of the reference, whose spread is the error bar
 
 
-class TextileErrors(Figure[dict[str, list[Point]]]):
-    """A panel for each textile test: mean error over the fabrics against run time."""
+def points_of_tests(run: Run) -> dict[str, list[Point]]:
+    """Return test -> points of the methods that did it with every fabric."""
+    points = {}
+    for test in PANELS:
+        rows = rows_of_test(run, test)
+        rows = rows[~rows["role"].isin(VARIANTS)]
+        points[test] = points_of(run, rows, sorted(set(rows["scene"])), ERROR, TIME)
+    return {test: of_test for test, of_test in points.items() if len(of_test) > 1}
 
-    name = "textile_errors"
 
-    def needs(self, run: Run) -> dict[str, list[Point]]:
-        """Return test -> points of the methods that did it with every fabric."""
-        points = {}
-        for test in PANELS:
-            rows = rows_of_test(run, test)
-            rows = rows[~rows["role"].isin(VARIANTS)]
-            points[test] = points_of(run, rows, sorted(set(rows["scene"])), ERROR, TIME)
-        return {test: of_test for test, of_test in points.items() if len(of_test) > 1}
-
-    def draw(self, run: Run, data: dict[str, list[Point]]) -> Iterator[Drawing]:
-        """Draw the panels side by side."""
-        figure = new_figure(PAGE_WIDTH, 3.1)
-        panels = figure.subplots(1, len(data), squeeze=False)[0]
-        drawn = []
-        for axes, (test, points) in zip(panels, data.items()):
-            rows = rows_of_test(run, test)
-            reference, band = value_of(rows, run.reference, TIME), indistinct(run, rows, ERROR)
-            drawn.append(draw_points(axes, run, families(run, points), reference, band))
-            axes.set(xlabel="run time [ms per frame]", title=PANELS[test])
-            grid(axes)
-        lay_out(figure)
-        for axes, panel in zip(panels, drawn):
-            write_labels(axes, panel)
-        caption = (
-            "Textile tests: mean error over the fabrics against run time; lower left is better. Bending "
-            "length: distance from the exact one. Drape coefficient: difference from the reference's; bars: "
-            "the change by a perturbed reference. Grey: no more than that of the reference and of its "
-            "perturbed runs. Dotted: the reference's run time. Joined: a family, "
-            "its first and last number beside."
-        )
-        yield Drawing(figure, self.name, caption)
+def textile_errors(run: Run) -> Iterator[Drawing]:
+    """Draw a panel for each textile test: mean error over the fabrics against run time."""
+    tests = points_of_tests(run)
+    if not tests:
+        return
+    figure = new_figure(PAGE_WIDTH, 3.1)
+    panels = figure.subplots(1, len(tests), squeeze=False)[0]
+    drawn = []
+    for axes, (test, points) in zip(panels, tests.items()):
+        rows = rows_of_test(run, test)
+        reference, band = value_of(rows, run.reference, TIME), indistinct(run, rows, ERROR)
+        drawn.append(draw_points(axes, run, families(run, points), reference, band))
+        axes.set(xlabel="run time [ms per frame]", title=PANELS[test])
+        grid(axes)
+    lay_out(figure)
+    for axes, panel in zip(panels, drawn):
+        write_labels(axes, panel)
+    caption = (
+        "Textile tests: mean error over the fabrics against run time; lower left is better. Bending "
+        "length: distance from the exact one. Drape coefficient: difference from the reference's; bars: "
+        "the change by a perturbed reference. Grey: no more than that of the reference and of its "
+        "perturbed runs. Dotted: the reference's run time. Joined: a family, "
+        "its first and last number beside."
+    )
+    yield Drawing(figure, "textile_errors", caption)

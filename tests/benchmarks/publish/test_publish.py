@@ -15,8 +15,7 @@ from benchmarks.publish import __main__ as command
 from benchmarks.publish.__main__ import PublishError, keep, publish
 from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.run_folder import RunFolder
-from reports.figures import FIGURES
-from reports.pictures import PICTURES
+from reports.blocks import FIGURES
 from tests.benchmarks.plan.planned import planned
 
 FALL = "--preset smoke --suite speed --scenes free_fall --methods "
@@ -31,7 +30,7 @@ def test_every_published_command_can_be_planned(name, tmp_path):
 
 
 def test_every_published_picture_is_one_that_reports_draw():
-    patterns = [pattern for figure in (*FIGURES, *PICTURES) for pattern in figure.patterns()]
+    patterns = [pattern for figure in FIGURES for pattern in figure.patterns]
     for run in RUNS.values():
         for name in run.pictures:
             assert any(fnmatch(f"{name}.png", pattern) for pattern in patterns), name

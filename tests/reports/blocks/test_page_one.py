@@ -9,14 +9,10 @@ import re
 import numpy as np
 import pytest
 
-from reports.blocks import BLOCKS
-from reports.blocks.block import FigureBlock
 from reports.blocks.page_one_sentences import headline
 from reports.blocks.printed_tables import shortened
 from reports.blocks.what_went_wrong import endings, failures
 from reports.document.content import content
-from reports.figures import FIGURES
-from reports.pictures import PICTURES
 from reports.statistics import paper_claims
 from reports.statistics.page_one_methods import leads
 from reports.tables import make_tables, number_texts
@@ -244,11 +240,6 @@ def test_a_shortened_table_has_rows_of_each_garment():
     lines = tuple((garment, f"{garment}-{k}") for garment in ("shirt", "tunic") for k in range(8))
     short = shortened(Table("energies", columns, lines, grouped_by=("garment",)), 12)
     assert short.rows == (*lines[:6], *lines[8:14])
-
-
-def test_every_block_names_a_figure_or_table_that_is_declared():
-    figures = {figure.name for figure in (*FIGURES, *PICTURES)}
-    assert {block.name for block in BLOCKS if isinstance(block, FigureBlock)} == figures
 
 
 def test_no_number_of_the_report_is_infinite_or_nan():

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks.results.run_folder import RunFolder
+from reports.blocks import FIGURES
 from reports.blocks.block import Report
 from reports.document.typeset import write_pdf
-from reports.figures import FIGURES
 from reports.figures.figure import draw_figures
-from reports.pictures import PICTURES
 from reports.run.reading import read_run
 from reports.tables import make_tables
 from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, declaration, row, sheet, write_mesh
@@ -77,7 +76,7 @@ def report(request, tmp_path_factory):
             fields = {f"energy/{t}": np.linspace(0, v, 5) for t, v in TERMS.items()}
             write_mesh(run.trajectory_path(scene, method), *sheet(0.1), fields)
     read = read_run(run)
-    pictures = draw_figures(read, run.figures, (*PICTURES, *FIGURES))
+    pictures = draw_figures(read, run.figures, FIGURES)
     write_pdf(run, Report(read, make_tables(read), pictures))
     assert not read.problems
     found = pdfium.PdfDocument(run.report_path)

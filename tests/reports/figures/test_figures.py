@@ -7,9 +7,9 @@ import numpy as np
 from benchmarks.results.run_folder import RunFolder
 from reports.figures import hem, histograms, known_answers, method_styles, stability_maps
 from reports.figures.chosen_roll_outs import SceneRollOuts
-from reports.figures.dots import Dots
+from reports.figures.dots import dots
 from reports.figures.plotting import file_name, printable
-from reports.figures.training_curves import TrainingCurves
+from reports.figures.training_curves import training_curves
 from reports.run import reading
 from reports.run.finished_run import shown_seeds
 from reports.run.reading import read_run_with_trainings
@@ -104,10 +104,10 @@ def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
 
 def test_every_garment_has_its_training_curves(tmp_path):
     folder = written(tmp_path, [row(), row("tunic/stop")])
-    assert TrainingCurves().drawings(read_run_with_trainings(folder)) == []
+    assert list(training_curves(read_run_with_trainings(folder))) == []
     for garment in ("tshirt", "tunic"):
         write_model(folder.models_of(garment) / "snug-seed0.safetensors", "snug", strain=0.1)
-    drawings = TrainingCurves().drawings(read_run_with_trainings(folder))
+    drawings = list(training_curves(read_run_with_trainings(folder)))
     assert [drawing.name for drawing in drawings] == ["training", "training_tunic"]
     assert [drawing.caption.partition(":")[0] for drawing in drawings] == ["tshirt", "tunic"]
 
@@ -133,10 +133,10 @@ def test_a_map_of_every_outcome_is_drawn_from_what_its_cases_declare():
     run = run_of([*rows, other], cases=cases)
     assert set(map_points(run).values()) >= {(1.0, 1e-4), (1e4, 1 / 30)} and len(map_points(run)) == 10
     assert list(stress_tests(run)["scene"]) == ["another"]
-    (drawing,) = stability_maps.StabilityMaps().drawings(run)
+    (drawing,) = stability_maps.stability_maps(run)
     (axes,) = drawing.canvas.axes
     assert len(axes.patches) == len(rows) and axes.get_title() == "map sheet"
-    assert stability_maps.StabilityMaps().drawings(run_of([other], cases=cases)) == []
+    assert list(stability_maps.stability_maps(run_of([other], cases=cases))) == []
     blues = [stability_maps.shade(n)[0] for n in (1.0, 2.0, 20.0, 300.0, 1e6)]
     assert blues == sorted(blues, reverse=True) and blues[0] == blues[1] and blues[3] == blues[4]
 
@@ -147,11 +147,11 @@ def test_a_dot_stands_for_each_motion_and_seed():
         for s in ("tshirt/a", "tshirt/b")
         for k, v in enumerate((1, 3))
     ]
-    (drawing,) = Dots().drawings(run_of(rows))
-    dots, bar = drawing.canvas.axes[0].get_lines()
-    assert sorted(dots.get_xdata()) == [1.0, 1.0, 3.0, 3.0] and list(bar.get_xdata()) == [2.0, 2.0]
+    (drawing,) = dots(run_of(rows))
+    marks, bar = drawing.canvas.axes[0].get_lines()
+    assert sorted(marks.get_xdata()) == [1.0, 1.0, 3.0, 3.0] and list(bar.get_xdata()) == [2.0, 2.0]
     assert drawing.canvas.axes[0].get_xlabel() == "Total [J]"
-    assert Dots().drawings(run_of([row("flag", garment="")])) == []
+    assert list(dots(run_of([row("flag", garment="")]))) == []
 
 
 def test_dots_of_relative_excess_stand_on_a_logarithmic_axis_on_both_sides_of_zero():
@@ -161,7 +161,7 @@ def test_dots_of_relative_excess_stand_on_a_logarithmic_axis_on_both_sides_of_ze
         for method, of_scenes in values.items()
         for scene, value in zip(("tshirt/a", "tshirt/b"), of_scenes)
     ]
-    (drawing,) = Dots().drawings(run_of(rows))
+    (drawing,) = dots(run_of(rows))
     axes = drawing.canvas.axes[0]
     assert (axes.get_xlabel(), axes.get_xscale()) == ("Relative excess [%]", "asinh")
     lines = {float(np.mean(line.get_ydata())): line.get_xdata() for line in axes.get_lines()[::2]}
@@ -198,7 +198,7 @@ def test_checks_are_drawn_by_their_tolerances_in_order():
         "tolerance": 2.0,
     }
     rows = [row(f"case {k}", value=v, **more) for k, v in enumerate((1.0, 0.5, 0.0))]
-    (drawing,) = known_answers.KnownAnswers().drawings(run_of(rows))
+    (drawing,) = known_answers.known_answers(run_of(rows))
     heights = drawing.canvas.axes[0].get_lines()[0].get_ydata()
     assert list(heights) == [known_answers.LOWEST, 0.25, 0.5]
 

@@ -7,8 +7,8 @@ import dataclasses
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from reports.figures.break_even import BreakEven
-from reports.figures.error_against_time import ErrorOfPageOne, ErrorsOfScene, ErrorsOfScenes
+from reports.figures.break_even import break_even
+from reports.figures.error_against_time import error_of_page_one, errors_of_scene, errors_of_scenes
 from reports.figures.figure import Drawing, save_drawing
 from reports.figures.plotting import _columns
 from reports.statistics.pareto import (
@@ -20,7 +20,7 @@ from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, row
 
 # method: ms a frame, relative energy gap, curvature error
-FIGURES = (ErrorOfPageOne(), ErrorsOfScene(), ErrorsOfScenes(), BreakEven())
+FIGURES = (error_of_page_one, errors_of_scene, errors_of_scenes, break_even)
 
 
 def test_a_legend_has_no_more_columns_than_fit():
@@ -48,23 +48,23 @@ def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_p
         )
         assert point.time == pytest.approx(0.1 + shift) and point.time_spread == pytest.approx(0.05)
         assert run_time(scene) == ("cost/whole" if shift else "cost/frame")
-        assert ErrorOfPageOne().drawings(run)
+        assert list(error_of_page_one(run))
 
 
 def test_ablations_are_drawn_where_the_full_recipe_is_not():
     costs = (("cost/frame", 1.0), ("gap/energy", 0.1))
     rows = [row("tshirt/walk", m, k, v) for m in ("snug-springs", "newton-1") for k, v in costs]
-    (drawing,) = (part for figure in FIGURES for part in figure.drawings(run_of(rows)))
+    (drawing,) = (part for figure in FIGURES for part in figure(run_of(rows)))
     assert drawing.name == "error_against_time"
     rows += [row("tshirt/walk", "snug", *cost) for cost in costs]
     kept = [r for r in rows if r.method != "newton-1"]
-    assert [figure.drawings(run_of(kept)) for figure in FIGURES] == [[]] * 4  # one point is no plot
+    assert [part for figure in FIGURES for part in figure(run_of(kept))] == []  # one point is no plot
 
 
 @pytest.fixture(scope="module")
 def drawings() -> list[Drawing]:
     run = run_of(all_rows())
-    return [drawing for figure in FIGURES for drawing in figure.drawings(run)]
+    return [drawing for figure in FIGURES for drawing in figure(run)]
 
 
 def test_every_figure_of_the_suite_is_drawn(drawings, tmp_path):

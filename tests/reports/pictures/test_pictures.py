@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from benchmarks.results.run_folder import RunFolder
+from reports.blocks import FIGURES
 from reports.figures.chosen_roll_outs import SceneRollOuts
-from reports.pictures import PICTURES, render, sheets
+from reports.pictures import render, sheets
 from reports.pictures.colour_scales import scales
-from reports.pictures.failures import Failures, worst_failures
+from reports.pictures.failures import failures, worst_failures
 from reports.pictures.side_by_side import draw_side_by_side
 from reports.run.reading import read_run
 from tests.reports.report_folder import FRAMES, Stored, declaration, mesh, row, run_of, sheet
@@ -91,9 +92,9 @@ def test_a_failure_is_shown_at_its_worst_frame():
     run = run_of(rows)
     cloth, faces = sheet(0.1)
     strain = {"energy/strain": np.array([0.0, 9.0, 1.0, 1.0, 1.0])}
-    assert Failures().drawings(run) == []
+    assert list(failures(run)) == []
     stored = replace(run, roll_outs=Stored(mesh(cloth, faces, strain)))
-    (drawing,) = Failures().drawings(stored)
+    (drawing,) = failures(stored)
     assert drawing.name == "failures" and worst_failures(stored)[0].frame == 1
 
 
@@ -106,7 +107,7 @@ def test_only_what_was_drawn_is_read(tmp_path):
     path.parent.mkdir(parents=True)
     path.write_bytes(b"no mesh")
     run = read_run(folder)
-    assert [figure.drawings(run) for figure in PICTURES] == [[]] * len(PICTURES) and run.problems == []
+    assert [drawing for figure in FIGURES for drawing in figure.drawings(run)] == [] and run.problems == []
 
 
 def test_words_beside_a_row_have_room_for_all_their_lines():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from reports.figures.fabric.textile_errors import TextileErrors
+from reports.figures.fabric.textile_errors import points_of_tests, textile_errors
 from reports.tables.fabric.textile_tests import fabric_bands, fabric_drape, fabric_order
 from tests.reports.report_folder import row, run_of
 
@@ -43,12 +43,12 @@ def test_pairs_in_the_wrong_order_are_counted(rows):
 
 
 def test_errors_are_drawn_against_run_time(rows):
-    points = TextileErrors().needs(run_of(rows))
+    points = points_of_tests(run_of(rows))
     assert {test: [(p.method, p.time, p.error) for p in found] for test, found in points.items()} == {
         "cantilever": [("simulation", 4.0, pytest.approx(0.01)), ("vbd-5", 0.5, 3.0)],
         "drape": [("simulation", 50.0, pytest.approx(0.01)), ("vbd-5", 5.0, 9.0)],
     }
-    assert len(TextileErrors().drawings(run_of(rows))) == 1
+    assert len(list(textile_errors(run_of(rows)))) == 1
 
 
 def test_cases_make_the_tables_of_the_reference():
