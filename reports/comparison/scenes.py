@@ -10,7 +10,6 @@ method without seeds is compared with the uncertainty that the reference's ensem
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,33 +20,6 @@ from reports.comparison.change import FLOOR, SPREADS, Change, side, size_of_valu
 from reports.run.finished_run import Metric
 
 ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter
-
-
-@dataclass(frozen=True)
-class Difference:
-    """Difference of a method's metric in one scene, the later run less the earlier.
-
-    Attributes:
-        scene: its name.
-        method: name of the method.
-        metric: the metric.
-        before: mean over seeds in the earlier run.
-        after: mean over seeds in the later run.
-        far: difference on the scale: of logarithms where all values are positive, else plain.
-        least: largest difference on that scale that is no change.
-        error: standard error; 0 without seeds.
-        freedom: degrees of freedom of the error.
-    """
-
-    scene: str
-    method: str
-    metric: Metric
-    before: float
-    after: float
-    far: float
-    least: float
-    error: float = 0.0
-    freedom: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -79,18 +51,22 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
 
     answers = [name for name, metric in metrics.items() if metric.of != "machine"]
     before, after = (_tables(frame[frame["metric"].isin(answers)]) for frame in (one, other))
-    differences: list[Difference] = []
-    for (method, name), table in before.items():
-        differences += _differences(method, metrics[name], table, after[method, name])
-    tests = sum(difference.error > 0.0 for difference in differences)
+    parts = [
+        _differences(method, metrics[name], table, after[method, name])
+        for (method, name), table in before.items()
+        if not table.seeded or min(table.values.shape[1], after[method, name].values.shape[1]) > 1
+    ]
+    if not parts:
+        return []
+    rows = pd.concat(parts)
+    tests = max(int((rows["error"] > 0.0).sum()), 1)
+    beyond = rows["error"] * stats.t.isf(LEVEL / 2.0 / tests, rows["freedom"])
+    rows = rows[rows["far"].abs() > np.maximum(rows["least"], beyond)]
     changes = []
-    for d in differences:
-        if abs(d.far) <= d.least:
-            continue
-        if d.error > 0.0 and abs(d.far) <= d.error * float(stats.t.isf(LEVEL / 2.0 / tests, d.freedom)):
-            continue
-        size = size_of_values(d.metric, d.before, d.after)
-        changes.append(Change(side(d.metric, d.far), d.scene, d.method, d.metric.name, size))
+    for row in rows.itertuples():
+        metric = metrics[row.metric]
+        size = size_of_values(metric, row.before, row.after)
+        changes.append(Change(side(metric, row.far), row.scene, row.method, metric.name, size))
     return changes
 
 
@@ -118,10 +94,13 @@ def _tables(frame: pd.DataFrame) -> dict[tuple[str, str], Table]:
     return tables
 
 
-def _differences(method: str, metric: Metric, one: Table, other: Table) -> Iterator[Difference]:
-    """Yield the difference of each scene that both have; of a network, where both have two seeds."""
-    if one.seeded and min(one.values.shape[1], other.values.shape[1]) < 2:
-        return
+def _differences(method: str, metric: Metric, one: Table, other: Table) -> pd.DataFrame:
+    """Return for each scene the difference of the later run from the earlier.
+
+    before, after: means over seeds. far: the difference on the scale, of logarithms where all values are
+    positive, else plain. least: the largest one on that scale that is no change. error: its standard error, 0
+    without seeds. freedom: degrees of freedom of the error.
+    """
     before, after = one.values, other.values
     relative = metric.name.startswith("relative_excess/")
     signed = relative or metric.arbitrary_zero
@@ -140,11 +119,10 @@ def _differences(method: str, metric: Metric, one: Table, other: Table) -> Itera
         least = np.maximum(np.maximum(share * unit, FLOOR * median), moved)
     counts = [np.isfinite(x).sum(axis=1) for x in (before, after)]
     error = scatter * np.sqrt(1.0 / counts[0] + 1.0 / counts[1])
-    for k, scene in enumerate(one.scenes):
-        yield Difference(
-            scene, method, metric, float(old[k]), float(new[k]), float(far[k]), float(least[k]),
-            float(error[k]), freedom,
-        )  # fmt: skip
+    return pd.DataFrame({
+        "scene": one.scenes, "method": method, "metric": metric.name, "before": old, "after": new,
+        "far": far, "least": least, "error": error, "freedom": freedom,
+    })  # fmt: skip
 
 
 def _scatter(runs: list[np.ndarray]) -> tuple[np.ndarray, float]:
