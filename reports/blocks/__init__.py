@@ -5,7 +5,7 @@ out, and so is a heading with nothing below it. Blocks before the first heading 
 A new figure is a function in a file of its own and a line here.
 """
 
-from reports.blocks.block import Block, Heading, SentenceBlock, TableBlock, TablesOfSuite
+from reports.blocks.block import Block, Heading, SentenceBlock, TableBlock
 from reports.blocks.page_one_sentences import headline
 from reports.blocks.printed_tables import failed_checks, not_converged, with_labels
 from reports.blocks.what_went_wrong import unread_files, worst
@@ -25,6 +25,8 @@ from reports.pictures.failures import failures
 from reports.pictures.lead_row import lead_row
 from reports.pictures.side_by_side import side_by_side
 from reports.pictures.strip import strip
+
+PERFORMANCE = ("", "_simulator", "_search", "_scaling", "_training", "_inference", "_convergence")
 
 BLOCKS: tuple[Block, ...] = (
     SentenceBlock(headline),
@@ -81,7 +83,7 @@ BLOCKS: tuple[Block, ...] = (
     Heading("Training"),
     TableBlock("trainings"),
     Figure("training", training_curves),
-    TablesOfSuite("performance"),
+    *(TableBlock(f"performance{part}_by_scene") for part in PERFORMANCE),
     Heading("How cells, checks and stress tests ended"),
     TableBlock("endings"),
     TableBlock("unfinished", printed=with_labels),

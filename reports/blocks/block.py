@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from reports.blocks.printed_tables import of_suite, unchanged
+from reports.blocks.printed_tables import unchanged
 from reports.figures.figure import Figure, Picture
 from reports.run.finished_run import Run
 from reports.tables.table import Table
@@ -54,26 +54,5 @@ class TableBlock:
     most: int = ROWS
     printed: Callable[[Run, Table], Table] = unchanged
 
-    def tables(self, report: Report) -> list[Table]:
-        """Return the whole table, in a list that is empty where the run has none."""
-        return [report.tables[self.name]] if self.name in report.tables else []
 
-
-@dataclass(frozen=True)
-class TablesOfSuite:
-    """Rows of one suite in all tables that are scene by scene."""
-
-    suite: str
-    most: int = ROWS
-
-    def tables(self, report: Report) -> list[Table]:
-        """Return these tables with the lines of the suite and the columns that have a number there."""
-        parts = (of_suite(table, self.suite) for table in report.tables.values())
-        return [table for table in parts if table.rows]
-
-    def printed(self, run: Run, table: Table) -> Table:
-        """Return the table as it is."""
-        return table
-
-
-Block = Heading | SentenceBlock | Figure | TableBlock | TablesOfSuite
+Block = Heading | SentenceBlock | Figure | TableBlock

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from reports.run.finished_run import Run
 from reports.tables.outcomes import merged
-from reports.tables.pivot import BY_SCENE
 from reports.tables.table import Cell, Table
 
 LETTERS = 90  # of a sentence in a cell
@@ -61,12 +60,3 @@ def with_labels(run: Run, table: Table) -> Table:
         rows.append((*row[:place], run.label(str(row[place])), *row[place + 1 : -1], reason))
     lines = merged(replace(table, rows=tuple(rows)), ("seed", "suite", "scene", "method"))
     return replace(lines, rows=tuple(tuple(cut(str(cell)) for cell in row) for row in lines.rows))
-
-
-def of_suite(table: Table, suite: str) -> Table:
-    """Return the lines of the suite in a table that is scene by scene, with columns that have a number."""
-    rows = [row for row in table.rows if row[0] == suite] if table.grouped_by == BY_SCENE else []
-    filled = [k for k in range(1, len(table.columns)) if any(row[k] is not None for row in rows)]
-    columns = tuple(table.columns[place] for place in filled)
-    cells = tuple(tuple(row[place] for place in filled) for row in rows)
-    return replace(table, columns=columns, rows=cells, grouped_by=("scene",))

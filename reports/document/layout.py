@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from reports.blocks.block import Block, Report, SentenceBlock, TableBlock, TablesOfSuite
+from reports.blocks.block import Report, SentenceBlock, TableBlock
 from reports.blocks.printed_tables import shortened
 from reports.figures.figure import Figure, Picture
 from reports.run.finished_run import Run
@@ -20,18 +20,17 @@ FEW = 5  # up to so many columns, the columns of a table share its width evenly
 MOST = 9  # columns of numbers that fit on a page; a wider table goes on below
 
 
-def lay_out(report: Report, block: Block) -> list[Values]:
+def lay_out(report: Report, block: SentenceBlock | Figure | TableBlock) -> list[Values]:
     """Return the values of a block, none where the report has no content for it."""
     if isinstance(block, SentenceBlock):
         sentences = [list(pair) for pair in block.make(report.run)]
         return [{"kind": "sentences", "pairs": sentences, "small": block.small}] if sentences else []
     if isinstance(block, Figure):
         return [_figure(picture) for picture in report.pictures.get(block.name, ())]
-    if isinstance(block, TableBlock | TablesOfSuite):
-        tables = [block.printed(report.run, table) for table in block.tables(report)]
-        tables = [shortened(table, block.most) for table in tables if table.rows]
-        return [values for table in tables for values in lay_out_table(report.run, table)]
-    raise TypeError(f"{block} has no content of its own")
+    if block.name not in report.tables:
+        return []
+    table = block.printed(report.run, report.tables[block.name])
+    return list(lay_out_table(report.run, shortened(table, block.most))) if table.rows else []
 
 
 def _figure(picture: Picture) -> Values:

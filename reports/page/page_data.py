@@ -65,11 +65,10 @@ def tables_of(report: Report) -> list[dict[str, Any]]:
 
     A table without a caption is a file to plot from, and too long for a page.
     """
-    blocks = [block for block in BLOCKS if isinstance(block, TableBlock)]
-    first = {table.name: table for block in blocks for table in block.tables(report)}
-    return [
-        table_data(report.run, table) for table in (first | dict(report.tables)).values() if table.caption
-    ]
+    first = [block.name for block in BLOCKS if isinstance(block, TableBlock)]
+    names = dict.fromkeys((*first, *report.tables))
+    tables = [report.tables[name] for name in names if name in report.tables]
+    return [table_data(report.run, table) for table in tables if table.caption]
 
 
 def sentences_of(report: Report) -> list[tuple[str, str]]:
