@@ -5,7 +5,6 @@ To simulate a whole scene elsewhere, see python -m benchmarks.export.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -141,8 +140,9 @@ def _write_frames(folder: Path, meshes: Meshes) -> None:
                 write_obj(part / f"{name}_{frame:04d}.obj", positions, mesh.faces)
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """Make the parser of the command."""
+@command("reports.export")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
     parser = Parser(
         prog="python -m reports.export",
         description="Write a roll-out of a run, and the body, as Alembic, USD, PC2 or OBJ files.",
@@ -155,13 +155,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "-o", "--out", required=True, metavar="FILE", help="x.abc, x.usdc, x.pc2 or a new folder"
     )
-    return parser
-
-
-@command("reports.export")
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    options = make_parser().parse_args(arguments)
+    options = parser.parse_args(arguments)
     path = Path(options.out)
     demand_writable(path)
     from reports.run.selected_roll_outs import select_roll_outs  # heavy: not needed for --help

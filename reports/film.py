@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -215,8 +214,9 @@ def demand_possible(path: Path) -> None:
         )
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """Make the parser of the command."""
+@command("reports.film")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
     parser = Parser(
         prog="python -m reports.film",
         description="A film of methods side by side in a scene of a run.",
@@ -231,13 +231,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--azimuth", type=float, default=25.0, metavar="DEGREES",
         help="of the camera, from the front to the body's left (default 25; 180: from behind)")  # fmt: skip
     parser.add_argument("-o", "--out", required=True, metavar="FILE", help="x.mp4 or x.gif")
-    return parser
-
-
-@command("reports.film")
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    options = make_parser().parse_args(arguments)
+    options = parser.parse_args(arguments)
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
         raise ValueError("--speed is 0.01 to 10, --width 64 to 2000")
