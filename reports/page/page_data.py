@@ -9,17 +9,16 @@ import pandas as pd
 
 from reports.blocks import BLOCKS
 from reports.blocks.block import Report, SentenceBlock, TableBlock
+from reports.blocks.what_went_wrong import endings
 from reports.figures.method_styles import style
 from reports.run.finished_run import Run
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean, value_of
+from reports.statistics.outcomes import BAD
 from reports.statistics.pareto import ERRORS, error_points, indistinct, run_time, time_label
 from reports.tables.cell_texts import column_texts, remarks_below
 from reports.tables.outcomes import merged
 from reports.tables.table import Cell, Column, Table
-
-MEANING = {"stalled": "with frames left unconverged"}
-WRONG = ("failed", "timeout", "out-of-memory", "diverged")
 
 
 def methods_of(run: Run) -> dict[str, dict[str, Any]]:
@@ -119,21 +118,17 @@ def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
 
 
 def unfinished_cells(report: Report) -> tuple[str, bool, list[str]]:
-    """Say what did not run to its end: a sentence of counts, whether anything went wrong, and each cell."""
+    """Say what did not run to its end: the counts of page one, whether anything went wrong, and each cell."""
     if "unfinished" not in report.tables:
         return "", False, []
-    table = report.tables["unfinished"]
+    table = merged(report.tables["unfinished"], ("suite", "scene"))
     names = [column.name for column in table.columns]
-    rows = [dict(zip(names, row)) for row in table.rows]
-    cells: dict[tuple, str] = {}
-    for row in rows:
-        cells.setdefault((row["suite"], row["scene"], row["method"], row["seed"]), str(row["status"]))
-    counts = pd.Series(list(cells.values())).value_counts()
-    order = [*(status for status in WRONG if status in counts), *(s for s in counts.index if s not in WRONG)]
-    text = ", ".join(f"{counts[status]} {MEANING.get(status, status)}" for status in order)
-    lines = []
-    cells_by_reason = (dict(zip(names, line)) for line in merged(table, ("suite", "scene")).rows)
-    for cell in sorted(cells_by_reason, key=lambda cell: order.index(cell["status"])):
-        label = report.run.label(str(cell["method"]))
-        lines.append(f"{cell['status']}: {label}, seed {cell['seed']}, {cell['scene']}: {cell['reason']}")
-    return f"Not every cell ended well: {text}.", any(status in counts for status in WRONG), lines
+    cells = [{name: str(cell) for name, cell in zip(names, row)} for row in table.rows]
+    cells.sort(key=lambda cell: (*BAD, "skipped").index(cell["status"]))
+    lines = [
+        f"{cell['status']}: {report.run.label(cell['method'])}, seed {cell['seed']}, {cell['scene']}: "
+        f"{cell['reason']}"
+        for cell in cells
+    ]
+    wrong = cells[0]["status"] not in ("stalled", "skipped")
+    return f"Not every cell ended well. {endings(report.run)}".strip(), wrong, lines
