@@ -117,8 +117,8 @@ def demand_writable(path: Path) -> None:
 
 def write(path: Path, meshes: Meshes) -> None:
     """Write the meshes, each whole or not at all. Raises OSError."""
-    from reference_sim.files.atomic_files import replacing
-    from reference_sim.trajectory.point_cache import write_point_cache
+    from reference_sim.files.atomic_files import new_folder, replacing
+    from reference_sim.trajectory.point_cache import write_obj, write_point_cache
 
     if path.suffix in ARCHIVES:
         with replacing(path) as temporary:
@@ -127,17 +127,10 @@ def write(path: Path, meshes: Meshes) -> None:
         for name, mesh in meshes.items():
             write_point_cache(path if name == "garment" else path.with_stem(f"{path.stem}_{name}"), mesh)
     else:
-        _write_frames(path, meshes)
-
-
-def _write_frames(folder: Path, meshes: Meshes) -> None:
-    from reference_sim.files.atomic_files import new_folder
-    from reference_sim.trajectory.point_cache import write_obj
-
-    with new_folder(folder) as part:
-        for name, mesh in meshes.items():
-            for frame, positions in enumerate(mesh.positions):
-                write_obj(part / f"{name}_{frame:04d}.obj", positions, mesh.faces)
+        with new_folder(path) as part:
+            for name, mesh in meshes.items():
+                for frame, positions in enumerate(mesh.positions):
+                    write_obj(part / f"{name}_{frame:04d}.obj", positions, mesh.faces)
 
 
 @command("reports.export")

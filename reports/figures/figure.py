@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reports.figures.plotting import PAGE_WIDTH, save
+from reference_sim.files.atomic_files import replacing
+from reports.figures.plotting import DOTS, PAGE_WIDTH
 from reports.run.finished_run import Run
 
 if TYPE_CHECKING:
@@ -55,8 +56,15 @@ def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[s
 
 def save_drawing(folder: Path, drawing: Drawing) -> Picture:
     """Write <name>.png and, unless it is a photograph, <name>.svg, which the PDF then takes."""
-    path = save(drawing.canvas, folder, drawing.name, vector=drawing.vector)
-    return Picture(path, drawing.caption, min(1.0, float(drawing.canvas.get_figwidth()) / PAGE_WIDTH))
+    canvas, path = drawing.canvas, folder / f"{drawing.name}.png"
+    with replacing(path) as temporary:
+        canvas.savefig(temporary, dpi=DOTS, metadata={"Software": None})
+    if drawing.vector:
+        canvas.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
+        path = folder / f"{drawing.name}.svg"
+        with replacing(path) as temporary:
+            canvas.savefig(temporary, metadata={"Date": None})
+    return Picture(path, drawing.caption, min(1.0, float(canvas.get_figwidth()) / PAGE_WIDTH))
 
 
 def remove_figures(folder: Path, figures: Iterable[Figure]) -> None:

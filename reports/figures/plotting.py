@@ -6,12 +6,10 @@ import math
 import re
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.files.atomic_files import replacing
 from reports.figures.method_styles import Style
 
 if TYPE_CHECKING:
@@ -136,19 +134,6 @@ def grid(axes: Axes, which: str = "both") -> None:
 def file_name(text: str) -> str:
     """Return a scene's or method's name as part of a file name, in letters that the report's text keeps."""
     return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
-
-
-def save(figure: Figure, folder: Path, name: str, *, vector: bool = True) -> Path:
-    """Write <name>.png and, if `vector`, <name>.svg; return the path of the latter, or else of the former."""
-    path = folder / f"{name}.png"
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=DOTS, metadata={"Software": None})
-    if vector:
-        figure.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
-        path = folder / f"{name}.svg"
-        with replacing(path) as temporary:
-            figure.savefig(temporary, metadata={"Date": None})
-    return path
 
 
 def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:

@@ -51,35 +51,33 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
     embedded, references = Embedded(), {}
     wanted = list(groups(folder, run))
     budget -= NOTE * len(wanted)
-    for group in wanted:
+    for scene, seeds in wanted:
         if embedded.missing:
-            embedded.missing[group.scene] = embedded.missing.get(group.scene, 0) + len(group.seeds)
+            embedded.missing[scene] = embedded.missing.get(scene, 0) + len(seeds)
             continue
-        stored = {
-            method: run.roll_outs.cloth(group.scene, method, seed) for method, seed in group.seeds.items()
-        }
+        stored = {method: run.roll_outs.cloth(scene, method, seed) for method, seed in seeds.items()}
         whole = {method: cloth.finite() for method, cloth in stored.items() if cloth is not None}
         cloths = {method: cloth for method, cloth in whole.items() if cloth.frames}
         if run.reference in cloths:
-            references[group.scene] = cloths[run.reference]
-        body = run.roll_outs.body(group.scene)
+            references[scene] = cloths[run.reference]
+        body = run.roll_outs.body(scene)
         skin = skin_of(body.positions, body.faces) if body else None
         depths = _depths(cloths, skin) if skin else {}
-        rest = run.roll_outs.rest_areas(group.scene)
+        rest = run.roll_outs.rest_areas(scene)
         for method, cloth in cloths.items():
-            scene = dict(embedded.scenes.get(group.scene) or {"body": None, "methods": {}})
+            shown = dict(embedded.scenes.get(scene) or {"body": None, "methods": {}})
             texts: dict[str, str] = {}
-            if body and scene["body"] is None:
-                scene["body"] = _kept(texts, _body(body))
-            pack = _cloth(cloth, rest, references.get(group.scene), depths.get(method), run.metrics)
-            scene["methods"] = {**scene["methods"], method: _kept(texts, pack) | {"ending": _ending(cloth)}}
+            if body and shown["body"] is None:
+                shown["body"] = _kept(texts, _body(body))
+            pack = _cloth(cloth, rest, references.get(scene), depths.get(method), run.metrics)
+            shown["methods"] = {**shown["methods"], method: _kept(texts, pack) | {"ending": _ending(cloth)}}
             new = {name: text for name, text in texts.items() if name not in embedded.texts}
             budget -= sum(ROOM + len(text) for text in new.values())
             if budget < 0:
-                embedded.missing[group.scene] = embedded.missing.get(group.scene, 0) + 1
+                embedded.missing[scene] = embedded.missing.get(scene, 0) + 1
             else:
                 embedded.texts |= new
-                embedded.scenes[group.scene] = scene
+                embedded.scenes[scene] = shown
     return embedded
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import SUITES, Run, shown_seeds
@@ -16,16 +15,11 @@ RULE = (
 )
 
 
-@dataclass(frozen=True)
-class Group:
-    """Roll-outs of one scene that are taken one after the other: method -> seed."""
+def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
+    """Yield scene and method -> seed of all roll-outs on disk, the most wanted first.
 
-    scene: str
-    seeds: dict[str, int]
-
-
-def groups(folder: RunFolder, run: Run) -> Iterator[Group]:
-    """Yield all roll-outs on disk, the most wanted first; those of a scene come in one or two groups."""
+    Those of a scene come in one or two groups.
+    """
     cells = run.cells(*SUITES)
     seeds = shown_seeds(cells)
     traits = cells.drop_duplicates("scene").set_index("scene")[["garment", "part"]]
@@ -40,4 +34,4 @@ def groups(folder: RunFolder, run: Run) -> Iterator[Group]:
                 chosen = {m: int(seeds[scene, m]) for m in methods}
                 stored = {m: s for m, s in chosen.items() if folder.trajectory_path(scene, m, s).is_file()}
                 if stored:
-                    yield Group(scene, stored)
+                    yield scene, stored

@@ -15,7 +15,7 @@ from benchmarks.results.run_folder import RunFolder, model_path
 from reference_sim.files.array_file import read_arrays
 from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
 from reports.run.finished_run import NoRollOuts, Run, make_run
-from reports.run.training_histories import History, ModelHeaderError, read_history
+from reports.run.training_histories import History, read_history
 
 
 def read_run_with_trainings(folder: RunFolder) -> Run:
@@ -66,7 +66,7 @@ def _read_histories(folder: RunFolder, run: Run) -> list[History]:
                 continue
             try:
                 history = read_history(path, method)
-            except ModelHeaderError as error:
+            except ValueError as error:
                 run.problems.append(_without_folder(folder, error))
             else:
                 histories += [replace(history, garment=str(garment), seed=int(seed))] if history else []

@@ -18,10 +18,6 @@ PANELS = {
 }
 
 
-class ModelHeaderError(ValueError):
-    """A model file has no header that can be read; the message names the file."""
-
-
 @dataclass(frozen=True)
 class History:
     """Loss of one model over its training.
@@ -64,14 +60,14 @@ class History:
 
 
 def read_history(path: Path, method: str) -> History | None:
-    """Return the history in a model file, None without one. Raises ModelHeaderError for a broken file."""
+    """Return the history in a model file, None without one. Raises ValueError for a broken file."""
     from safetensors import SafetensorError, safe_open
 
     try:
         with safe_open(path, "numpy") as stored:
             data: dict[str, Any] = json.loads((stored.metadata() or {}).get("snug", "{}"))
     except (OSError, ValueError, SafetensorError) as error:
-        raise ModelHeaderError(f"{path}: no safetensors header ({error})") from None
+        raise ValueError(f"{path}: no safetensors header ({error})") from None
     rows = data.get("history") or []
     summary = data.get("summary") or {}
     kind, unit = data.get("kind", ""), data.get("unit", "")

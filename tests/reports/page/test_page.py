@@ -164,7 +164,7 @@ def test_scenes_of_one_motion_share_the_body(folder):
 
 
 def test_clips_come_first_and_leading_methods_before_others(folder):
-    order = [(group.scene, list(group.seeds)) for group in groups(folder, read_run(folder))]
+    order = [(scene, list(seeds)) for scene, seeds in groups(folder, read_run(folder))]
     leading = ["simulation", "skinning", "snug", "pbns"]
     assert order == [
         *((scene, leading) for scene in CLIPS), *((scene, ["newton-4"]) for scene in CLIPS),
