@@ -34,7 +34,7 @@ def excesses(random: np.random.Generator, motions: int, seeds: int, spread: floa
 def mean_of(grid: np.ndarray, group: str) -> Mean:
     """Return the mean over motions and seeds of a grid (motions, seeds)."""
     cells = {(str(m), s): float(grid[m, s]) for m, s in np.ndindex(grid.shape)}
-    return Mean(float(grid.mean()), None, *grid.shape, grid.size, cells=cells, pairing_group=group)
+    return Mean(float(grid.mean()), None, grid.shape[1], grid.size, cells=cells, pairing_group=group)
 
 
 def main() -> None:

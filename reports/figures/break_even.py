@@ -45,6 +45,6 @@ def break_even(run: Run) -> Iterator[Drawing]:
     log_axis(axes, "x")
     log_axis(axes, "y")
     grid(axes)
-    legend_above(figure, [style(run, m) for m in run.ordered(cost.method for cost in costs)], lines=True)
+    legend_above(figure, [style(run, m) for m in run.ordered(cost.method for cost in costs)])
     caption = f"Total time against the number of frames ({', '.join(scenes)}). "
     yield Drawing(figure, "break_even", caption + "Dots: where a training has paid.")

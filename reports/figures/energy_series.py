@@ -39,7 +39,7 @@ def energy_series(run: Run) -> Iterator[Drawing]:
         axes.set(title=term.capitalize(), xlabel="time [s]")
         grid(axes)
     panels[0].set_ylabel("energy [J]")
-    legend_above(figure, [style(run, method) for method in methods], lines=True)
+    legend_above(figure, [style(run, method) for method in methods])
     scene = roll_outs.scene
     caption = f"{scene}: energy of each frame by term, logarithmic. A frame with no energy at all is a gap."
     yield Drawing(figure, f"energy_series_{file_name(scene)}", caption)

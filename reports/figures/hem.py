@@ -66,7 +66,7 @@ def draw_hem(run: Run, roll_outs: SceneRollOuts) -> Drawing:
             axes.set_xlim(body.times[first], body.times[-1])
         axes.set(title=title, xlabel="time [s]")
         grid(axes)
-    legend_above(figure, [style(run, method) for method in methods], lines=True)
+    legend_above(figure, [style(run, method) for method in methods])
     caption = f"{roll_outs.scene}: the hem in the axes of the root."
     if stop is not None and body is not None:
         caption += f" Grey: the body has stopped, at {number(float(body.times[stop]))} s. "

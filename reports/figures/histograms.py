@@ -52,5 +52,5 @@ def draw_histograms(run: Run, series: Mapping[str, Trajectory], rest: np.ndarray
         axes.set(xlabel=title, ylabel="share of vertices [%]", ylim=(RARE, None))
         log_axis(axes, "y")
         grid(axes)
-    legend_above(figure, [style(run, method) for method in methods], lines=True)
+    legend_above(figure, [style(run, method) for method in methods])
     return figure

@@ -136,20 +136,12 @@ def file_name(text: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
 
 
-def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> None:
-    """Draw one legend for all panels, above them: of lines, or else of markers."""
+def legend_above(figure: Figure, entries: Sequence[Style]) -> None:
+    """Draw one legend of lines for all panels, above them."""
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D(
-            [],
-            [],
-            color=look.colour,
-            linestyle=look.line if lines or not look.marker else "none",  # type: ignore[arg-type]
-            marker="" if lines else look.marker,
-            markersize=9 if look.marker == "*" else 6,
-            label=wrapped(look.label, 30),
-        )
+        Line2D([], [], color=look.colour, linestyle=look.line, label=wrapped(look.label, 30))  # type: ignore[arg-type]
         for look in entries
     ]
     figure.legend(
@@ -157,7 +149,7 @@ def legend_above(figure: Figure, entries: Sequence[Style], *, lines: bool) -> No
         loc="outside upper center",
         ncols=_columns([len(look.label) + 8 for look in entries], figure.get_figwidth() / PAGE_WIDTH),
         frameon=False,
-        handlelength=1.6 if lines else 0.8,
+        handlelength=1.6,
         handletextpad=0.5,
         columnspacing=1.4,
     )

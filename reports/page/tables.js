@@ -52,7 +52,6 @@ function showTable(table, root, definition, note) {
       if (k === column) cell.setAttribute('aria-sort', direction > 0 ? 'ascending' : 'descending');
       else cell.removeAttribute('aria-sort');
       const arrow = k === column ? (direction > 0 ? ' ▴' : ' ▾') : '';
-      cell.dataset.arrow = arrow;
       cell.querySelector('.arrow')?.remove();
       if (arrow) cell.firstChild.append(element('span', { class: 'arrow', 'aria-hidden': 'true' }, arrow));
     });

@@ -35,7 +35,6 @@ def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> Pa
         "plots": plots_of(run),
         "tables": tables_of(report),
         "curves": {name: [metric.title, metric.unit] for name, metric in run.metrics.items()},
-        "reference": run.reference,
     }
     fixed = len(_page(report, content, Embedded()).encode())
     embedded = embed(folder, run, budget - fixed)

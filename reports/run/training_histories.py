@@ -23,8 +23,8 @@ class History:
     """Loss of one model over its training.
 
     unit: of the loss. rows: for every few steps, step, seconds, loss and terms, at some the value on held-out
-    motions. kind: of the network. frames: number that it learned from. best_step: that of the least value on
-    held-out motions, nan where there are none.
+    motions. frames: number that it learned from. best_step: that of the least value on held-out motions, nan
+    where there are none.
     """
 
     method: str
@@ -33,7 +33,6 @@ class History:
     garment: str = ""
     seed: int = 0
     frames: int | None = None
-    kind: str = ""
     best_step: float = np.nan
 
     @property
@@ -68,9 +67,8 @@ def read_history(path: Path, method: str) -> History | None:
             data: dict[str, Any] = json.loads((stored.metadata() or {}).get("snug", "{}"))
     except (OSError, ValueError, SafetensorError) as error:
         raise ValueError(f"{path}: no safetensors header ({error})") from None
-    rows = data.get("history") or []
+    rows, unit = data.get("history") or [], data.get("unit", "")
     summary = data.get("summary") or {}
-    kind, unit = data.get("kind", ""), data.get("unit", "")
     best = (summary.get("validation") or {}).get("best_step", np.nan)
     frames = summary.get("training_frames")
-    return History(method, unit, rows, frames=frames, kind=kind, best_step=best) if len(rows) > 1 else None
+    return History(method, unit, rows, frames=frames, best_step=best) if len(rows) > 1 else None

@@ -18,7 +18,7 @@ import pandas as pd
 class Mean:
     """Mean of a metric, its spread over seeds, and the cells it was taken over.
 
-    scenes, seeds: how many have the metric. asked: number of cells that should have it, every seed in every
+    seeds: how many have the metric. asked: number of cells that should have it, every seed in every
     scene in which any method has the metric; where fewer have, the mean is not `complete` and the table must
     say so. stalled: a solver left some frames of some cell unconverged. seeded: another seed would give
     another value. cells: value of each (scene, seed). pairing_group: means of one group are compared seed by
@@ -28,7 +28,6 @@ class Mean:
 
     value: float
     spread: float | None
-    scenes: int
     seeds: int
     asked: int
     stalled: bool = False
@@ -87,18 +86,17 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     across = seeds.groupby(names, sort=False)
     unsure = of_all["uncertainty"].mean() if "uncertainty" in frame else [None] * len(cells)
     columns = (
-        across.mean(), across.std(), of_all["scene"].nunique(), of_all["stalled"].any(),
+        across.mean(), across.std(), of_all["stalled"].any(),
         of_all["seeded"].any(), of_all["pairing_group"].first(), unsure,
     )  # fmt: skip
     result = {}
-    for key, value, spread, scenes, stalled, seeded, pairing_group, moved in zip(cells, *columns):
+    for key, value, spread, stalled, seeded, pairing_group, moved in zip(cells, *columns):
         group = dict(zip(names, key))
         seeds_here = {seed for _, seed in cells[key]}
         every_seed = seeds_here | failed.get(_key(group, ends), set())
         result[key] = Mean(
             value=float(value),
             spread=None if pd.isna(spread) else float(spread),
-            scenes=int(scenes),
             seeds=len(seeds_here),
             asked=int(asked[_key(group, places)]) * len(every_seed),
             stalled=bool(stalled),

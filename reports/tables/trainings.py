@@ -51,7 +51,7 @@ def _over_seeds(values: Sequence[float | None]) -> Mean | float | None:
     if len(numbers) == len(values) and len(set(known.values())) == 1:
         return float(numbers[0])
     spread = float(numbers.std(ddof=1)) if len(numbers) > 1 else None
-    return Mean(float(numbers.mean()), spread, 1, len(numbers), len(values), cells=known) if known else None
+    return Mean(float(numbers.mean()), spread, len(numbers), len(values), cells=known) if known else None
 
 
 def training_curves(run: Run) -> list[Table]:

@@ -39,8 +39,6 @@ EXCEPTIONS = {
     ("reports/text/code_parts.py", "benchmarks.plan.options.make_parser"),
     ("reports/text/code_parts.py", "benchmarks.plan.suites.SUITES"),
     ("reports/text/code_parts.py", "benchmarks.presets.PRESETS"),
-    ("reports/text/code_parts.py", "reference_sim.kernels.fast_kernels.USES"),
-    ("reports/text/code_parts.py", "snug.garments.templates.GARMENT_TEMPLATES"),
     ("reports/text/code_parts.py", "snug.recipes.named.RECIPES"),
     ("reports/text/published_parts.py", "snug.motion.composition.clip_rows"),
     ("reports/text/published_parts.py", "snug.motion.composition.distance_rows"),

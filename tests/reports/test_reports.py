@@ -203,7 +203,7 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
         "definition": "warmth",
     }
     found = make_tables(make_run(said, rows))
-    assert found["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1, 1)),)
+    assert found["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1)),)
     found["acoustics"].write_csv(tmp_path)
     assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
     (heat,) = (column for column in found["energies"].columns if column.name == "energy/heat")

@@ -21,12 +21,10 @@ OF_REFERENCE = (
 class Curve:
     """Points that a line joins in their order, a method alone where there is one.
 
-    name: what the curve is called where no end is. ends: label of its first and of its last point. look: of
-    its line, and of its markers unless the marker is each method's own. aside: points of its kind that lie
-    off the line.
+    ends: label of its first and of its last point. look: of its line, and of its markers unless the marker is
+    each method's own. aside: points of its kind that lie off the line.
     """
 
-    name: str
     points: Sequence[Point]
     ends: tuple[str, str]
     look: Style
@@ -39,14 +37,13 @@ def families(run: Run, points: Iterable[Point]) -> list[Curve]:
     for members in _grouped(run, points, lambda method: method.family):
         method = run.methods[members[0].method]
         if method.level is None:
-            label = run.label(method.name)
-            curves.append(Curve(label, members, (label, ""), style(run, method.name)))
+            curves.append(Curve(members, (run.label(method.name), ""), style(run, method.name)))
             continue
         members.sort(key=lambda point: run.methods[point.method].level or 0.0)
         look = family_style(run, method)
         first, last = (power_text(run.methods[members[end].method].level or 0.0) for end in (0, -1))
         ends = (f"{look.label}, {first}", last if len(members) > 1 else "")
-        curves.append(Curve(look.label, members, ends, look))
+        curves.append(Curve(members, ends, look))
     return curves
 
 
@@ -67,7 +64,7 @@ def of_page_one(run: Run, points: Iterable[Point]) -> list[Curve]:
         first, last = (run.label(best[end].method) for end in (0, -1))
         first = first if base or len(best) == 1 else f"{SOLVERS.label}: {first}"
         aside = [point for point in members if point not in best]
-        curves.append(Curve(look.label, best, (first, last if len(best) > 1 else ""), look, aside))
+        curves.append(Curve(best, (first, last if len(best) > 1 else ""), look, aside))
     return curves
 
 

@@ -100,7 +100,7 @@ def random_means(random, motions, seeds, spread, paired):
         grid = sum(parts, shared)
         cells = {(str(m), s): float(grid[m, s]) for m in range(motions) for s in range(seeds)}
         group = "both" if paired else name
-        means.append(Mean(float(grid.mean()), None, motions, seeds, True, cells=cells, pairing_group=group))
+        means.append(Mean(float(grid.mean()), None, seeds, True, cells=cells, pairing_group=group))
     return means
 
 
@@ -143,7 +143,7 @@ def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
     def interval():
         values = alike**0.5 * random.normal(size=9)[place] + (1 - alike) ** 0.5 * random.normal(size=20)
         cells = {(scene, 0): float(value) for scene, value in zip(MOTIONS, values)}
-        one = Mean(float(values.mean()), None, 20, 1, 20, seeded=False, cells=cells)
+        one = Mean(float(values.mean()), None, 1, 20, seeded=False, cells=cells)
         far = effect(one, replace(one, value=0.0, cells=dict.fromkeys(cells, 0.0)), DIFFERENCE)
         return far.interval
 
@@ -152,7 +152,7 @@ def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
 
     assert 0.93 <= held() <= 0.98
     same = {(scene, 0): 99.7 for scene in MOTIONS}
-    constant = Mean(99.7, None, 20, 1, 20, seeded=False, cells=same)
+    constant = Mean(99.7, None, 1, 20, seeded=False, cells=same)
     assert effect(constant, replace(constant, cells=dict.fromkeys(same, 0.1)), DIFFERENCE).interval is None
     if alike:
         monkeypatch.setattr(effects, "recording_of", lambda scene: scene)

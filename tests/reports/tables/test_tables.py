@@ -45,7 +45,7 @@ def test_every_declared_case_has_its_place_in_the_tables(tmp_path):
 def test_mean_and_spread_over_seeds():
     rows = [row(scene, seed=s, value=v) for scene in SCENES for s, v in ((0, 1.0), (1, 3.0), (2, 8.0))]
     mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
-    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), scenes=2, seeds=3, asked=6)
+    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), seeds=3, asked=6)
     assert dict(mean.cells) == {(scene, s): v for scene in SCENES for s, v in enumerate((1.0, 3.0, 8.0))}
     assert mean_of(run_of(rows[:1]).frame, "snug", "energy/strain", SCENES[:1]).spread is None
     assert mean_of(run_of(rows).frame, "snug", "energy/bending") is None
@@ -169,7 +169,7 @@ def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     captions = made["ablations"].caption + made["ablation_effects"].caption
     assert "recipe" not in captions and "ingredient" not in captions  # a variant may have more of it
     full = made["ablations"].rows[0]
-    assert full[-2] == Mean(pytest.approx(1.1), pytest.approx(0.1), scenes=1, seeds=3, asked=3)
+    assert full[-2] == Mean(pytest.approx(1.1), pytest.approx(0.1), seeds=3, asked=3)
     lines = {line[1]: line[2:] for line in made["ablation_effects"].rows}
     assert list(lines) == ["snug-no-noise", "snug-window6"]
     error, drift = lines["snug-no-noise"]

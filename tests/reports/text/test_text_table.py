@@ -19,7 +19,7 @@ RUN = make_run({"methods": DECLARED}, [Row("garments", "a/b", "snug", 0, "energy
 
 def small_table() -> Table:
     effect = Effect(value=1.5, scale=EXCESS, second=0.0, error=0.2, motions=20)
-    mean = Mean(value=0.25, spread=0.01, scenes=1, seeds=3, asked=0)
+    mean = Mean(value=0.25, spread=0.01, seeds=3, asked=0)
     columns = (METHOD, Column("excess", "Excess", "%"), Column("total", "Total", "J"), Column("none", "None"))
     return Table("t", columns, (("snug", effect, mean, None), ("skinning", None, None, None)))
 
@@ -39,7 +39,7 @@ def test_columns_are_chosen_by_name_and_an_unknown_one_is_refused():
 
 
 def test_a_mean_over_fewer_roll_outs_is_marked_and_the_mark_explained():
-    fewer = replace(small_table(), rows=(("snug", None, Mean(0.25, None, scenes=1, seeds=3, asked=3), None),))
+    fewer = replace(small_table(), rows=(("snug", None, Mean(0.25, None, seeds=3, asked=3), None),))
     rows = text_rows(RUN, fewer)
     assert rows[1] == ["SNUG", "0.250*"]
     assert remarks_on(rows).startswith("* A mean over fewer") and remarks_on(rows[:1]) == ""

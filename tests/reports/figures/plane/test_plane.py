@@ -36,7 +36,7 @@ def test_a_family_is_one_curve_in_the_order_of_its_level():
 def test_solvers_stopped_early_are_one_curve_of_page_one():
     points, run = points_and_run()
     *alone, solvers, started = of_page_one(run, points)
-    assert [curve.name for curve in alone] == ["SNUG", "Skinning alone"]
+    assert [curve.ends[0] for curve in alone] == ["SNUG", "Skinning alone"]
     assert [p.method for p in solvers.points] == ["lbfgs-5", "lbfgs-20", "newton-4"]
     assert [p.method for p in solvers.aside] == ["newton-1"]
     assert solvers.ends == ("Solvers stopped early: L-BFGS, 5 iterations", "Newton, 4 iterations")
