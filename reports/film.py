@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
@@ -108,9 +109,7 @@ def camera_path(selected: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarra
     lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
     dt = next(iter(cloths)).dt
     reach = 0 if np.isnan(dt) else int(SMOOTHED / dt / 2.0)
-    padded = np.pad((lowest + highest) / 2.0, ((reach, reach), (0, 0)), mode="edge")
-    kernel = np.full(2 * reach + 1, 1.0 / (2 * reach + 1))
-    centres = np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(3)], axis=1)
+    centres = uniform_filter1d((lowest + highest) / 2.0, 2 * reach + 1, axis=0, mode="nearest")
     right, up, _ = np.maximum(highest - centres, centres - lowest).max(axis=0)
     return centres @ axes.T, MARGIN * float(max(up, TALL * right))
 
