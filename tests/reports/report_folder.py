@@ -12,6 +12,7 @@ import numpy as np
 
 from benchmarks.results.row import Row
 from benchmarks.results.run_config import FORMAT
+from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
 from reports.blocks.block import Report
 from reports.run.finished_run import NoRollOuts, Run, make_run
@@ -124,6 +125,14 @@ def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
 
 def run_of(rows: Sequence[Row], **more) -> Run:
     return make_run(declaration(rows, **more), rows)
+
+
+def run_folder(path: Path, rows: Sequence[Row], **more) -> RunFolder:
+    """A folder with run.json and results.csv of these rows."""
+    folder = RunFolder(path)
+    folder.write_rows(rows)
+    folder.write_config(declaration(rows, **more))
+    return folder
 
 
 def report_of(rows: Sequence[Row], **more) -> Report:

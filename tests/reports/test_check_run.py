@@ -10,7 +10,7 @@ import pytest
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.run_folder import RunFolder
 from reports import build, check
-from tests.reports.report_folder import declaration, row
+from tests.reports.report_folder import row, run_folder
 
 SCENES = ("tshirt/walk", "tshirt/jump")
 
@@ -31,16 +31,9 @@ def sound_rows():
     return [*rows, row("flag", "snug", "cost/frame", suite="speed", unit="ms", **skip, **more)]
 
 
-def write(path, rows) -> RunFolder:
-    folder = RunFolder(path)
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows, preset="smoke", commit="abc"))
-    return folder
-
-
 @pytest.fixture(scope="module")
 def built(tmp_path_factory) -> RunFolder:
-    folder = write(tmp_path_factory.mktemp("run"), sound_rows())
+    folder = run_folder(tmp_path_factory.mktemp("run"), sound_rows(), preset="smoke", commit="abc")
     assert build.main([str(folder.path)]) == 0
     return folder
 
@@ -59,7 +52,7 @@ def lines(folder, capsys) -> list[str]:
 
 def of_rows(rows, tmp_path, capsys) -> list[str]:
     """Without those on files of the report, which is not made."""
-    found = lines(write(tmp_path / "run", rows), capsys)
+    found = lines(run_folder(tmp_path / "run", rows, preset="smoke", commit="abc"), capsys)
     return [line for line in found if not line.startswith("files")]
 
 

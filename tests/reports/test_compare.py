@@ -7,10 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.results.run_folder import RunFolder
 from reports import compare as command
 from reports.comparison.compare_runs import compare
-from tests.reports.report_folder import declaration, row, run_of
+from tests.reports.report_folder import row, run_folder, run_of
 
 SCENES = ("tshirt/walk", "tshirt/jump", "tshirt/bow", "tshirt/kick")
 SEEDS = (0, 1, 2)
@@ -138,15 +137,10 @@ def test_a_cell_that_fails_is_found_where_it_has_no_metric_in_common():
     )
 
 
-def write(path, rows, **more):
-    folder = RunFolder(path)
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows, **more))
-    return str(path)
-
-
 def test_exit_status_and_lines(tmp_path, capsys):
-    one, worse = write(tmp_path / "a", rows_of()), write(tmp_path / "b", rows_of(1, snug=1.3))
+    run_folder(tmp_path / "a", rows_of())
+    run_folder(tmp_path / "b", rows_of(1, snug=1.3))
+    one, worse = str(tmp_path / "a"), str(tmp_path / "b")
     assert command.main([one, one]) == 0 and "0 worse" in capsys.readouterr().out
     assert command.main([one, worse]) == 1
     line = capsys.readouterr().out.splitlines()[0]
@@ -158,11 +152,11 @@ def test_exit_status_and_lines(tmp_path, capsys):
 
 @pytest.mark.parametrize("what", ["absent", "preset", "nothing shared", "pattern"])
 def test_bad_input_is_one_line_and_status_2(tmp_path, refused, what):
-    one = write(tmp_path / "a", rows_of(), preset="quick")
+    run_folder(tmp_path / "a", rows_of(), preset="quick")
     if what == "preset":
-        write(tmp_path / "b", rows_of(), preset="smoke")
+        run_folder(tmp_path / "b", rows_of(), preset="smoke")
     if what in ("nothing shared", "pattern"):
         other = [row("skirt/turn")] if what == "nothing shared" else rows_of()
-        write(tmp_path / "b", other, preset="quick")
+        run_folder(tmp_path / "b", other, preset="quick")
     options = ["--metrics", "energy/strian"] if what == "pattern" else []
-    refused("reports.compare: ", command.main, [one, str(tmp_path / "b"), *options])
+    refused("reports.compare: ", command.main, [str(tmp_path / "a"), str(tmp_path / "b"), *options])

@@ -11,7 +11,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
 from reference_sim.trajectory.point_cache import read_point_cache
 from reports import export
-from tests.reports.report_folder import declaration, row, sheet, write_mesh
+from tests.reports.report_folder import row, run_folder, sheet, write_mesh
 
 SCENE = "tshirt/walk"
 
@@ -19,11 +19,9 @@ SCENE = "tshirt/walk"
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> RunFolder:
     """A simulation, a network of two seeds, one that diverged, and a body."""
-    folder = RunFolder(tmp_path_factory.mktemp("run"))
     rows = [row(SCENE, "simulation"), *(row(SCENE, "snug", seed=seed) for seed in (0, 1))]
     rows += [row(SCENE, "pbns"), row(SCENE, "supervised"), row("tshirt/jump", "snug")]
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows))
+    folder = run_folder(tmp_path_factory.mktemp("run"), rows)
     body, faces = sheet(-0.05)
     write_mesh(folder.trajectory_path(SCENE, "body"), body, faces, {})
     for number, (method, seed) in enumerate((("simulation", 0), ("snug", 0), ("snug", 1), ("pbns", 0))):

@@ -14,7 +14,7 @@ from reference_sim import Trajectory
 from reports import film
 from reports.pictures.render import camera_axes, vertex_normals
 from reports.run.selected_roll_outs import SelectedRollOuts
-from tests.reports.report_folder import declaration, row, run_of, sheet, write_mesh
+from tests.reports.report_folder import row, run_folder, run_of, sheet, write_mesh
 
 SCENE = "tshirt/walk"
 needs_opengl = pytest.mark.usefixtures("opengl")
@@ -29,10 +29,8 @@ def opengl():
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> RunFolder:
     """A simulation that moves, skinning that stands still, and a network that ended early."""
-    folder = RunFolder(tmp_path_factory.mktemp("run"))
     rows = [row(SCENE, method) for method in ("simulation", "skinning", "snug")]
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows))
+    folder = run_folder(tmp_path_factory.mktemp("run"), rows)
     body, faces = sheet(-0.2)
     write_mesh(folder.trajectory_path(SCENE, "body"), body, faces, {})
     for method in ("simulation", "skinning", "snug"):

@@ -27,6 +27,7 @@ from tests.reports.report_folder import (
     all_rows,
     declaration,
     row,
+    run_folder,
     sheet,
     write_mesh,
     write_model,
@@ -39,10 +40,8 @@ KEPT = ("mine.png", "gap-relative_against_cost-frame.svg")
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> RunFolder:
     """A whole run folder with its report, drawn without OpenGL, where figures of an earlier report lay."""
-    run = RunFolder(tmp_path_factory.mktemp("run"))
-    run.write_rows(all_rows())
     said = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
-    run.write_config(declaration(all_rows(), **said))
+    run = run_folder(tmp_path_factory.mktemp("run"), all_rows(), **said)
     for scene in SCENES:
         body, faces = sheet(0.0)
         write_mesh(run.trajectory_path(scene, "body"), body, faces, {})
@@ -138,9 +137,8 @@ def test_no_run_folder_is_one_line_and_status_2(tmp_path, refused, what):
 
 
 def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
-    run, rows = RunFolder(tmp_path), [r for r in all_rows() if r.method in ("simulation", "skinning", "snug")]
-    run.write_config(declaration(rows))
-    run.write_rows(rows)
+    rows = [r for r in all_rows() if r.method in ("simulation", "skinning", "snug")]
+    run = run_folder(tmp_path, rows)
     path = run.trajectory_path(SCENES[0], "snug")
     path.parent.mkdir(parents=True)
     path.write_bytes(b"no mesh")
@@ -154,9 +152,7 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
 
 
 def test_curves_beside_a_trajectory_are_its_own(tmp_path):
-    run = RunFolder(tmp_path)
-    run.write_rows(all_rows())
-    run.write_config(declaration(all_rows()))
+    run = run_folder(tmp_path, all_rows())
     path = run.trajectory_path(SCENES[0], "snug")
     write_mesh(path, *sheet(0.1), {"energy/strain": np.zeros(FRAMES), "iterations": np.ones(FRAMES)})
     np.savez(run.curves_path(SCENES[0], "snug"), **{"energy/strain": np.ones(FRAMES)})

@@ -7,14 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.results.run_folder import RunFolder
 from reports.blocks import FIGURES
 from reports.blocks.block import Report
 from reports.document.typeset import write_pdf
 from reports.figures.figure import draw_figures
 from reports.run.reading import read_run
 from reports.tables import make_tables
-from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, declaration, row, sheet, write_mesh
+from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, row, run_folder, sheet, write_mesh
 
 pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installed")
 
@@ -67,9 +66,8 @@ def hostile():
 @pytest.fixture(scope="module", params=[few, many, hostile])
 def report(request, tmp_path_factory):
     """The pages of a report; that of many methods has roll-outs."""
-    run, rows = RunFolder(tmp_path_factory.mktemp("run")), request.param()
-    run.write_rows(rows)
-    run.write_config(declaration(rows, preset="smoke", commit="abc", started="2030-01-02T03:04:05+00:00"))
+    rows, said = request.param(), {"commit": "abc", "started": "2030-01-02T03:04:05+00:00"}
+    run = run_folder(tmp_path_factory.mktemp("run"), rows, preset="smoke", **said)
     for scene in {r.scene for r in rows if r.garment} if request.param is many else ():
         write_mesh(run.trajectory_path(scene, "body"), *sheet(0.0), {})
         for method in {r.method for r in rows} & {*METHODS, *HOSTILE}:

@@ -8,19 +8,18 @@ import re
 
 import pytest
 
-from benchmarks.results.run_folder import RunFolder
 from reports.entries.__main__ import main
 from reports.entries.page import page_of
 from reports.entries.tables import entries_tables, full_scenes, of_entry
 from reports.run.reading import read_run
-from tests.reports.report_folder import declaration, row
+from tests.reports.report_folder import row, run_folder
 
 TOTAL = {"simulation": 1.0, "skinning": 9.0}
 FULL = ("tshirt/a", "tshirt/b")
 NASTY = "</script><script>window.hacked=1</script>"
 
 
-def write_run(folder, totals, scenes, protocol, **config):
+def write_run(path, totals, scenes, protocol, **config):
     rows = []
     for scene in scenes:
         for name, total in (TOTAL | totals).items():
@@ -35,9 +34,8 @@ def write_run(folder, totals, scenes, protocol, **config):
                 )
                 for metric, value in numbers.items()
             ]
-    folder.path.mkdir(parents=True)
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows) | config)
+    path.mkdir(parents=True)
+    folder = run_folder(path, rows, **config)
     return folder, read_run(folder)
 
 
@@ -46,14 +44,14 @@ def published(tmp_path):
     motions = {"test tshirt": ["a", "b", "c"]}
     more = {"motions": motions, "preset_values": {"test_motions": 2}}
     scenes = (*FULL, "tshirt/c")
-    return write_run(RunFolder(tmp_path / "published"), {"snug": 1.8}, scenes, "1.0", **more)
+    return write_run(tmp_path / "published", {"snug": 1.8}, scenes, "1.0", **more)
 
 
 def write_entry(root, name, total, *, scenes=FULL, protocol="1.0"):
     (root / name).mkdir(parents=True)
     (root / name / "entry.toml").write_text("")
     said = {"title": f"{name} {NASTY}", "authors": "they", "training_data": "none"}
-    return write_run(RunFolder(root / name / "scores"), {name: total}, scenes, protocol, metadata=said)
+    return write_run(root / name / "scores", {name: total}, scenes, protocol, metadata=said)
 
 
 def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, published):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.results.run_folder import RunFolder
 from reports.figures import hem, histograms, known_answers, method_styles, stability_maps
 from reports.figures.chosen_roll_outs import SceneRollOuts
 from reports.figures.dots import dots
@@ -14,7 +13,7 @@ from reports.run import reading
 from reports.run.finished_run import shown_seeds
 from reports.run.reading import read_run_with_trainings
 from reports.statistics.outcomes import map_points, stress_tests
-from tests.reports.report_folder import FRAMES, declaration, mesh, row, run_of, sheet, write_model
+from tests.reports.report_folder import FRAMES, mesh, row, run_folder, run_of, sheet, write_model
 
 
 def test_methods_keep_their_order_and_their_look():
@@ -85,15 +84,8 @@ def test_a_stop_is_where_the_body_no_longer_moves():
     assert hem.overshoot(curves["creeps"], 12) == 0.0
 
 
-def written(path, rows) -> RunFolder:
-    folder = RunFolder(path)
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows))
-    return folder
-
-
 def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
-    folder = written(tmp_path, [row(), row(method="pbns")])
+    folder = run_folder(tmp_path, [row(), row(method="pbns")])
     write_model(folder.models / "snug-seed0.safetensors", "snug", strain=0.1)
     write_model(folder.models / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
     read = []
@@ -103,7 +95,7 @@ def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
 
 
 def test_every_garment_has_its_training_curves(tmp_path):
-    folder = written(tmp_path, [row(), row("tunic/stop")])
+    folder = run_folder(tmp_path, [row(), row("tunic/stop")])
     assert list(training_curves(read_run_with_trainings(folder))) == []
     for garment in ("tshirt", "tunic"):
         write_model(folder.models_of(garment) / "snug-seed0.safetensors", "snug", strain=0.1)

@@ -22,7 +22,7 @@ from reports.page.roll_out_choice import groups
 from reports.page.write_page import write_page
 from reports.run.reading import read_run
 from reports.tables import make_tables
-from tests.reports.report_folder import declaration, row, sheet, skipped, write_mesh
+from tests.reports.report_folder import row, run_folder, sheet, skipped, write_mesh
 
 NASTY = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">\'" & мантия 裾'
 CLIPS, WHOLE = ("tshirt/walk@clip", "skirt/walk@clip"), "tshirt/walk"
@@ -68,9 +68,7 @@ def steps(cloth: np.ndarray) -> np.ndarray:
 
 
 def make_folder(path: Path) -> RunFolder:
-    run = RunFolder(path)
-    run.write_rows(rows_of_page())
-    run.write_config(declaration(rows_of_page(), preset="smoke", commit=NASTY))
+    run = run_folder(path, rows_of_page(), preset="smoke", commit=NASTY)
     for scene in (WHOLE, *CLIPS):
         corners, faces = block()
         body = np.repeat((0.5 * corners - [0.0, 0.0, 0.5])[None], len(sheet(0.0)[0]), axis=0)

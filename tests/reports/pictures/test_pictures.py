@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from benchmarks.results.run_folder import RunFolder
 from reports.blocks import FIGURES
 from reports.figures.chosen_roll_outs import SceneRollOuts
 from reports.pictures import render, sheets
@@ -15,7 +14,7 @@ from reports.pictures.colour_scales import scales
 from reports.pictures.failures import failures, worst_failures
 from reports.pictures.side_by_side import draw_side_by_side
 from reports.run.reading import read_run
-from tests.reports.report_folder import FRAMES, Stored, declaration, mesh, row, run_of, sheet
+from tests.reports.report_folder import FRAMES, Stored, mesh, row, run_folder, run_of, sheet
 
 
 def scene_of(methods, height=0.1):
@@ -100,9 +99,7 @@ def test_a_failure_is_shown_at_its_worst_frame():
 
 def test_only_what_was_drawn_is_read(tmp_path):
     """A scene of another kind, such as a roll-out of a thousand frames, has no pictures of its frames."""
-    rows, folder = [row("tshirt/there_and_back", metric="roll_out/drift", unit="mm")], RunFolder(tmp_path)
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows))
+    folder = run_folder(tmp_path, [row("tshirt/there_and_back", metric="roll_out/drift", unit="mm")])
     path = folder.trajectory_path("tshirt/there_and_back", "snug")
     path.parent.mkdir(parents=True)
     path.write_bytes(b"no mesh")

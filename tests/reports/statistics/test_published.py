@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.results.row import Row
-from reports.run.finished_run import Run, make_run
+from reports.run.finished_run import Run
 from reports.statistics import published
 from reports.statistics.published import DEFAULT, published_beside
-from tests.reports.report_folder import DECLARED
+from tests.reports import report_folder
+from tests.reports.report_folder import row
 
-ROLES = {"simulation": "reference", "skinning": "baseline"}
 SCENES = ("tshirt/a", "tshirt/b", "tshirt/c")
 
 
@@ -25,17 +24,7 @@ def run_of(
     hard: a scene with ten times as many.
     """
     rows = [
-        Row(
-            "garments",
-            scene,
-            method,
-            seed,
-            "energy/total",
-            "J",
-            value,
-            garment="tshirt",
-            role=ROLES.get(method, "network"),
-        )
+        row(scene, method, "energy/total", value, seed=seed)
         for scene in scenes
         for method, seed, value in (
             ("simulation", 0, 1.0),
@@ -43,7 +32,7 @@ def run_of(
             *(("snug", k, 1.0 + share * (10 if scene == hard else 1) / 100) for k, share in shares.items()),
         )
     ]
-    return make_run({"methods": DECLARED, "preset": DEFAULT, "started": started, **config}, rows)
+    return report_folder.run_of(rows, **{"preset": DEFAULT, "started": started, **config})
 
 
 @pytest.fixture

@@ -7,11 +7,10 @@ import csv
 import numpy as np
 import pytest
 
-from benchmarks.results.run_folder import RunFolder
 from reports.run.reading import read_run_with_trainings
 from reports.tables.equal_data import EQUAL_DATA, members
 from reports.tables.trainings import training_curves
-from tests.reports.report_folder import declaration, row, run_of, write_model
+from tests.reports.report_folder import row, run_folder, run_of, write_model
 
 COSTS = {"cost/data": 60.0, "cost/setup": 5.0, "cost/train": 100.0, "cost/train_steps": 5300.0}
 
@@ -55,9 +54,7 @@ def test_each_method_of_the_block_has_its_frames_seconds_and_errors():
 
 
 def test_curves_of_every_network_are_kept_with_their_value_on_held_out_motions(tmp_path):
-    folder, rows = RunFolder(tmp_path), block()
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows))
+    folder = run_folder(tmp_path, block())
     write_model(folder.models / "snug-data-12-seed0.safetensors", "snug")
     write_model(folder.models / "supervised-data-0-seed1.safetensors", "supervised", validation=3.0)
     run = read_run_with_trainings(folder)

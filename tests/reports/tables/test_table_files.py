@@ -15,7 +15,7 @@ from reports.run.finished_run import make_run
 from reports.run.reading import read_run, read_run_with_trainings
 from reports.tables import latex, make_tables, write_tables
 from reports.tables.dictionary import dictionary
-from tests.reports.report_folder import all_rows, declaration, row
+from tests.reports.report_folder import all_rows, declaration, row, run_folder
 
 TOP = r"\begin{tabular}[t]{@{}r@{}}"
 NASTY = r"a_b & 50 % $x$ #1 {c} ~ ^ \input{/etc/passwd} <b> мантия"
@@ -134,10 +134,7 @@ def test_two_columns_of_one_heading_keep_their_own_numbers(tmp_path):
 
 
 def test_a_table_that_the_run_has_not_is_not_written(tmp_path):
-    folder = RunFolder(tmp_path)
-    rows = [row("tshirt/walk", "snug", "energy/strain", 1.0)]
-    folder.write_rows(rows)
-    folder.write_config(declaration(rows))
+    folder = run_folder(tmp_path, [row("tshirt/walk", "snug", "energy/strain", 1.0)])
     run = read_run(folder)
     latex.write_latex(run, make_tables(run), folder.tables)
     assert [path.name for path in folder.tables.iterdir()] == ["energies.tex"]
