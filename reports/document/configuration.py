@@ -8,7 +8,6 @@ from typing import Any
 
 import pandas as pd
 
-from reports.statistics.page_one_methods import LEARNED
 from reports.tables.number_texts import DASH, duration, number
 
 # Declarations and files: not how the rows were made. run.json has it all.
@@ -18,12 +17,11 @@ NOT_SHOWN = (
 )  # fmt: skip
 UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
 MOST_LETTERS = 420  # letters of a value
-TRAINED = (*LEARNED, "warm-started")  # roles of methods that were trained
 
 
 def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[list[str]]:
-    """Return names and values of run.json, whatever it holds, each value as one text."""
-    config = {**config, "motions": _of_rows(config.get("motions"), frame)}
+    """Return names and values of run.json, whatever it holds, each value a text; motions are the rows'."""
+    config = {**config, "motions": sorted(set(frame["motion"]) - {""})}
     pairs = {
         _title(name): _text(value)
         for name, value in config.items()
@@ -38,24 +36,6 @@ def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[list[s
         [title, text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}…"]
         for title, text in pairs.items()
     ]
-
-
-def _of_rows(motions: Any, frame: pd.DataFrame) -> Any:
-    """Return the motions of run.json without those that the rows do not need.
-
-    Motions of trainings are needed where a method was trained, all others where rows are of them.
-    """
-    if not isinstance(motions, dict):
-        return motions
-    of_rows, trained = set(frame["motion"]), frame["role"].isin(TRAINED).any()
-    kept = {
-        name: [motion for motion in of_part if motion in of_rows or (trained and not name.startswith("test"))]
-        for name, of_part in motions.items()
-        if isinstance(of_part, list)
-    }
-    known = of_rows.union(*kept.values())
-    frames = [f"{name} {count}" for name, count in (motions.get("frames") or {}).items() if name in known]
-    return {name: value for name, value in (kept | {"frames": frames}).items() if value}
 
 
 def _text(value: Any) -> str:
