@@ -157,7 +157,5 @@ def spring_stiffness(cloth: Cloth) -> np.ndarray:
 def areas_beside(cloth: Cloth, edges: np.ndarray) -> np.ndarray:
     """Return the area (E,) [m^2] of the one or two faces beside each of some edges (E, 2) of the cloth."""
     key = np.array([cloth.vertex_count, 1])
-    ends = np.sort(np.stack([cloth.faces, np.roll(cloth.faces, -1, axis=1)], axis=-1), axis=-1)
-    places = np.searchsorted(cloth.edges @ key, (ends @ key).ravel())
-    areas = np.bincount(places, weights=np.repeat(cloth.areas, 3), minlength=len(cloth.edges))
+    areas = np.bincount(cloth.sides.ravel(), weights=np.repeat(cloth.areas, 3))
     return areas[np.searchsorted(cloth.edges @ key, np.sort(edges, axis=1) @ key)]

@@ -79,9 +79,9 @@ ENGINES: tuple[Engine, ...] = (
 
 
 def find_engine(name: str) -> Engine:
-    """Return the declared engine of that name.
+    """Return the declared engine of that name. Raises KeyError for a name that none has.
 
     >>> find_engine("mujoco.euler").budget(4)
     (68, 1)
     """
-    return next(engine for engine in ENGINES if engine.name == name)
+    return {engine.name: engine for engine in ENGINES}[name]

@@ -134,8 +134,9 @@ class Energy:
         Args:
             x: (V, 3) [m].
             convexity: share of the negative curvature that is taken out: 0 gives the true second derivatives,
-                1 positive semi-definite blocks. Here by eigenvalues; terms with a closed form know where
-                their negative curvature sits.
+                1 positive semi-definite blocks.
+
+        Here by automatic differentiation and eigenvalues. The solver asks `add_hessian`.
         """
         blocks = self.hessian_blocks(x)
         if convexity > 0:
@@ -145,9 +146,10 @@ class Energy:
         return np.arange(len(self.stencils)), blocks
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
-        """Add the blocks of active_hessian_blocks to the values of a matrix.
+        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix.
 
-        A closed form may do so without storing them first.
+        By default they are the blocks of active_hessian_blocks. A term with a closed form stores no blocks,
+        and takes out its negative curvature where it sits.
         """
         places.add(*self.active_hessian_blocks(x, convexity), data)
 

@@ -75,9 +75,12 @@ def read_arrays(
                     continue
                 if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                     raise ValueError(f"is packed by method {info.compress_type}, only 0 and 8 are read")
-                limit -= info.file_size  # zipfile unpacks no more than that
-                if limit < 0:
-                    raise ValueError("is too large, or the arrays before it are")
+                if info.file_size > limit:  # zipfile unpacks no more than that
+                    size, left = info.file_size / 1e6, limit / 1e6
+                    raise ValueError(
+                        f"has {size:.0f} MB unpacked, too large: {left:.0f} MB more are read at most"
+                    )
+                limit -= info.file_size
                 with archive.open(info) as member:
                     arrays[name] = _array(member)
         return arrays
@@ -119,7 +122,10 @@ def _array(stream: IO[bytes]) -> np.ndarray:
     """Read the array that a stream holds and nothing else; raise whatever its bytes make numpy raise."""
     with warnings.catch_warnings():  # of headers that Python 2 wrote, and of odd bytes in them
         warnings.simplefilter("ignore")
-        array = np.lib.format.read_array(stream, allow_pickle=False)
+        try:
+            array = np.lib.format.read_array(stream, allow_pickle=False)
+        except MemoryError:
+            raise ValueError("declares more numbers than fit into memory") from None
     if array.dtype.kind not in PLAIN_KINDS or array.dtype.itemsize == 0:
         raise ValueError(f"has type {array.dtype}, only plain numbers and text are read")
     if stream.read(1):

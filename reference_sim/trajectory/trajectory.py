@@ -109,6 +109,8 @@ class Trajectory:
             return read_file(Path(path))
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
+        except ImportError:
+            raise
         except Exception as error:  # whatever h5py and numpy raise for a file that is none, or is damaged
             reason = " ".join(str(error).split())
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None

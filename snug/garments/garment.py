@@ -113,9 +113,14 @@ def smooth_weights(weights: ArrayLike, faces: Index, iterations: int) -> Array:
 
     Half the vertex, half the mean (uniform Laplacian): rows keep their sum and stay non-negative.
 
+    Raises:
+        GarmentError: fewer than 0 iterations.
+
     >>> smooth_weights([[1.0], [0.0], [0.0]], np.array([[0, 1, 2]]), 1).ravel().tolist()
     [0.5, 0.25, 0.25]
     """
+    if iterations < 0:
+        raise GarmentError(f"iterations={iterations}: smoothing needs 0 rounds or more")
     return _average(np.asarray(weights, dtype=np.float64), faces, iterations)
 
 

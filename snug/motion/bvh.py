@@ -72,7 +72,7 @@ class BvhClip:
 
 
 def read_clip(path: Path) -> BvhClip:
-    """Parse a file. Raises MotionError, naming file and line, for what is damaged, cut off or too large."""
+    """Parse a file. Raises MotionError, naming the file, and the line of what is damaged or too large."""
     lines = read_lines(path)
     _next_line(lines, path, "HIERARCHY")
     joints = _hierarchy(lines, path)

@@ -60,14 +60,16 @@ class Line:
 
     def numbers(self, first: int, last: int | None = None) -> list[float]:
         """Return tokens first to last - 1 as numbers. Raises MotionError unless they are there and finite."""
-        words = self.tokens[first:last]
         try:
-            values = [float(word) for word in words]
+            values = [float(word) for word in self.tokens[first:last]]
         except ValueError:
             values = [math.nan]
         if not all(map(math.isfinite, values)) or (last is not None and len(values) != last - first):
-            text = " ".join(words)[:40]
-            raise self.error(f"finite numbers should be here, not '{text}'; fetch the file again")
+            count = "" if last is None else f"{last - first} "
+            text = " ".join(self.tokens)[:60]
+            raise self.error(
+                f"{count}finite numbers should be in '{text}'; repair the file or fetch it again"
+            )
         return values
 
 

@@ -28,8 +28,9 @@ class GarmentNetwork(nn.Module):
         closed_form: whether it trains by snug.kernels.gru, on a CPU; its next state then has no gradient.
         pins: vertices without offset, which the body carries; see snug.networks.architectures.make_network.
         output_scale: factor on the predicted offsets.
-        offsets: last layer of a network that has one.
-        gru: recurrent units of a network that has them; their state (layers, N, hidden) is the network's.
+        offsets: last layer; a network without one overrides `last_layers`.
+        gru: recurrent units, whose state (layers, N, hidden) is the network's; a `sequential` network without
+            them overrides `random_state`.
     """
 
     feature_set: ClassVar[str]
@@ -85,8 +86,14 @@ class GarmentNetwork(nn.Module):
         return (self.offsets,)
 
     def offset_space(self) -> tuple[Tensor, Tensor]:
-        """Return the offsets that the last layers can express: a basis (3 V, K) and a centre (3 V,) [m]."""
+        """Return the offsets that the last layers can express: a basis (3 V, K) and a centre (3 V,) [m].
+
+        Raises:
+            ValueError: a network without a last layer.
+        """
         layers = self.last_layers()
+        if not layers:
+            raise ValueError(f"{type(self).__name__} has no last layer, whose span could be minimised in")
         biases: list[Tensor] = [layer.bias for layer in layers if layer.bias is not None]
         centre = torch.stack(biases).sum(0) if biases else layers[0].weight.new_zeros(3 * self.vertices)
         basis = torch.cat([layer.weight for layer in layers], dim=1)

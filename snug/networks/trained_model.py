@@ -121,6 +121,8 @@ package: pbns-tshirt, snug-tshirt, supervised-tshirt
             network = make_network(
                 data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]
             )
+            if network.state_dict().keys() != tensors.keys():
+                raise ModelFileError(f"{path}: not the weights of this version's {data['kind']}: train again")
             network.load_state_dict(tensors)
             copied = {name: data[name] for name in _COPIED} | {"origin": data.get("origin", {})}
         except ModelFileError:

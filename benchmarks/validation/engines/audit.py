@@ -23,7 +23,10 @@ Answer = tuple[float | None, str]  # value and remark
 
 
 def measured(measure: Callable[..., Answer]) -> Callable[..., Measurement]:
-    """Name the engine's version beside the answer; an absent engine is skipped, one that diverges says so."""
+    """Let a measurement be called with the name of an engine, whose version then stands beside the answer.
+
+    An absent engine is skipped, one that diverges says so.
+    """
 
     @wraps(measure)
     def measurement(engine: str, **options: Any) -> Measurement:
@@ -44,7 +47,7 @@ def measured(measure: Callable[..., Answer]) -> Callable[..., Measurement]:
 def law(engine: Engine, name: str, sample: str) -> Answer:
     """Evaluate a function of benchmarks.engines.laws on the engine's default roll-out of a specimen."""
     value: float | None = getattr(laws, name)(cached_roll_out(engine.name, sample))
-    return value, "" if value is not None else "it does not tell velocities, or its energy"
+    return value, "" if value is not None else "its energy is not documented"
 
 
 @measured

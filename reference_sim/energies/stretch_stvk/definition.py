@@ -75,7 +75,10 @@ class StretchStVK(Energy):
         return value, gradient
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
-        """Add the second derivatives at x (V, 3) [m]; compressive stress alone is negative, see Energy."""
+        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix.
+
+        Compressive stress alone is negative, and reduced by `convexity`.
+        """
         stress = self._predicted_stress
         if stress is None:
             stress = self._stress(x, np.zeros_like(x))

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
-from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.methods.catalogue.trainings import LEARN_FROM_SIMULATIONS, TRAININGS
 from benchmarks.plan.suites import SUITES
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
@@ -14,6 +14,7 @@ from snug.networks.architectures import ARCHITECTURES
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import ABLATIONS, RECIPES
 from snug.recipes.recipe import TERMS
+from snug.training.kinds import KINDS
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress
@@ -25,6 +26,10 @@ def plan(*words):
 
 def methods(*words):
     return {cell.method for cell in plan(*words).cells}
+
+
+def test_kinds_that_learn_vertices_are_those_that_get_simulations():
+    assert set(LEARN_FROM_SIMULATIONS) == {name for name, kind in KINDS.items() if not kind.physics}
 
 
 def test_they_run_when_named_and_not_otherwise(tmp_path):

@@ -60,14 +60,17 @@ def test_an_array_of_objects_is_refused_only_where_it_is_asked_for(tmp_path):
         read_arrays(tmp_path / "a.npz")
 
 
+SHORT = "negative|read all|could not read|convert to|too large|EOF|more numbers than fit"
+
+
 @pytest.mark.parametrize(
     ("shape", "descr", "reason"),
     [
         ("(10**30,)", "'<f8'", "Header|malformed"),
-        (f"({10**30},)", "'<f8'", "."),
-        ("(40000, 40000)", "'<f8'", "."),
-        ("(-1, 3)", "'<f8'", "."),
-        ("(3,)", "'<f8'", "."),
+        (f"({10**30},)", "'<f8'", SHORT),
+        ("(40000, 40000)", "'<f8'", SHORT),
+        ("(-1, 3)", "'<f8'", SHORT),
+        ("(3,)", "'<f8'", SHORT),
         ("(1,)", "'<f8'", "longer than its shape"),
         (f"({10**14},)", "'S0'", "."),
         ("(2,)", "'|O'", "Object arrays"),

@@ -113,6 +113,7 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path, su
         ("a.obj", "v 0 0 0\nf 0 1 2\n", "line 2 is not understood"),
         ("a.obj", "# a mesh\nv 0 0 zero\n", "line 2 is not understood: 'v 0 0 zero'"),
         ("a.obj", "v 0 0 0\nv 1 0 0\n", "no triangles in it"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 nan\nf 1 2 3\n", "vertex 2 is not finite"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1e300 0\nf 1 2 3\n", "vertex 2 is not finite, or farther than"),
         ("a.obj", "v 0 0\n", "line 1 is not understood: 'v 0 0'"),
         ("a.obj", SEAM + "f 1 2 9\n", "triangle 0 names a vertex beyond the 4"),

@@ -314,7 +314,7 @@ def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
     assert np.allclose(dress.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["tshirt", "skirt", "trousers"])
+@pytest.mark.parametrize("kind", ["tshirt", "tank_top", "skirt", "trousers"])
 def test_every_kind_of_cut_fits_another_mesh(another, kind):
     garment = find_template(kind).tailor(another, vertices=500)
     assert set(garment.loops) == OPENINGS[kind]

@@ -92,6 +92,10 @@ class TestBrokenFiles:
             (lambda text: text.replace("name lfemur", "name left_thigh"), "'lfemur' has no entry"),
             (lambda text: text.replace("femur", "thigh"), "unknown bone 'lfemur'|no bone 'lfemur'"),
             (lambda text: text.replace("length 7.0", "length long", 1), "line .*numbers"),
+            (
+                lambda text: text.replace("length 7.0", "length", 1),
+                "line .*1 finite numbers should be in 'length'",
+            ),
             (lambda text: text.replace("direction 0 1 0", "direction 0 0 0", 1), "direction cannot be zero"),
             (lambda text: text.replace("dof rx ry rz", "dof rx ry rz l", 1), "channel 'l'"),
             (lambda text: text.replace("0.0 XYZ", "0.0 XXZ", 1), "permutation"),

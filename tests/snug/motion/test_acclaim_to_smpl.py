@@ -1,4 +1,4 @@
-"""Recorded motion put on the body: retargeting, and recorded clips where they are."""
+"""Recorded motion put on the body: retargeting, jumps of a bone, and recorded clips where they are."""
 
 import os
 from pathlib import Path
@@ -19,6 +19,7 @@ from snug.body.skeleton import (
 from snug.motion.acclaim import read_amc, read_asf
 from snug.motion.acclaim_to_smpl import CMU_RATE, JOINT_BONES, LIMBS, read_asf_amc
 from snug.motion.files import load_motions, read_motion
+from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
 from tests.snug.motion.cmu_clips import amc_frame, write_clip
 
@@ -75,6 +76,18 @@ class TestRetargeting:
     def test_hands_are_damped(self, tmp_path):
         motion = read_motion(write_clip(tmp_path, [amc_frame(1, lhand=(50,))]), MotionFileOptions())
         assert np.linalg.norm(motion.poses[0, JOINT["left_wrist"]]) == pytest.approx(np.radians(5))
+
+
+def test_a_spike_of_a_bone_is_bridged_and_named(tmp_path):
+    angles = np.linspace(0, 30, 61)
+    angles[30] = 150
+    clip = write_clip(tmp_path, [amc_frame(k + 1, rradius=(a,)) for k, a in enumerate(angles)])
+    with pytest.raises(MotionError, match="right_elbow jumps in frames 28-32; give --repair"):
+        read_motion(clip, MotionFileOptions())
+    motion = read_motion(clip, MotionFileOptions(repair=True))
+    assert "repaired: right_elbow jumps in frames 28-32" in motion.source
+    turned = np.linalg.norm(motion.poses[:, JOINT["right_elbow"]], axis=1)
+    np.testing.assert_allclose(np.degrees(turned), np.linspace(0, 30, 61), atol=1e-6)
 
 
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="no CMU clips here; set CMU_MOTIONS to a folder of them")

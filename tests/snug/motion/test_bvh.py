@@ -220,7 +220,7 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
         (lambda text: text.replace("head", "hat"), "no joint is known as 'head'"),
         (lambda text: text.replace("OFFSET", "OFFSETS", 1), "not known in a hierarchy"),
         (lambda text: text.rsplit(" ", 1)[0], "75 numbers should be here, not 74"),
-        (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "finite numbers should be here"),
+        (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "finite numbers should be in"),
         (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
     ],
 )
