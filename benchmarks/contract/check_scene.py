@@ -121,7 +121,7 @@ def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> 
     import numpy as np
 
     from reference_sim import Potential
-    from reference_sim.energies import Step
+    from reference_sim.energies import Energy, Step
 
     cloth, random = scene.cloth, np.random.default_rng(0)
     edges = cloth.edges
@@ -152,6 +152,16 @@ def check_derivatives(findings: Findings, energy: Energy, scene: BuiltScene) -> 
             f"differences say {slope:.6g} N",
         )
     turned = (ahead[1] - behind[1]) / (2.0 * DIFFERENCE_STEP)
+    if type(energy).add_hessian is Energy.add_hessian and not energy.dynamic:
+        blocks = energy.active_hessian_blocks(x)[1]  # the solver reads one half of them
+        findings.demand(
+            bool(
+                np.allclose(
+                    blocks, blocks.swapaxes(1, 2), rtol=0.0, atol=1e-9 * np.abs(blocks).max(initial=0.0)
+                )
+            ),
+            f"{what} Hessian is not symmetric; leave it to automatic differentiation, or mend it",
+        )
     product = (Potential([energy]).hessian(x) @ direction.ravel()).reshape(x.shape)
     off, most = float(np.abs(turned - product).max()), float(np.abs(turned).max())
     findings.demand(

@@ -36,15 +36,19 @@ class Picture:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: its name, with which its files begin, and what draws it, in no part, in one or in several."""
+    """A figure: its name, what draws it, in no part, in one or in several, and its files.
+
+    files: patterns of them in the folder of figures, where they are not <name>.*.
+    """
 
     name: str
     drawings: Callable[[Run], Iterable[Drawing]]
+    files: tuple[str, ...] = ()
 
     @property
-    def patterns(self) -> tuple[str, str]:
+    def patterns(self) -> tuple[str, ...]:
         """Patterns of its files in the folder of figures."""
-        return f"{self.name}.*", f"{self.name}_*"
+        return self.files or (f"{self.name}.*",)
 
 
 def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, list[Picture]]:

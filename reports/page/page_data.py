@@ -131,4 +131,4 @@ def unfinished_cells(report: Report) -> tuple[str, bool, list[str]]:
         for cell in cells
     ]
     wrong = cells[0]["status"] not in ("stalled", "skipped")
-    return f"Not every cell ended well. {endings(report.run)}".strip(), wrong, lines
+    return f"Not every number could be had. {endings(report.run)}".strip(), wrong, lines

@@ -19,6 +19,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.task import Context
 from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Trajectory
+from reference_sim.energies import StretchSpring
 from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
 
@@ -226,6 +227,7 @@ def judge(roll_out, values):
 BOUND_FILE = """import numpy as np
 from benchmarks.method import Method, MethodEntry
 from reference_sim import Trajectory
+from reference_sim.energies import StretchSpring
 
 METHODS = (MethodEntry(name="bound", label="Bound", description="", role="solver"),)
 
@@ -291,6 +293,21 @@ def test_a_wrong_gradient_is_found_however_many_vertices_do_not_feel_it(factor, 
     check_derivatives(found, Pulled(sheet.cloth, forces), sheet)
     assert (not found.wrong) == fine
     assert fine or "gradient is not the derivative of its value" in found.wrong[0]
+
+
+def test_a_hessian_that_is_wrong_in_the_half_that_the_solver_does_not_read_is_found():
+    sheet = small_scene("hanging_sheet")
+
+    class Skewed(StretchSpring):
+        def active_hessian_blocks(self, x, convexity=0.0):
+            elements, blocks = super().active_hessian_blocks(x, convexity)
+            return elements, np.tril(blocks) - np.triu(blocks, 1)
+
+    found = Findings("mine.py")
+    check_derivatives(found, StretchSpring(sheet.cloth), sheet)
+    assert not found.wrong
+    check_derivatives(found, Skewed(sheet.cloth), sheet)
+    assert "Hessian is not symmetric" in found.wrong[0]
 
 
 @pytest.mark.parametrize(

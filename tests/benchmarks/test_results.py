@@ -117,6 +117,7 @@ def test_an_absent_or_broken_config_is_named(tmp_path):
     ("text", "word"),
     [
         ("[" * 100_000, "not readable as JSON"),
+        ('{"format": 4, "a": ' + "[" * 40 + "]" * 40 + "}", "nested more than 30 deep"),
         ('{"format": 4, "seeds": ' + "9" * 5000 + "}", "not readable as JSON"),
         ('{"format": 4, "metrics": []}', "'metrics' should be metric -> what it declares"),
         ('{"format": 4, "metrics": {"a": {"title": 3}}}', "'metrics' should be"),

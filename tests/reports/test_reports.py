@@ -34,7 +34,7 @@ from tests.reports.report_folder import (
 )
 
 OLD = ("hem_tunic-stop.svg", "error_against_time_flag.png", "training_tunic.svg")
-KEPT = ("mine.png", "gap-relative_against_cost-frame.svg")
+KEPT = ("mine.png", "lead_mine.png", "map.txt", "gap-relative_against_cost-frame.svg")
 
 
 @pytest.fixture(scope="module")

@@ -78,6 +78,7 @@ def loaded(code: str, *arguments: str) -> set[str]:
 @pytest.mark.parametrize(
     ("scene", "present", "absent"),
     [
+        ("hanging_sheet", MATERIAL, (*BODY, *CONTACT, "torch")),
         (
             "sheet_on_sphere",
             (*MATERIAL, CONTACT[0], BODY[4]),

@@ -120,6 +120,19 @@ def test_failures_are_values_and_a_batch_stays_together(two, folder):
     np.testing.assert_array_equal(np.load(folder.path / "numbers" / "from large.npy"), 2.0 * expected)
 
 
+def test_a_worker_has_its_next_task_before_results_of_others_are_taken(two, folder, monkeypatch):
+    monkeypatch.setattr(runner_side, "POLL", 1.0)  # both have ended then
+    calls = []
+    for name in ("_take", "_submit"):
+        own = getattr(ClusterExecutor, name)
+        monkeypatch.setattr(
+            ClusterExecutor, name,
+            lambda self, *words, own=own, name=name: (calls.append(name), own(self, *words))[1],
+        )  # fmt: skip
+    together(folder, two.address, *([write(name)] for name in "abcd"))
+    assert calls == ["_submit", "_submit", *["_take", "_submit"] * 2, *["_take"] * 2]
+
+
 def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
     monkeypatch.setattr(runner_side, "LOOK", 0.1)
     told = []

@@ -125,6 +125,7 @@ def test_a_task_whose_process_is_killed_is_kept_as_failed_and_done_again_when_as
     first, runner = ended(False, True, False)
     assert [outcome.failed for outcome in first] == [False, True, False]
     assert first[1].status == "out-of-memory" and "SIGKILL" in first[1].reason
+    assert "the system was out of memory" in first[1].reason
     found = runner.cache.find(task("two"), {})
     assert found.state == "failed" and found.why.startswith("out-of-memory") and "SIGKILL" in found.why
     assert dict(runner.broken()) == {"network two": found.why}

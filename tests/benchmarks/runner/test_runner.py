@@ -145,6 +145,7 @@ def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path
         assert run.main(words_of(tmp_path, "simulation,newton-1,newton-4")) == 130
     assert "interrupted" in capsys.readouterr().err
     assert RunFolder(tmp_path).read_config()["interrupted"] is True
+    assert not [path for path in tmp_path.rglob("*") if ".part" in path.name]
     assert RunFolder(tmp_path).read_rows() == [row for row in before if row.method == "simulation"]
     assert run.main(words) == 0 and RunFolder(tmp_path).read_rows() == before
 

@@ -241,7 +241,7 @@ def test_names_with_markup_stay_text(folder):
 def test_what_did_not_run_stands_at_the_top(folder):
     page = folder.page_path.read_text(encoding="utf-8")
     head = page[: page.index("<main>")]
-    assert "Not every cell ended well. Of 18 cells 1 failed, 1 timeout, 1 skipped." in head
+    assert "Not every number could be had. Of 18 cells 1 failed, 1 timeout, 1 skipped." in head
     assert "over 30 s" in head and "no body here" in head and 'class="trouble wrong"' in head
 
 
