@@ -65,7 +65,7 @@ RUNS = {
         "the recipe of the paper's text and PBNS by it, 136,000 steps at 4378 vertices, on 22 test motions",
         {
             "": f"--preset paper --suite garments {THREE} {ALL_TESTS} --scenes 'tshirt/*' --methods "
-            "simulation,simulation-perturbed-1e-4,skinning,snug-paper,pbns-paper,supervised"
+            f"{REFERENCES},snug-paper,pbns-paper,supervised"
         },
         ("frames_tshirt-01_01_a", "training"),
     ),

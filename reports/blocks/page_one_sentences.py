@@ -206,7 +206,7 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
 def _trust(run: Run, timed: pd.DataFrame) -> str:
     """Say how uncertain the reference itself is, what its time step leaves out, and how claims came out."""
     sentences = []
-    where = _in_scenes(timed["scene"].nunique())
+    where = _in_scenes(timed[timed["method"] == run.reference]["scene"].nunique())
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(

@@ -63,6 +63,15 @@ def test_of_a_family_of_networks_page_one_has_the_last():
     assert "handles-80" in methods and "handles-40" not in methods
 
 
+def test_scenes_that_nothing_simulates_do_not_count_for_the_reference():
+    rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
+    for metric, unit in (("distance/rms", "mm"), ("curvature/error", "1/m")):
+        rows += [row(scene, "simulation-perturbed-1e-4", metric, 3.0, unit=unit) for scene in SCENES]
+    rows.append(row("tshirt/there_and_back", "snug", "drift/hem", 3.0, unit="mm"))
+    said = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
+    assert "curvature from the reference, in 2 scenes:" in said
+
+
 def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
     rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
     assert "What does not hold" not in dict(headline(run_of(rows))).get("How certain", "")
