@@ -65,6 +65,8 @@ def recover(path: str | Path, provenance: dict[str, Any], *, frames: int) -> Par
         if wrong := try_out(read_whole_frames, path):
             raise ValueError(wrong)
         earlier = read_whole_frames(path)
+    except ImportError:
+        raise
     except Exception as error:
         raise TrajectoryError(
             f"{path}: nothing to resume: not a readable trajectory ({_one_line(error)}); "

@@ -101,7 +101,7 @@ def test_two_arrays_of_one_name_are_refused(tmp_path, second):
 
 
 def test_a_small_file_of_a_large_array_takes_no_memory(tmp_path):
-    """Of five gigabytes that it declares there are fifty megabytes, packed into fifty kilobytes."""
+    """The file declares five gigabytes and holds fifty megabytes, packed into fifty kilobytes."""
     member = npy("(625000000,)", data=bytes(50_000_000))
     data = npz(member)
     true, claimed = (struct.pack("<I", n) for n in (len(member), 4_000_000_000))
