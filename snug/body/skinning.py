@@ -80,7 +80,8 @@ def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
             [0., 1., 0.]])
     """
     blended = _blended(weights, transforms)
-    return (blended[..., :3] @ points[..., None])[..., 0] + blended[..., 3]
+    # Row by row: that many products of a matrix and a vector take a GPU several times as long.
+    return (blended[..., :3] * points[..., None, :]).sum(-1) + blended[..., 3]
 
 
 def unskin(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:

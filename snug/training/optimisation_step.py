@@ -24,7 +24,7 @@ from snug.networks.tensor_file import select_tensors
 from snug.recipes.recipe import Recipe
 from snug.training.augmentation.augmented_set import make_training_set, varies_shape
 from snug.training.contact.planes import Posed, TrainingContact
-from snug.training.device import CPU
+from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.hidden_state_cache import HiddenStateCache
 from snug.training.kinds import find_kind
@@ -32,10 +32,12 @@ from snug.training.losses.physics_loss import PhysicsLoss
 from snug.training.losses.simulated_past import SimulatedPast
 from snug.training.losses.vertex_targets import Targets, VertexTargets
 from snug.training.process_group import ALONE, Group, GroupError
+from snug.training.recorded_step import RecordedStep
 from snug.training.stopwatch import Stopwatch
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 
 DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
+UNRECORDED = 3  # steps in single operations before a GPU records: they make Adam's moments
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -71,7 +73,7 @@ class Trainer:
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
         self.device, self.group, self.clock = device, group, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
-        self.posed_by = FastSkin.apply if self.kernels else skin
+        self.posed_by = FastSkin.apply if self.kernels else compiled(skin, device)
         self.data = make_training_set(how, dressed, motions, recipe, seed=seed, device=device)
         self.shaped = varies_shape(how, dressed, recipe) and recipe.shape_of == "window"
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
@@ -84,9 +86,12 @@ class Trainer:
         self.network = network.to(device)
         if how.closed_form:
             network.closed_form = self.kernels
+        on_gpu = device.type == "cuda"
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(),
-            lr=recipe.learning_rate,
+            # A recorded update reads the rate and its number of steps from the device.
+            lr=torch.tensor(recipe.learning_rate, device=device) if on_gpu else recipe.learning_rate,
+            capturable=on_gpu,
             eps=recipe.adam_epsilon,
             weight_decay=recipe.weight_decay,
             fused=True,
@@ -105,6 +110,7 @@ class Trainer:
         self.hidden_states = self._hidden_state_cache()
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
+        self.recorded = RecordedStep(self) if on_gpu and RecordedStep.serves(self) else None
 
     def _set_up_supervision(
         self, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
@@ -181,17 +187,52 @@ class Trainer:
                 shapes = self.dressed.body.shape_count
                 betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
             mine = self.group.part(len(windows))
+            frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
+            state = self.start_state(len(windows), mine, frames[mine])
+        if self.recorded and number > UNRECORDED:
+            if means := self._recorded_step(number, windows, frames, betas, state):
+                return {"loss": sum(means.values()), **means}
+        with self.clock.part("draw"):
             batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
-            state = self.start_state(len(windows), mine, batch)
         if self.loss is None:
             assert self.targets is not None
             with self.clock.part("forward"):
                 terms = self.targets.terms(self.network, batch, state, self.posed_by)
             means, _ = self._update(number, windows, terms)
         else:
-            frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
             means = self._physics_step(number, windows, frames, batch, state)
         return {"loss": sum(means.values()), **means}
+
+    def _recorded_step(
+        self, number: int, windows: np.ndarray, frames: np.ndarray, betas: np.ndarray | None,
+        state: Tensor | None,
+    ) -> dict[str, float]:  # fmt: skip
+        """Take a step on the energies by what a GPU has recorded; return the means by term.
+
+        Empty where the guard would not simply update: then nothing has been changed.
+        """
+        assert self.recorded is not None
+        with self.clock.part("recorded"):
+            terms, norm = self.recorded.gradients(frames, betas, state)
+        joules = np.sum(list(terms.values()), axis=0).mean(1)
+        high = number >= SETTLING and (joules > self.recipe.spike).any()
+        if high or not np.isfinite([*joules, norm]).all():
+            return {}
+
+        def name(row: int) -> str:
+            return self.data.where(self.data.starts[windows[row]])
+
+        verdict = self.guard.judge(number, joules, name)
+        self.guard.accepts(number, verdict, norm, joules, name)
+        with self.clock.part("optimiser"):
+            x, after, posed = self.recorded.follow()
+        if self.hidden_states and after is not None:
+            self.hidden_states.keep(frames[:, -1], after)
+        if self.contact and posed:
+            with self.clock.part("requery"):
+                self.contact.settle(frames, trusted=True)
+                self.contact.requery(frames, posed, x)
+        return {name: float(energy.mean()) for name, energy in terms.items()}
 
     def _physics_step(
         self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Tensor | None
@@ -241,20 +282,20 @@ class Trainer:
         self.contact.search(places, frames, posed, x, exact=True)
         return True
 
-    def start_state(self, count: int, mine: slice, batch: Batch) -> Tensor | None:
-        """Return the state before the windows of a batch: noise of the recipe's sigma plus the cached state.
+    def start_state(self, count: int, mine: slice, frames: np.ndarray) -> Tensor | None:
+        """Return the state before windows with frames (N, T): noise of the recipe plus the cached state.
 
         For TailorNet it is the dropout masks; a network with a lead reads the frames before.
 
         Noise is drawn for all `count` windows of the step; only that of this process is kept.
         """
         if self.network.lead:
-            return self.network.state_after(self.data.before(batch.frames[:, 0], self.network.lead))
+            return self.network.state_after(self.data.before(frames[:, 0], self.network.lead))
         state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
         if state is None:
             return None
         state = state[:, mine].contiguous()  # as cuDNN wants it
-        return state + self.hidden_states.at(batch.frames[:, 0]) if self.hidden_states else state
+        return state + self.hidden_states.at(frames[:, 0]) if self.hidden_states else state
 
     def predict(self, batch: Batch, state: Tensor | None) -> tuple[Tensor, Tensor | None]:
         """Return vertices (N, T, V, 3) [m] relative to the pelvis, and the state after them."""
@@ -272,7 +313,11 @@ class Trainer:
         if self.recipe.schedule == "cosine":
             factor = COSINE_END + (1 - COSINE_END) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
         for group in self.optimiser.param_groups:
-            group["lr"] = self.guard.rate * self.recipe.learning_rate * factor
+            rate = self.guard.rate * self.recipe.learning_rate * factor
+            if isinstance(group["lr"], Tensor):
+                group["lr"].fill_(rate)
+            else:
+                group["lr"] = rate
 
     def _update(
         self, number: int, windows: np.ndarray, terms: dict[str, Tensor]

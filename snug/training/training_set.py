@@ -14,7 +14,7 @@ from snug.body.skinning import joint_transforms
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipes.recipe import Recipe
-from snug.training.device import CPU
+from snug.training.device import CPU, compiled
 
 # Smallest spread by which an input is divided: rotations are numbers up to 1 in size, and one that hardly
 # moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
@@ -88,6 +88,12 @@ class TrainingSet:
         self.behind = torch.cat([_behind(pelvis) for pelvis in pelvises]).to(device)
         self.rest = dressed.rest().to(device)
         self._rest_directions: Tensor | None = None
+        body = dressed.body
+        self._skeleton = (  # float64 until the chain is done
+            torch.as_tensor(body.joint_template, device=device),
+            torch.as_tensor(body.joint_directions, device=device),
+        )
+        self._repose = compiled(_reposed, device)
         self.window = recipe.window if sequences else 1
         stride = recipe.window_stride if sequences else 1
         self.starts = np.concatenate(
@@ -129,13 +135,27 @@ class TrainingSet:
 
     def at(self, frames: np.ndarray) -> Batch:
         """Return rows (N, T), those of a line from one motion, as tensors; each motion on its own body."""
-        rows = torch.as_tensor(frames, device=self.device)
-        batch = Batch(
-            frames, self.features[rows], self.rest, self.transforms[rows], self.ahead[rows], self.behind[rows]
-        )
+        batch = replace(self.gathered(torch.as_tensor(frames, device=self.device)), frames=frames)
         if self.shapes is None:
             return batch
-        return self._dressed(batch, self.shapes[self.motion_of(frames[:, 0])])
+        betas = self.shapes[self.motion_of(frames[:, 0])]
+        return self._dressed(batch, torch.as_tensor(betas, device=self.device))
+
+    def gathered(self, rows: Tensor, betas: Tensor | None = None) -> Batch:
+        """Return rows (N, T) on the device, each line on the mean body or that of shape numbers (N, S).
+
+        The batch does not know its frames.
+        """
+        parts = (self.transforms[rows], self.ahead[rows], self.behind[rows])
+        batch = Batch(np.empty(0, np.int64), self.features[rows], self.rest, *parts)
+        if betas is None:
+            return batch
+        reposed = self._repose(self.dressed.parents, *self._skeleton, batch.transforms, betas.double())
+        batch = self._dressed(replace(batch, transforms=reposed), betas)
+        assert batch.betas is not None
+        repeated = batch.betas[:, None].expand(-1, rows.shape[1], -1)
+        inputs = torch.cat([batch.features[..., : -betas.shape[1]], repeated], -1)
+        return replace(batch, features=inputs)
 
     def before(self, frames: np.ndarray, count: int) -> Tensor:
         """Return the features (N, count, D) before rows (N,), in place of missing ones a motion's first."""
@@ -145,40 +165,36 @@ class TrainingSet:
 
     def batch(self, windows: np.ndarray, betas: np.ndarray | None = None) -> Batch:
         """Return windows (N,) as tensors, each on the body of its motion, or of its shape in betas (N, S)."""
-        batch = self.at(self.starts[windows][:, None] + np.arange(self.window))
+        frames = self.starts[windows][:, None] + np.arange(self.window)
         if betas is None:
-            return batch
-        reposed = _reposed(self.dressed, batch.transforms, torch.as_tensor(betas, device=self.device))
-        batch = self._dressed(replace(batch, transforms=reposed), betas)
-        assert batch.betas is not None
-        repeated = batch.betas[:, None].expand(-1, self.window, -1)
-        inputs = torch.cat([batch.features[..., : -betas.shape[1]], repeated], -1)
-        return replace(batch, features=inputs)
+            return self.at(frames)
+        rows, shapes = (torch.as_tensor(numbers, device=self.device) for numbers in (frames, betas))
+        return replace(self.gathered(rows, shapes), frames=frames)
 
-    def _dressed(self, batch: Batch, betas: np.ndarray) -> Batch:
+    def _dressed(self, batch: Batch, betas: Tensor) -> Batch:
         """Return the batch with the unposed garments of shapes (N, S)."""
-        shapes = torch.as_tensor(betas, dtype=torch.float32, device=self.device)
+        shapes = betas.float()
         if self._rest_directions is None:
             self._rest_directions = self.dressed.rest_directions().to(self.device)
         rest = self.rest + torch.einsum("ns,svi->nvi", shapes, self._rest_directions)
         return replace(batch, rest=rest[:, None], betas=shapes)
 
 
-def _reposed(dressed: DressedBody, transforms: Tensor, betas: Tensor) -> Tensor:
+def _reposed(
+    parents: Sequence[int], template: Tensor, directions: Tensor, transforms: Tensor, betas: Tensor
+) -> Tensor:
     """Return the same poses on other skeletons; rotations are read from the transforms of the mean body.
 
-    transforms (N, T, 24, 3, 4) float32, betas (N, 10) float64.
+    Joints (24, 3) and their directions (24, 3, 10), both float64; transforms (N, T, 24, 3, 4) float32; betas
+    (N, 10) float64.
     """
-    body, device = dressed.body, betas.device
-    template = torch.as_tensor(body.joint_template, device=device)  # float64 until the chain is done
-    directions = torch.as_tensor(body.joint_directions, device=device)  # (24, 3, 10)
     joints = (template + torch.einsum("jis,ns->nji", directions, betas))[:, None]
     world = transforms[..., :3].double()
-    relative = world[:, :, [max(parent, 0) for parent in dressed.parents]].transpose(-1, -2) @ world
+    relative = world[:, :, [max(parent, 0) for parent in parents]].transpose(-1, -2) @ world
     relative[:, :, 0] = world[:, :, 0]
     home = (-joints[..., 0, :]).expand(*transforms.shape[:2], 3)
     joints = joints.expand(*transforms.shape[:2], *joints.shape[-2:])
-    return joint_transforms(relative, joints, dressed.parents, home).float()
+    return joint_transforms(relative, joints, parents, home).float()
 
 
 def _ahead(pelvis: np.ndarray) -> Tensor:

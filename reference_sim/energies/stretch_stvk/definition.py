@@ -62,11 +62,16 @@ class StretchStVK(Energy):
 
         Dm_inverse = torch.as_tensor(self.Dm_inverse).to(u)
         area = torch.as_tensor(self.areas).to(u)
-        Ds = torch.stack([u[..., 1, :] - u[..., 0, :], u[..., 2, :] - u[..., 0, :]], dim=-1)
-        F = Ds @ Dm_inverse
-        G = 0.5 * (F.transpose(-1, -2) @ F - torch.eye(2, dtype=u.dtype, device=u.device))
-        trace = G[..., 0, 0] + G[..., 1, 1]
-        return area * (0.5 * self.lam * trace**2 + self.mu * (G * G).sum((-1, -2)))
+        first, second = u[..., 1, :] - u[..., 0, :], u[..., 2, :] - u[..., 0, :]
+        # Entry by entry: hundreds of thousands of small matrix products take a GPU ten times as long.
+        along, across = (
+            first * Dm_inverse[..., 0, column, None] + second * Dm_inverse[..., 1, column, None]
+            for column in range(2)
+        )  # the columns of F
+        G00, G11 = 0.5 * ((along * along).sum(-1) - 1), 0.5 * ((across * across).sum(-1) - 1)
+        G01 = 0.5 * (along * across).sum(-1)
+        trace_of_square = G00 * G00 + G11 * G11 + 2 * G01 * G01
+        return area * (0.5 * self.lam * (G00 + G11) ** 2 + self.mu * trace_of_square)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""

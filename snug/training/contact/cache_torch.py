@@ -14,7 +14,10 @@ from torch import Tensor
 
 from reference_sim.contact.anchor_walk import CROSSINGS, WALK_SLACK
 from snug.training.contact.cache import PARTS, ContactCache, Patch
+from snug.training.device import compiled
+from snug.training.recorded_step import Recorded
 
+Anchors = tuple[Tensor, Tensor]  # faces (N, S) and barycentric coordinates (N, S, 2)
 NEAREST = 3  # body vertices whose faces are tried for each sample
 CHUNK = 2048  # samples searched at once: a table of CHUNK x P distances
 # m^2 added to the squared distance of a face out of the region: taken only for want of others.
@@ -35,9 +38,10 @@ class TensorContactCache:
             for array in (patch.rest, patch.centroids, patch.sample_rest)
         )
         self.adjacency = torch.as_tensor(patch.adjacency, device=device).long()  # (Q, 3)
-        self.around = torch.as_tensor(
-            _incident(patch.faces), device=device
-        )  # (P, K) faces, -1 beyond the last
+        around = _incident(patch.faces)
+        self.around = torch.as_tensor(around, device=device)  # (P, K) faces, -1 beyond the last
+        self._walked_from, self._planes_at = compiled(self._walked, device), compiled(self._planes, device)
+        self._find = Recorded(self._found, device)
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
         """Return the places of the oldest anchors, see ContactCache.oldest."""
@@ -59,11 +63,21 @@ class TensorContactCache:
 
         Patch positions and normals of the frames are rows (N,) of (R, P, 3) tensors.
         """
-        device = positions.device
-        chosen = torch.as_tensor(frames, device=device)
-        corners = self.corners[self.faces[chosen].long()]  # (N, S, 3)
-        row = torch.as_tensor(rows, device=device)[:, None, None]
-        last = self.barycentric[chosen] / PARTS
+        chosen, row = (torch.as_tensor(numbers, device=positions.device) for numbers in (frames, rows))
+        return self.planes_at((self.faces[chosen], self.barycentric[chosen]), row, positions, normals)
+
+    def planes_at(
+        self, anchors: Anchors, rows: Tensor, positions: Tensor, normals: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Return the points and normals of `planes` at anchors of N frames."""
+        return self._planes_at(*anchors, rows, positions, normals)
+
+    def _planes(
+        self, faces: Tensor, barycentric: Tensor, row: Tensor, positions: Tensor, normals: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Return `planes` at anchors (N, S) with bodies in the rows (N,)."""
+        corners, row = self.corners[faces.long()], row[:, None, None]  # (N, S, 3)
+        last = barycentric / PARTS
         weights = torch.cat([1 - last.sum(-1, keepdim=True), last], -1)[..., None]
         points = (weights * positions[row, corners]).sum(-2)
         directions = (weights * normals[row, corners]).sum(-2)
@@ -78,46 +92,67 @@ class TensorContactCache:
         Anchors of samples (N, S, 3) less than `reach` and SLACK above their planes walk. positions, normals:
         see `planes`.
         """
-        # A frame that comes twice walks once: which of two writes lands last is not a GPU's to choose.
-        once = np.sort(np.unique(frames, return_index=True)[1])
-        samples, frames, rows = (
-            samples[torch.as_tensor(once, device=samples.device)],
-            frames[once],
-            rows[once],
+        _, first, again = np.unique(frames, return_index=True, return_inverse=True)
+        chosen, owner, row = (
+            torch.as_tensor(numbers, device=samples.device) for numbers in (frames, first[again], rows)
         )
-        points, directions = self.planes(frames, rows, positions, normals)
-        near = ((samples - points) * directions).sum(-1) < reach + WALK_SLACK
-        place, sample = near.nonzero(as_tuple=True)
-        chosen = torch.as_tensor(frames, device=samples.device)[place]
-        row = torch.as_tensor(rows, device=samples.device)[place]
-        x, home = samples[place, sample], self.sample_rest[sample]
-        face = self.faces[chosen, sample].long()
-        last, moving = face, torch.ones_like(face, dtype=torch.bool)
+        self.place(chosen, self.walked(samples, chosen, owner, row, positions, normals, reach=reach))
+
+    def walked(
+        self, samples: Tensor, frames: Tensor, first: Tensor, rows: Tensor, positions: Tensor,
+        normals: Tensor, *, reach: float,
+    ) -> Anchors:  # fmt: skip
+        """Return the anchors of frames (N,) after `walk`; first (N,): where each frame comes first.
+
+        A frame that comes twice walks once, as its first garment has it.
+        """
+        held = self.faces[frames], self.barycentric[frames]
+        faces, barycentric = self._walked_from(samples, *held, rows, positions, normals, reach)
+        return faces[first], barycentric[first]
+
+    def place(self, frames: Tensor, anchors: Anchors) -> None:
+        """Keep anchors of frames (N,); those of a frame that comes twice must be equal."""
+        self.faces[frames], self.barycentric[frames] = anchors
+
+    def _walked(
+        self, x: Tensor, faces: Tensor, barycentric: Tensor, row: Tensor, positions: Tensor, normals: Tensor,
+        reach: float,
+    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """Return where anchors (N, S) of samples x (N, S, 3) rest, with bodies in the rows (N,).
+
+        All of them take every turn, for a GPU that counts those near the skin waits for the count.
+        """
+        points, directions = self._planes(faces, barycentric, row, positions, normals)
+        near = ((x - points) * directions).sum(-1) < reach + WALK_SLACK
+        row, face = row[:, None, None], faces.long()
+        last, moving = face, near
         for _ in range(CROSSINGS):
-            a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
+            a, b, c = positions[row, self.corners[face]].unbind(-2)
             v, w, _ = foot(b - a, c - a, x - a)
             weights = torch.stack([1 - v - w, v, w], -1)
-            side = weights.argmin(-1)
-            other = self.adjacency[face, side]
-            far = (self.centroids[other] - home).square().sum(-1) > self.patch.region**2
+            other = self.adjacency[face, weights.argmin(-1)]
+            far = (self.centroids[other] - self.sample_rest).square().sum(-1) > self.patch.region**2
             moving = moving & (weights.amin(-1) < 0) & (other >= 0) & (other != last) & ~far
             last, face = torch.where(moving, face, last), torch.where(moving, other, face)
-        a, b, c = positions[row[:, None], self.corners[face]].unbind(-2)
+        a, b, c = positions[row, self.corners[face]].unbind(-2)
         v, w = closest_on_triangle(b - a, c - a, x - a)
-        faces, parts = quantise_tensors(face, torch.stack([v, w], -1), self.faces.dtype)
-        self.faces[chosen, sample], self.barycentric[chosen, sample] = faces, parts
+        walked, parts = quantise_tensors(face, torch.stack([v, w], -1), faces.dtype)
+        return torch.where(near, walked, faces), torch.where(near[..., None], parts, barycentric)
 
     def requery(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame.
 
         Brute force has no use for old anchors, so that `exact` changes nothing.
         """
-        for start in range(0, len(points), CHUNK):
-            part = slice(start, start + CHUNK)
-            faces, barycentric = self._searched(points[part], self.sample_rest[part], positions)
-            anchors = quantise_tensors(faces, barycentric, self.faces.dtype)
-            self.faces[frame, part], self.barycentric[frame, part] = anchors
+        self.faces[frame], self.barycentric[frame] = self._find(points, positions)
         self.age[frame] = 0
+
+    def _found(self, points: Tensor, positions: Tensor) -> Anchors:
+        """Return the closest anchors of samples (S, 3) on a body (P, 3), part by part."""
+        parts = zip(points.split(CHUNK), self.sample_rest.split(CHUNK))
+        found = [self._searched(point, home, positions) for point, home in parts]
+        faces, barycentric = (torch.cat(pieces) for pieces in zip(*found))
+        return quantise_tensors(faces, barycentric, self.faces.dtype)
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
         distances = torch.cdist(points, positions)
@@ -137,10 +172,10 @@ class TensorContactCache:
 
 
 def quantise_tensors(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
-    """Round anchors as snug.training.contact.cache.quantise does: faces (S,), barycentric (S, 2)."""
-    second = (PARTS * barycentric[:, :1]).round()
-    third = torch.minimum((PARTS * barycentric[:, 1:]).round(), PARTS - second)
-    return faces.to(kind), torch.cat([second, third], 1).to(torch.uint8)
+    """Round anchors as snug.training.contact.cache.quantise does: faces (..., S), barycentric (..., S, 2)."""
+    second = (PARTS * barycentric[..., :1]).round()
+    third = torch.minimum((PARTS * barycentric[..., 1:]).round(), PARTS - second)
+    return faces.to(kind), torch.cat([second, third], -1).to(torch.uint8)
 
 
 def foot(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -20,7 +20,8 @@ from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
 from snug.kernels.skinning import FastSkin
 from snug.training.contact.cache import ContactCache, Patch
-from snug.training.contact.cache_torch import TensorContactCache
+from snug.training.contact.cache_torch import Anchors, TensorContactCache
+from snug.training.device import compiled
 from snug.training.losses.physics_loss import Planes
 from snug.training.process_group import ALONE, Group
 from snug.training.training_set import Batch, TrainingSet
@@ -79,6 +80,7 @@ class TrainingContact:
             self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
+        self._pose = compiled(self._posed_by_torch, device)
         self._kept = self._posed_everywhere() if kept and kernels else None
         self._changed = np.zeros(frames, bool)
         self._before: tuple[np.ndarray | Tensor, ...] | None = None
@@ -134,18 +136,50 @@ class TrainingContact:
         """Return the body in the poses of a batch."""
         if self._kept is not None:
             return batch.frames.ravel(), *self._kept
-        rest = self.template
-        if batch.betas is not None:
-            # (P, 3, N), as FastSkin reads it
-            moved = torch.tensordot(self.directions, batch.betas, ([2], [1]))
-            rest = (rest[..., None] + moved).permute(2, 0, 1)[:, None]
-        rows = np.arange(batch.frames.size)
+        rest, rows = self._unposed(batch), np.arange(batch.frames.size)
         if isinstance(self.cache, ContactCache):  # the first frames of all windows, then the second ones
             by_time = rows.reshape(batch.frames.shape[::-1]).T.ravel()
             return by_time, *self._posed_fast(rest, batch.transforms)
-        rest = self._corrected(rest, batch.transforms)
-        positions = skin(rest, self.weights, batch.transforms).flatten(0, 1)
-        return rows, positions, self.cache.normals(positions)
+        return rows, *self._pose(rest, batch.transforms)
+
+    def _unposed(self, batch: Batch) -> Tensor:
+        """Return the unposed patches of a batch, (P, 3) or one for each window (N, 1, P, 3)."""
+        if batch.betas is None:
+            return self.template
+        # (P, 3, N), as FastSkin reads it
+        moved = torch.tensordot(self.directions, batch.betas, ([2], [1]))
+        return (self.template[..., None] + moved).permute(2, 0, 1)[:, None]
+
+    def walked(
+        self, batch: Batch, frames: Tensor, first: Tensor, x: Tensor
+    ) -> tuple[Posed, Anchors, tuple[Tensor, Tensor]]:
+        """Return bodies, anchors and planes (N, T, S, 3) of a batch; nothing is kept, nothing waited for.
+
+        Args:
+            batch: windows; its own row numbers are not read.
+            frames: (N, T), their row numbers on the device.
+            first: (N T,), see TensorContactCache.walked.
+            x: (N, T, V, 3), vertices that the anchors walk to.
+        """
+        assert isinstance(self.cache, TensorContactCache)
+        body = self._pose(self._unposed(batch), batch.transforms)
+        samples, rows = self._samples(x.detach().flatten(0, 1)), torch.arange(len(first), device=x.device)
+        reach = self.contact.margin
+        anchors = self.cache.walked(samples, frames.flatten(), first, rows, *body, reach=reach)
+        points, normals = self.cache.planes_at(anchors, rows, *body)
+        shape = (*frames.shape, *points.shape[1:])
+        return (np.arange(len(first)), *body), anchors, (points.reshape(shape), normals.reshape(shape))
+
+    def place(self, frames: Tensor, anchors: Anchors) -> None:
+        """Keep anchors of frames (N,) that `walked` has found."""
+        assert isinstance(self.cache, TensorContactCache)
+        self.cache.place(frames, anchors)
+
+    def _posed_by_torch(self, rest: Tensor, transforms: Tensor) -> tuple[Tensor, Tensor]:
+        """Pose rest (..., P, 3) by transforms (N, T, J, 3, 4); return positions and normals (N T, P, 3)."""
+        assert isinstance(self.cache, TensorContactCache)
+        positions = skin(self._corrected(rest, transforms), self.weights, transforms).flatten(0, 1)
+        return positions, self.cache.normals(positions)
 
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
         """Return points and normals (N, T, S, 3) at the cached anchors, or, with kernels, the energy itself.

@@ -45,7 +45,7 @@ from reference_sim.kernels.training_lanes import TRAINING_LANES, BatchKernel
 from snug.kernels.lanes import from_lanes, to_lanes
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe
-from snug.training.device import CPU
+from snug.training.device import CPU, compiled
 from snug.training.losses.pbns_material import SquaredContact, spring_terms
 
 STATIC = ("strain", "bending", "gravity")
@@ -178,6 +178,7 @@ class PhysicsLoss:
             name: term if kernels and has_closed_form(term) else on_device(term, device)
             for name, term in self.static.items()
         }
+        self._definitions = compiled(self._defined, device)
         self._batches: dict[str, BatchKernel] = {}
         if kernels:
             made = {name: fast_kernel(term, "training_batch") for name, term in self.static.items()}
@@ -201,10 +202,21 @@ class PhysicsLoss:
             planes: points and normals (N, T, S, 3) of the contact samples, or a kernel in lanes that knows
                 its planes; None leaves contact out.
         """
-        closed: dict[str, Tensor] = {}
-        if self.kernels and x.dtype == torch.float32:
-            kernels = self._kernels(x, ahead, planes)
-            closed = dict(zip(kernels, ClosedForms.apply(x, *kernels.values()) if kernels else ()))
+        if not (self.kernels and x.dtype == torch.float32):
+            return self._definitions(x, ahead, planes, behind, {})
+        kernels = self._kernels(x, ahead, planes)
+        closed = dict(zip(kernels, ClosedForms.apply(x, *kernels.values()) if kernels else ()))
+        return self._defined(x, ahead, planes, behind, closed)
+
+    def _defined(
+        self,
+        x: Tensor,
+        ahead: Tensor,
+        planes: Planes | None,
+        behind: Tensor | None,
+        closed: dict[str, Tensor],
+    ) -> dict[str, Tensor]:
+        """Return the energies of `__call__`: those of `closed`, and the others by their definitions."""
         terms = {}
         for name, energy in self.static.items():
             kernels_too = self.kernels and has_closed_form(energy)

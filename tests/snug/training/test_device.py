@@ -18,8 +18,10 @@ from snug.recipes.recipe import DEFAULT
 from snug.training.contact.cache import PARTS, ContactCache, Patch
 from snug.training.contact.cache_torch import TensorContactCache
 from snug.training.device import CPU, DeviceError, find_device
+from snug.training.divergence_guard import SETTLING
 from snug.training.losses.physics_loss import STATIC, on_device
-from snug.training.optimisation_step import Trainer
+from snug.training.optimisation_step import UNRECORDED, Trainer
+from snug.training.recorded_step import RecordedStep
 from snug.training.training_set import TrainingSet
 from tests.snug.training.dressing import planes_of, swaying, tube_dress
 
@@ -252,3 +254,35 @@ def test_the_harness_hands_the_device_on(tmp_path):
         check_device("cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
         task.run(context(tmp_path, assets_of(dressed, motion)), {})
+
+
+@pytest.mark.parametrize("kind", ["snug", "pbns"])
+@pytest.mark.parametrize("recipe", [PLAIN, PAPER], ids=["default", "paper"])
+def test_a_recorded_step_is_the_step(kind, recipe):
+    """What a GPU records gives the numbers of the step in single operations, and leaves the same behind."""
+    recipe = replace(recipe, contact_refresh=0.1, window_stride=1)  # frames that come twice in a step
+    plain, recording = (made(recipe, kernels=False, kind=kind) for _ in range(2))
+    recording.recorded = RecordedStep(recording)
+    assert RecordedStep.serves(plain) and plain.recorded is None
+    for number in range(UNRECORDED + 4):
+        expected, found = plain.step(number), recording.step(number)
+        assert found.keys() == expected.keys()
+        for name, value in expected.items():
+            assert found[name] == pytest.approx(value, rel=1e-5), (number, name)
+    assert recording.clock.taken()["recorded"] > 0
+    (weights, facts), (theirs, others) = plain.state(), recording.state()
+    assert weights.keys() == theirs.keys() and facts.keys() == others.keys()
+    assert facts["random"] == others["random"] and facts["contact"] == others["contact"]
+    assert facts["guard"] == others["guard"] | {"usual": pytest.approx(others["guard"]["usual"], rel=1e-5)}
+    for name, tensor in weights.items():
+        assert torch.allclose(tensor.double(), theirs[name].double(), rtol=1e-4, atol=1e-6), name
+
+
+def test_a_batch_that_is_not_followed_is_left_to_single_operations():
+    """A window above the limit: the recorded step changes nothing, and the guard sees the batch once."""
+    recipe = replace(PLAIN, spike=1e-6)
+    plain, recording = (made(recipe, kernels=False) for _ in range(2))
+    recording.recorded = RecordedStep(recording)
+    for number in (SETTLING, SETTLING + 1):
+        assert plain.step(number) == recording.step(number)
+    assert recording.guard.summary == plain.guard.summary and plain.guard.summary["high_windows"] > 0
