@@ -189,9 +189,9 @@ class Trainer:
             mine = self.group.part(len(windows))
             frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
             state = self.start_state(len(windows), mine, frames[mine])
-        if self.recorded and number > UNRECORDED:
-            if means := self._recorded_step(number, windows, frames, betas, state):
-                return {"loss": sum(means.values()), **means}
+        recorded = self.recorded and number > UNRECORDED
+        if recorded and (means := self._recorded_step(number, windows, frames, betas, state)):
+            return {"loss": sum(means.values()), **means}
         with self.clock.part("draw"):
             batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
         if self.loss is None:
