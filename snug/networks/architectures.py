@@ -83,11 +83,12 @@ def make_network(
     if network.pins:
         free = torch.ones(vertices, 1)
         free[list(network.pins)] = 0.0
+        network.register_buffer("free", free, persistent=False)
 
         def hold_pins(
-            _network: nn.Module, _features: object, output: tuple[Tensor, Tensor | None]
+            network: nn.Module, _features: object, output: tuple[Tensor, Tensor | None]
         ) -> tuple[Tensor, Tensor | None]:
-            return output[0] * free.to(output[0].device), output[1]
+            return output[0] * network.get_buffer("free"), output[1]
 
         network.register_forward_hook(hold_pins)
     return network

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -23,6 +23,7 @@ from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.tensor_file import select_tensors
 from snug.recipes.recipe import Recipe
 from snug.training.augmentation.augmented_set import make_training_set, varies_shape
+from snug.training.captured_step import CapturedStep
 from snug.training.contact.planes import Posed, TrainingContact
 from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
@@ -32,12 +33,10 @@ from snug.training.losses.physics_loss import PhysicsLoss
 from snug.training.losses.simulated_past import SimulatedPast
 from snug.training.losses.vertex_targets import Targets, VertexTargets
 from snug.training.process_group import ALONE, Group, GroupError
-from snug.training.recorded_step import RecordedStep
 from snug.training.stopwatch import Stopwatch
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 
 DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
-UNRECORDED = 3  # steps in single operations before a GPU records: they make Adam's moments
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -89,9 +88,8 @@ class Trainer:
         on_gpu = device.type == "cuda"
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(),
-            # A recorded update reads the rate and its number of steps from the device.
+            # A captured update reads the rate from the device.
             lr=torch.tensor(recipe.learning_rate, device=device) if on_gpu else recipe.learning_rate,
-            capturable=on_gpu,
             eps=recipe.adam_epsilon,
             weight_decay=recipe.weight_decay,
             fused=True,
@@ -110,7 +108,7 @@ class Trainer:
         self.hidden_states = self._hidden_state_cache()
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
         self._callable = group.wrapped(self.network)
-        self.recorded = RecordedStep(self) if on_gpu and RecordedStep.serves(self) else None
+        self.captured = CapturedStep(self) if on_gpu and CapturedStep.serves(self) else None
 
     def _set_up_supervision(
         self, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
@@ -189,8 +187,7 @@ class Trainer:
             mine = self.group.part(len(windows))
             frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
             state = self.start_state(len(windows), mine, frames[mine])
-        recorded = self.recorded and number > UNRECORDED
-        if recorded and (means := self._recorded_step(number, windows, frames, betas, state)):
+        if self.captured and (means := self.captured.take(number, windows, frames, betas, state)):
             return {"loss": sum(means.values()), **means}
         with self.clock.part("draw"):
             batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
@@ -202,37 +199,6 @@ class Trainer:
         else:
             means = self._physics_step(number, windows, frames, batch, state)
         return {"loss": sum(means.values()), **means}
-
-    def _recorded_step(
-        self, number: int, windows: np.ndarray, frames: np.ndarray, betas: np.ndarray | None,
-        state: Tensor | None,
-    ) -> dict[str, float]:  # fmt: skip
-        """Take a step on the energies by what a GPU has recorded; return the means by term.
-
-        Empty where the guard would not simply update: then nothing has been changed.
-        """
-        assert self.recorded is not None
-        with self.clock.part("recorded"):
-            terms, norm = self.recorded.gradients(frames, betas, state)
-        joules = np.sum(list(terms.values()), axis=0).mean(1)
-        high = number >= SETTLING and (joules > self.recipe.spike).any()
-        if high or not np.isfinite([*joules, norm]).all():
-            return {}
-
-        def name(row: int) -> str:
-            return self.data.where(self.data.starts[windows[row]])
-
-        verdict = self.guard.judge(number, joules, name)
-        self.guard.accepts(number, verdict, norm, joules, name)
-        with self.clock.part("optimiser"):
-            x, after, posed = self.recorded.follow()
-        if self.hidden_states and after is not None:
-            self.hidden_states.keep(frames[:, -1], after)
-        if self.contact and posed:
-            with self.clock.part("requery"):
-                self.contact.settle(frames, trusted=True)
-                self.contact.requery(frames, posed, x)
-        return {name: float(energy.mean()) for name, energy in terms.items()}
 
     def _physics_step(
         self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Tensor | None
@@ -330,10 +296,7 @@ class Trainer:
         whole = self.group.gathered(stacked.detach())
         joules = whole.sum(1).mean(1).cpu().numpy()
         means = dict(zip(terms, whole.mean((0, 2)).tolist()))
-
-        def name(row: int) -> str:
-            return self.data.where(self.data.starts[windows[row]])
-
+        name = self.namer(windows)
         verdict = self.guard.judge(number, joules, name)
         if verdict == "leave out":
             return means, False
@@ -349,6 +312,10 @@ class Trainer:
                 nn.utils.clip_grads_with_norm_(parameters, self.recipe.gradient_limit, norm)
             self.optimiser.step()
         return means, verdict != "distrust"
+
+    def namer(self, windows: np.ndarray) -> Callable[[int], str]:
+        """Return what names a window of a step by its place among `windows` (N,)."""
+        return lambda row: self.data.where(self.data.starts[windows[row]])
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Return everything that the next step depends on: tensors, and plain facts for a JSON header."""

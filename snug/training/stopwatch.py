@@ -8,8 +8,8 @@ from contextlib import contextmanager
 
 import torch
 
-# On a GPU "recorded" is all from the windows to the gradients; see snug.training.recorded_step.
-PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "recorded", "optimiser", "requery")
+# On a GPU "captured" is all from the windows to the gradients; see snug.training.captured_step.
+PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "captured", "optimiser", "requery")
 
 WATCH_EVERY = 10  # steps, on a GPU
 

@@ -70,7 +70,7 @@ class StretchStVK(Energy):
         )  # the columns of F
         G00, G11 = 0.5 * ((along * along).sum(-1) - 1), 0.5 * ((across * across).sum(-1) - 1)
         G01 = 0.5 * (along * across).sum(-1)
-        trace_of_square = G00 * G00 + G11 * G11 + 2 * G01 * G01
+        trace_of_square = G00**2 + G11**2 + 2 * G01**2
         return area * (0.5 * self.lam * (G00 + G11) ** 2 + self.mu * trace_of_square)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:

@@ -14,8 +14,7 @@ from torch import Tensor
 
 from reference_sim.contact.anchor_walk import CROSSINGS, WALK_SLACK
 from snug.training.contact.cache import PARTS, ContactCache, Patch
-from snug.training.device import compiled
-from snug.training.recorded_step import Recorded
+from snug.training.device import CudaGraph, compiled
 
 Anchors = tuple[Tensor, Tensor]  # faces (N, S) and barycentric coordinates (N, S, 2)
 NEAREST = 3  # body vertices whose faces are tried for each sample
@@ -41,7 +40,7 @@ class TensorContactCache:
         around = _incident(patch.faces)
         self.around = torch.as_tensor(around, device=device)  # (P, K) faces, -1 beyond the last
         self._walked_from, self._planes_at = compiled(self._walked, device), compiled(self._planes, device)
-        self._find = Recorded(self._found, device)
+        self._find = CudaGraph(self._found, device)
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
         """Return the places of the oldest anchors, see ContactCache.oldest."""
@@ -92,17 +91,17 @@ class TensorContactCache:
         Anchors of samples (N, S, 3) less than `reach` and SLACK above their planes walk. positions, normals:
         see `planes`.
         """
-        _, first, again = np.unique(frames, return_index=True, return_inverse=True)
-        chosen, owner, row = (
-            torch.as_tensor(numbers, device=samples.device) for numbers in (frames, first[again], rows)
+        chosen, first, row = (
+            torch.as_tensor(numbers, device=samples.device)
+            for numbers in (frames, first_places(frames), rows)
         )
-        self.place(chosen, self.walked(samples, chosen, owner, row, positions, normals, reach=reach))
+        self.place(chosen, self.walked(samples, chosen, first, row, positions, normals, reach=reach))
 
     def walked(
         self, samples: Tensor, frames: Tensor, first: Tensor, rows: Tensor, positions: Tensor,
         normals: Tensor, *, reach: float,
     ) -> Anchors:  # fmt: skip
-        """Return the anchors of frames (N,) after `walk`; first (N,): where each frame comes first.
+        """Return the anchors of frames (N,) after `walk`; first (N,): see `first_places`.
 
         A frame that comes twice walks once, as its first garment has it.
         """
@@ -169,6 +168,16 @@ class TensorContactCache:
         best = squared.argmin(1, keepdim=True)
         pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]
         return pick[0], torch.stack(pick[1:], -1)
+
+
+def first_places(frames: np.ndarray) -> np.ndarray:
+    """Return for each of frames (N,) the place where it comes first.
+
+    >>> first_places(np.array([7, 5, 7]))
+    array([0, 1, 0])
+    """
+    _, first, again = np.unique(frames, return_index=True, return_inverse=True)
+    return first[again]
 
 
 def quantise_tensors(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:

@@ -8,8 +8,6 @@ claims a contact that is none, or misses a thigh that stands in the hem.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,25 +15,20 @@ import torch
 from torch import Tensor
 
 from reference_sim.energies import ContactPenalty
-from snug.body.skinning import add_pose_correctives, skin
-from snug.kernels.skinning import FastSkin
+from snug.body.skinning import skin
+from snug.training.contact.body_patches import BodyPatches, Posed
 from snug.training.contact.cache import ContactCache, Patch
 from snug.training.contact.cache_torch import Anchors, TensorContactCache
-from snug.training.device import compiled
 from snug.training.losses.physics_loss import Planes
 from snug.training.process_group import ALONE, Group
 from snug.training.training_set import Batch, TrainingSet
 
-# rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
-Posed = tuple[np.ndarray, Any, Any]  # arrays or tensors, as the cache has them
-POSED_TOGETHER = 64  # frames whose bodies are posed by one call
 # Frames before and after a searched one that may take over its anchors; at the start.
 REACH, FIRST_REACH = 3, 7
 # m: how far a mark of the body may have moved from a frame to one that takes over its anchors. At the start a
 # frame lies within FIRST_NEAR of the first and of the last of those; from those between it may be twice as
 # far.
 NEAR, FIRST_NEAR = 0.03, 0.07
-MARKED = 25  # every so many vertices of the patch there is a mark
 
 
 class TrainingContact:
@@ -69,86 +62,17 @@ class TrainingContact:
         self.cache = (
             ContactCache(self.patch, frames) if kernels else TensorContactCache(self.patch, frames, device)
         )
-        vertices = self.patch.body_vertices
-        self.weights, self.template, self.directions = (
-            torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
-            for array in (body.skinning_weights, body.template, body.shape_directions)
-        )
-        self.correctives: Tensor | None = None
-        if body.pose_directions is not None:
-            correctives = body.pose_directions[vertices]
-            self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
+        normals = self.patch.normals if kernels else self.cache.normals
+        self.bodies = BodyPatches(data, self.patch, normals, kernels=kernels, kept=kept)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
-        self._pose = compiled(self._posed_by_torch, device)
-        self._kept = self._posed_everywhere() if kept and kernels else None
         self._changed = np.zeros(frames, bool)
         self._before: tuple[np.ndarray | Tensor, ...] | None = None
         self._credit = 0.0
 
-    def _corrected(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
-        """Return patch positions (..., P, 3), or every so many of them, with pose correctives."""
-        rest = rest[..., ::every, :]
-        if self.correctives is None:
-            return rest
-        parents, directions = self.data.dressed.parents, self.correctives[::every].to(rest.device)
-        return add_pose_correctives(rest, directions, transforms, parents)
-
-    def _posed_fast(self, rest: Tensor, transforms: Tensor) -> tuple[np.ndarray, np.ndarray]:
-        """Pose rest (N, 1, P, 3) by transforms (N, T, J, 3, 4); return positions, normals (T N, P, 3)."""
-        points = self._corrected(rest, transforms).expand(*transforms.shape[:2], -1, -1)
-        posed = FastSkin.apply(points, self.weights, transforms)
-        positions = posed.transpose(0, 1).flatten(0, 1).contiguous().numpy()
-        return positions, self.patch.normals(positions)
-
-    def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
-        """Compute patch positions and normals (F, P, 3) of every frame."""
-        shape = self.data.frames, *self.template.shape
-        positions, normals = np.empty(shape, np.float32), np.empty(shape, np.int8)
-        for rest, frames in self._worn():
-            for start in range(frames.start, frames.stop, POSED_TOGETHER):
-                some = slice(start, min(start + POSED_TOGETHER, frames.stop))
-                positions[some], normals[some] = self._posed_fast(rest, self.data.transforms[None, some])
-        return positions, normals
-
-    def _worn(self) -> Iterator[tuple[Tensor, slice]]:
-        """Yield unposed patches (P, 3) and the frames of each: motion by motion, or one for all frames."""
-        shapes, first = self.data.shapes, self.data.first
-        if shapes is None:
-            yield self.template, slice(0, self.data.frames)
-            return
-        for betas, start, stop in zip(shapes, first[:-1], first[1:]):
-            moved = self.directions @ torch.as_tensor(betas).to(self.directions)
-            yield self.template + moved, slice(int(start), int(stop))
-
-    @cached_property
-    def _marks(self) -> np.ndarray:
-        """Some vertices of the patch in every frame, (F, M, 3) [m], by which poses are compared."""
-        # On the CPU whatever the device, so that processes that share a run propagate alike.
-        weights = self.weights[::MARKED].cpu()
-        return np.concatenate([
-            skin(self._corrected(rest.cpu(), part, MARKED), weights, part).numpy()
-            for rest, frames in self._worn()
-            for part in self.data.transforms[frames].cpu().split(POSED_TOGETHER)
-        ])  # fmt: skip
-
     def posed(self, batch: Batch) -> Posed:
         """Return the body in the poses of a batch."""
-        if self._kept is not None:
-            return batch.frames.ravel(), *self._kept
-        rest, rows = self._unposed(batch), np.arange(batch.frames.size)
-        if isinstance(self.cache, ContactCache):  # the first frames of all windows, then the second ones
-            by_time = rows.reshape(batch.frames.shape[::-1]).T.ravel()
-            return by_time, *self._posed_fast(rest, batch.transforms)
-        return rows, *self._pose(rest, batch.transforms)
-
-    def _unposed(self, batch: Batch) -> Tensor:
-        """Return the unposed patches of a batch, (P, 3) or one for each window (N, 1, P, 3)."""
-        if batch.betas is None:
-            return self.template
-        # (P, 3, N), as FastSkin reads it
-        moved = torch.tensordot(self.directions, batch.betas, ([2], [1]))
-        return (self.template[..., None] + moved).permute(2, 0, 1)[:, None]
+        return self.bodies.posed(batch)
 
     def walked(
         self, batch: Batch, frames: Tensor, first: Tensor, x: Tensor
@@ -158,28 +82,23 @@ class TrainingContact:
         Args:
             batch: windows; its own row numbers are not read.
             frames: (N, T), their row numbers on the device.
-            first: (N T,), see TensorContactCache.walked.
+            first: (N T,), see snug.training.contact.cache_torch.first_places.
             x: (N, T, V, 3), vertices that the anchors walk to.
         """
         assert isinstance(self.cache, TensorContactCache)
-        body = self._pose(self._unposed(batch), batch.transforms)
+        posed = self.posed(batch)
+        body = posed[1:]
         samples, rows = self._samples(x.detach().flatten(0, 1)), torch.arange(len(first), device=x.device)
         reach = self.contact.margin
         anchors = self.cache.walked(samples, frames.flatten(), first, rows, *body, reach=reach)
         points, normals = self.cache.planes_at(anchors, rows, *body)
         shape = (*frames.shape, *points.shape[1:])
-        return (np.arange(len(first)), *body), anchors, (points.reshape(shape), normals.reshape(shape))
+        return posed, anchors, (points.reshape(shape), normals.reshape(shape))
 
     def place(self, frames: Tensor, anchors: Anchors) -> None:
         """Keep anchors of frames (N,) that `walked` has found."""
         assert isinstance(self.cache, TensorContactCache)
         self.cache.place(frames, anchors)
-
-    def _posed_by_torch(self, rest: Tensor, transforms: Tensor) -> tuple[Tensor, Tensor]:
-        """Pose rest (..., P, 3) by transforms (N, T, J, 3, 4); return positions and normals (N T, P, 3)."""
-        assert isinstance(self.cache, TensorContactCache)
-        positions = skin(self._corrected(rest, transforms), self.weights, transforms).flatten(0, 1)
-        return positions, self.cache.normals(positions)
 
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
         """Return points and normals (N, T, S, 3) at the cached anchors, or, with kernels, the energy itself.
@@ -254,7 +173,8 @@ class TrainingContact:
         first = self.data.first
         motion = int(self.data.motion_of(frame))
         start, stop = max(frame - reach, int(first[motion])), min(frame + reach + 1, int(first[motion + 1]))
-        moved = np.linalg.norm(self._marks[start:stop] - self._marks[frame], axis=2).max(axis=1)
+        marks = self.bodies.marks
+        moved = np.linalg.norm(marks[start:stop] - marks[frame], axis=2).max(axis=1)
         far = (start + np.flatnonzero(moved > near)).tolist()
         before, after = (f + 1 for f in far if f < frame), (f for f in far if f > frame)
         return slice(max([start, *before]), min([stop, *after]))

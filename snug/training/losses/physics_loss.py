@@ -11,8 +11,8 @@ however long the window is. The recipe names two other forms of inertia (Recipe.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (those that a term declares as "training_batch", or its own gradient) give the same values and
-gradients in a small part of the time, so autograd uses those. On a GPU the definitions run as they are, and
-on a CPU that of an energy that has no kernel. A recipe may name any energy of the simulator
+gradients in a small part of the time, so autograd uses those. On a GPU the definitions are compiled by torch,
+and on a CPU that of an energy that has no kernel runs as it is. A recipe may name any energy of the simulator
 (snug.recipes.energies).
 The contact planes are the one difference: training keeps an anchor for each sample, which walks along, and
 takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the

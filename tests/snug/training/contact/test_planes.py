@@ -13,8 +13,9 @@ from snug.body.skeleton import JOINT
 from snug.body.skinning import skin
 from snug.recipes.recipe import DEFAULT
 from snug.training.augmentation.mixed_clips import augment
+from snug.training.contact.body_patches import MARKED
 from snug.training.contact.cache import ContactCache, Patch
-from snug.training.contact.planes import FIRST_NEAR, FIRST_REACH, MARKED, NEAR, REACH
+from snug.training.contact.planes import FIRST_NEAR, FIRST_REACH, NEAR, REACH
 from snug.training.optimisation_step import Trainer
 from tests.reference_sim.meshes import sphere
 from tests.snug.training.dressing import swaying, tube_dress
@@ -56,10 +57,10 @@ def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
     )
     trainer = made()
     monkeypatch.setattr(ContactCache, "requery", requery)
-    assert trainer.contact is not None and trainer.contact._kept is not None
+    assert trainer.contact is not None and trainer.contact.bodies.kept is not None
     anchors, patch = trainer.contact.cache, trainer.contact.patch
     at_rest = ContactCache(patch, 1).faces[0]
-    body = trainer.contact._kept[0]
+    body = trainer.contact.bodies.kept[0]
     for frame in range(41):  # marks are not all vertices: some move a little more than twice FIRST_NEAR
         near = [
             other
@@ -128,7 +129,7 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
     recipe = replace(DEFAULT, mixed=3.0, shape_range=3.0, shape_of="clip")
     trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=recipe, kernels=kernels)
     contact, data, body = trainer.contact, trainer.data, trainer.dressed.body
-    assert contact is not None and data.shapes is not None and (contact._kept is not None) == kernels
+    assert contact is not None and data.shapes is not None and (contact.bodies.kept is not None) == kernels
     clips = [*MOTIONS, *augment(MOTIONS, recipe, vertices=trainer.dressed.vertices, seed=0)]
     for place in (1, 2, 3):
         motion, own, first = clips[place], data.shapes[place], data.first[place]
@@ -139,7 +140,9 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
         ]
         pelvis = body.joints(own)[0] + motion.translations[3:6, None]
         assert np.allclose(np.asarray(positions)[rows], whole - pelvis, atol=1e-4)
-        assert np.allclose(contact._marks[first + 3 : first + 6], (whole - pelvis)[:, ::MARKED], atol=1e-4)
+        assert np.allclose(
+            contact.bodies.marks[first + 3 : first + 6], (whole - pelvis)[:, ::MARKED], atol=1e-4
+        )
 
 
 def propagated(motions, frame, monkeypatch):
