@@ -17,7 +17,7 @@ from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
 from benchmarks.tasks.task import RunStopped
-from reference_sim.command.command_line import heeded_interrupts
+from reference_sim.command.command_line import heeded_interrupts, print_text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.list:
             from benchmarks.plan.list_names import list_names
 
-            print(list_names(find_preset(options.preset), split(options.suite)))
+            print_text(list_names(find_preset(options.preset), split(options.suite)))
             return 0
         plan = make_plan(request_of_run(options, command_line))
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
@@ -53,7 +53,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         if dry_run:
             from benchmarks.runner.dry_run import describe
 
-            print(describe(plan))
+            print_text(describe(plan))
             return 0
         from benchmarks.process.isolated_process import LOADED_BY_DRESSED, start_loading
         from benchmarks.runner.execute_plan import check_roll_outs, execute

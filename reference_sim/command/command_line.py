@@ -5,6 +5,7 @@ from __future__ import annotations
 import _thread
 import argparse
 import functools
+import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -59,6 +60,14 @@ def heeded_interrupts() -> Iterator[None]:
         sys.unraisablehook = before
         for timer in timers:
             timer.cancel()
+
+
+def print_text(text: str) -> None:
+    """Print a text that may be read no further than its first lines, as by `| head`."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python still has to write
 
 
 def command(
