@@ -22,7 +22,7 @@ from snug.training.divergence_guard import SETTLING
 if TYPE_CHECKING:
     from snug.training.optimisation_step import Trainer
 
-UNCAPTURED = 3  # first steps, in single operations: they make Adam's moments
+UNCAPTURED = 3  # first steps, in single operations: they compile, and make Adam's moments
 
 
 class CapturedStep:
@@ -40,8 +40,8 @@ class CapturedStep:
     def serves(trainer: Trainer) -> bool:
         """Return whether a trainer's step can be captured.
 
-        It is that of one process, on the energies alone, of a network that reads no frames before its windows
-        and on bodies that belong to no motion.
+        The step must be of one process and on the energies alone. The network must read no frames before its
+        windows, and no motion may have a body of its own.
         """
         return bool(
             trainer.loss
@@ -75,6 +75,7 @@ class CapturedStep:
         with trainer.clock.part("captured"):
             terms, norm = self._gradients(frames, betas, state)
         joules = np.sum(list(terms.values()), axis=0).mean(1)
+        # Looked at before the guard judges, for it counts each batch that it judges.
         high = number >= SETTLING and (joules > trainer.recipe.spike).any()
         if high or not np.isfinite([*joules, norm]).all():
             return {}
@@ -96,7 +97,7 @@ class CapturedStep:
     def _gradients(
         self, frames: np.ndarray, betas: np.ndarray | None, state: Tensor | None
     ) -> tuple[dict[str, np.ndarray], float]:
-        """Return the terms (N, T) [J] of the windows, and the norm of the gradient that they have left."""
+        """Return the terms (N, T) [J] of the windows, and the gradient norm; gradients are then in place."""
         given = {"rows": torch.as_tensor(frames), "first": torch.as_tensor(first_places(frames.ravel()))}
         if betas is not None:
             given["betas"] = torch.as_tensor(betas)
@@ -109,7 +110,7 @@ class CapturedStep:
         return dict(zip(self._held["terms"], terms.swapaxes(0, 1))), float(numbers[-1])
 
     def _differentiated(self, *inputs: Tensor) -> dict[str, Any]:
-        """Return a step's tensors from its windows on, the gradients in their places."""
+        """Run forward and backward; return what the rest of the step reads. inputs: see `_gradients`."""
         given, trainer = dict(zip(self._names, inputs)), self.trainer
         assert trainer.loss is not None
         rows = given["rows"].to(trainer.device)

@@ -21,7 +21,10 @@ class DeviceError(ValueError):
 
 
 def find_device(name: str) -> torch.device:
-    """Return the device `cpu`, `cuda` or `cuda:1`. Raises DeviceError for an unknown or absent one."""
+    """Return the device `cpu`, `cuda` or `cuda:1`; on a GPU, recurrent units no longer use TF32.
+
+    Raises DeviceError for an unknown or absent one.
+    """
     try:
         device = torch.device(name)
     except RuntimeError:
@@ -35,12 +38,12 @@ def find_device(name: str) -> torch.device:
         raise DeviceError(f"--device {name}: {why}; use --device cpu")
     if (device.index or 0) >= torch.cuda.device_count():
         raise DeviceError(f"--device {name}: this machine has {torch.cuda.device_count()} CUDA device(s)")
-    torch.backends.cudnn.allow_tf32 = False  # recurrent units would round their products to ten bits
+    torch.backends.cudnn.allow_tf32 = False  # it rounds what is multiplied to ten bits
     return device
 
 
 def compiled(function: Callable[P, R], device: torch.device) -> Callable[P, R]:
-    """Return the function compiled by torch for a GPU, where a thousand small operations wait for Python.
+    """Return the function compiled by torch for a GPU, where launching small kernels takes most of the time.
 
     It is returned as it is on a CPU, where the kernels take its place, and where Triton or a C compiler is
     missing. It is compiled once for each size of its arguments, at the first call.

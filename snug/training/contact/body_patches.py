@@ -16,8 +16,8 @@ from snug.training.contact.cache import Patch
 from snug.training.device import compiled
 from snug.training.training_set import Batch, TrainingSet
 
-# rows (N T,) into the positions and normals (R, P, 3) that follow: the body's patch in the frames of a batch.
-Posed = tuple[np.ndarray, Any, Any]  # arrays or tensors, as the cache of anchors has them
+# Patches in the frames of a batch: row of each frame (N T,), positions and normals (R, P, 3), arrays or tensors.
+Posed = tuple[np.ndarray, Any, Any]
 POSED_TOGETHER = 64  # frames whose bodies are posed by one call
 MARKED = 25  # every so many vertices of the patch there is a mark
 
@@ -93,7 +93,7 @@ class BodyPatches:
         return positions, self.normals(positions)
 
     def _posed_by_kernels(self, rest: Tensor, transforms: Tensor) -> tuple[np.ndarray, np.ndarray]:
-        """Pose rest (N, 1, P, 3) by transforms (N, T, J, 3, 4); return positions, normals (T N, P, 3)."""
+        """Pose rest (P, 3) or (N, 1, P, 3) by (N, T, J, 3, 4); return positions, normals (T N, P, 3)."""
         points = self._corrected(rest, transforms).expand(*transforms.shape[:2], -1, -1)
         posed = FastSkin.apply(points, self.weights, transforms)
         positions = posed.transpose(0, 1).flatten(0, 1).contiguous().numpy()
