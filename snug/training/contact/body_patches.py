@@ -16,7 +16,7 @@ from snug.training.contact.cache import Patch
 from snug.training.device import compiled
 from snug.training.training_set import Batch, TrainingSet
 
-# Patches in the frames of a batch: rows (N T,) into positions and normals (R, P, 3), which are arrays or tensors.
+# Patches in the frames of a batch: rows (N T,) into positions and normals (R, P, 3), arrays or tensors.
 Posed = tuple[np.ndarray, Any, Any]
 POSED_TOGETHER = 64  # frames whose bodies are posed by one call
 MARKED = 25  # every so many vertices of the patch there is a mark
