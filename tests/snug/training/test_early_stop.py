@@ -143,7 +143,7 @@ def test_history_says_where_the_time_goes():
     )
     for row in model.history:
         parts = {name.removeprefix("seconds/"): s for name, s in row.items() if name.startswith("seconds/")}
-        assert set(parts) == set(PARTS)
+        assert set(parts) == set(PARTS) - {"captured"}  # of a GPU
         assert sum(parts.values()) > 0
     # The parts of all steps add up to nearly all of the run.
     assert 0.5 * model.seconds < 3 * sum(sum(v for k, v in row.items() if "/" in k) for row in model.history)
