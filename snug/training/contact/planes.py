@@ -8,6 +8,7 @@ claims a contact that is none, or misses a thigh that stands in the hem.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -59,10 +60,12 @@ class TrainingContact:
         self.patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
         frames = data.frames
         self.cache: ContactCache | TensorContactCache
-        self.cache = (
-            ContactCache(self.patch, frames) if kernels else TensorContactCache(self.patch, frames, device)
-        )
-        normals = self.patch.normals if kernels else self.cache.normals
+        normals: Callable[[Any], Any] = self.patch.normals
+        if kernels:
+            self.cache = ContactCache(self.patch, frames)
+        else:
+            self.cache = TensorContactCache(self.patch, frames, device)
+            normals = self.cache.normals
         self.bodies = BodyPatches(data, self.patch, normals, kernels=kernels, kept=kept)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
