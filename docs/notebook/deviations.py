@@ -1,4 +1,4 @@
-"""What each deviation of the default recipe from the paper's text does, on the validation motions.
+"""Each deviation of the default recipe from the paper's text, measured on the validation motions.
 
     python -m benchmarks.networks --methods 'snug,snug-paper,snug-without-*,snug-paper-with-*' -o nets
     python docs/notebook/deviations.py nets

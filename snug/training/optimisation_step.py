@@ -185,7 +185,7 @@ class Trainer:
                 shapes = self.dressed.body.shape_count
                 betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
             mine = self.group.part(len(windows))
-            frames = self.data.starts[windows][:, None] + np.arange(self.data.window)
+            frames = self.data.frames_of(windows)
             state = self.start_state(len(windows), mine, frames[mine])
         if self.captured and (means := self.captured.take(number, windows, frames, betas, state)):
             return {"loss": sum(means.values()), **means}

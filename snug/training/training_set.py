@@ -163,9 +163,13 @@ class TrainingSet:
         rows = np.maximum(frames[:, None] - np.arange(count, 0, -1), first[:, None])
         return self.features[torch.as_tensor(rows, device=self.device)]
 
+    def frames_of(self, windows: np.ndarray) -> np.ndarray:
+        """Return the row numbers (N, T) of windows (N,)."""
+        return self.starts[windows][:, None] + np.arange(self.window)
+
     def batch(self, windows: np.ndarray, betas: np.ndarray | None = None) -> Batch:
         """Return windows (N,) as tensors, each on the body of its motion, or of its shape in betas (N, S)."""
-        frames = self.starts[windows][:, None] + np.arange(self.window)
+        frames = self.frames_of(windows)
         if betas is None:
             return self.at(frames)
         rows, shapes = (torch.as_tensor(numbers, device=self.device) for numbers in (frames, betas))

@@ -39,8 +39,8 @@ class TensorContactCache:
         self.adjacency = torch.as_tensor(patch.adjacency, device=device).long()  # (Q, 3)
         around = _incident(patch.faces)
         self.around = torch.as_tensor(around, device=device)  # (P, K) faces, -1 beyond the last
-        self._walked_from, self._planes_at = compiled(self._walked, device), compiled(self._planes, device)
-        self._find = CudaGraph(self._found, device)
+        self._walked_from, self.planes_at = compiled(self._walked, device), compiled(self._planes, device)
+        self._closest = CudaGraph(self._searched_in_parts, device)
 
     def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
         """Return the places of the oldest anchors, see ContactCache.oldest."""
@@ -63,13 +63,7 @@ class TensorContactCache:
         Patch positions and normals of the frames are rows (N,) of (R, P, 3) tensors.
         """
         chosen, row = (torch.as_tensor(numbers, device=positions.device) for numbers in (frames, rows))
-        return self.planes_at((self.faces[chosen], self.barycentric[chosen]), row, positions, normals)
-
-    def planes_at(
-        self, anchors: Anchors, rows: Tensor, positions: Tensor, normals: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """Return the points and normals of `planes` at anchors of N frames."""
-        return self._planes_at(*anchors, rows, positions, normals)
+        return self.planes_at(self.faces[chosen], self.barycentric[chosen], row, positions, normals)
 
     def _planes(
         self, faces: Tensor, barycentric: Tensor, row: Tensor, positions: Tensor, normals: Tensor
@@ -143,10 +137,10 @@ class TensorContactCache:
 
         Brute force has no use for old anchors, so that `exact` changes nothing.
         """
-        self.faces[frame], self.barycentric[frame] = self._find(points, positions)
+        self.faces[frame], self.barycentric[frame] = self._closest(points, positions)
         self.age[frame] = 0
 
-    def _found(self, points: Tensor, positions: Tensor) -> Anchors:
+    def _searched_in_parts(self, points: Tensor, positions: Tensor) -> Anchors:
         """Return the closest anchors of samples (S, 3) on a body (P, 3), part by part."""
         parts = zip(points.split(CHUNK), self.sample_rest.split(CHUNK))
         found = [self._searched(point, home, positions) for point, home in parts]

@@ -94,7 +94,7 @@ class TrainingContact:
         samples, rows = self._samples(x.detach().flatten(0, 1)), torch.arange(len(first), device=x.device)
         reach = self.contact.margin
         anchors = self.cache.walked(samples, frames.flatten(), first, rows, *body, reach=reach)
-        points, normals = self.cache.planes_at(anchors, rows, *body)
+        points, normals = self.cache.planes_at(*anchors, rows, *body)
         shape = (*frames.shape, *points.shape[1:])
         return posed, anchors, (points.reshape(shape), normals.reshape(shape))
 
