@@ -178,7 +178,7 @@ class Unplaced(TorchFunctionMode):
 @pytest.mark.parametrize("recipe", [PLAIN, PAPER], ids=["default", "paper"])
 def test_a_step_makes_nothing_but_where_it_is_told_to(recipe):
     trainer = made(replace(recipe, contact_refresh=0.1), kernels=False)
-    trainer.dressed.rest_directions()  # made once, on the CPU on purpose, and kept: by whichever test is first
+    trainer.dressed.rest_directions()  # kept by the dress, which tests share: made on the CPU
     with Unplaced() as unplaced:
         row = trainer.step(0)
     assert unplaced.found == [] and np.isfinite(row["loss"])
