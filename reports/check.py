@@ -86,7 +86,7 @@ def spread(run: Run) -> Iterator[str]:
     repeated = pd.MultiIndex.from_frame(cells[cells["metric"] == REPEATS][CELL])
     once = timed[~pd.MultiIndex.from_frame(timed[CELL]).isin(repeated)]
     if len(once):
-        places = (once["method"] + " in " + once["scene"]).tolist()
+        places = [f"{method} in {scene}" for method, scene in zip(once["method"], once["scene"])]
         yield f"{len(once)} of {len(timed)} run times of suite speed were taken once: {_names(places)}"
     reference = cells[cells["method"] == run.reference].groupby("scene", sort=False)["uncertainty"].count()
     if len(unsure := reference[reference == 0]):

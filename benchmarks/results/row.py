@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from benchmarks.results.json_file import ResultsError
@@ -89,13 +90,15 @@ class Row:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "moved", tuple(map(tuple, self.moved)))  # JSON gives lists
-        label = f"{self.scene} x {self.method} / {self.metric}"
         if self.status not in STATUSES:
-            raise ResultsError(f"row {label}: status '{self.status}' is none of {', '.join(STATUSES)}")
+            raise self._error(f"status '{self.status}' is none of {', '.join(STATUSES)}")
         if self.status == "skipped" and (self.value is not None or not self.reason):
-            raise ResultsError(f"row {label}: a skipped row has a reason and no value")
+            raise self._error("a skipped row has a reason and no value")
         if self.status == "ok" and (self.value is None or not math.isfinite(self.value)):
-            raise ResultsError(f"row {label}: status ok needs a finite value, got {self.value}")
+            raise self._error(f"status ok needs a finite value, got {self.value}")
+
+    def _error(self, said: str) -> ResultsError:
+        return ResultsError(f"row {self.scene} x {self.method} / {self.metric}: {said}")
 
     @property
     def passed(self) -> bool:
@@ -134,6 +137,11 @@ def cell_text(text: str) -> str:
     return text
 
 
+@cache
+def _is_name(text: str) -> bool:
+    return text.isprintable() and len(text.encode()) <= LONGEST_NAME
+
+
 def row_to_cells(row: Row) -> dict[str, str]:
     """Return the text of each cell; numbers keep all their digits, so that reading gives the same row."""
     cells = {}
@@ -163,12 +171,13 @@ def cells_to_row(cells: dict[str, str]) -> Row:
             if abs(values[name]) >= 1 << 63:
                 raise ValueError("a number beyond 64 bits")
         for name in _NAMES:
-            if not cells[name].isprintable() or len(cells[name].encode()) > LONGEST_NAME:
+            if not _is_name(cells[name]):
                 raise ValueError(f"no name of at most {LONGEST_NAME} printable bytes")
         name = "seeded"
         values[name] = _TRUTHS[cells[name]]
         name = "moved"  # runs of before have none
-        values[name] = tuple((str(k), float(v)) for k, v in json.loads(cells.get(name) or "{}").items())
+        moved = json.loads(cells[name]) if cells.get(name) else {}
+        values[name] = tuple((str(k), float(v)) for k, v in moved.items())
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise ResultsError(f"column {name}: {error}") from None
     return Row(**values)

@@ -171,16 +171,15 @@ class RunFolder:
 
     def _rows(self, stream: Iterable[str]) -> list[Row]:
         rows = []
-        reader = csv.DictReader(stream)
-        names = tuple(reader.fieldnames or ())
+        reader = csv.reader(stream)
+        names = tuple(next(reader, ()))
         if names != tuple(name for name in COLUMNS if name in names or name not in LATER):
             raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
         for cells in reader:
-            line = f"{self.rows_path}: line {reader.line_num}"
-            if None in cells or None in cells.values():
-                raise ResultsError(f"{line}: {len(COLUMNS)} cells are expected")
             try:
-                rows.append(cells_to_row(cells))
+                if cells and len(cells) != len(names):
+                    raise ResultsError(f"{len(names)} cells are expected")
+                rows += [cells_to_row(dict(zip(names, cells)))] if cells else []
             except ResultsError as error:
-                raise ResultsError(f"{line}: {error}") from None
+                raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
         return rows

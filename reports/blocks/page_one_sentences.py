@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 import pandas as pd
 
@@ -32,6 +33,7 @@ CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
 SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
 
 
+@lru_cache(maxsize=4)
 def headline(run: Run) -> list[tuple[str, str]]:
     """Return (topic, sentence) for each topic of page one that the run can tell."""
     scenes = next(iter(run.garments(run.garment_rows).values()), [])

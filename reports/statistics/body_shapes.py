@@ -26,7 +26,7 @@ def rows_of_shapes(run: Run) -> tuple[pd.DataFrame, pd.Series]:
 def rows_of_other_shapes(run: Run) -> pd.DataFrame:
     """Return the rows of scenes whose body has not the mean shape."""
     rows, norms = rows_of_shapes(run)
-    return rows[rows["scene"].map(norms) > 0.0]
+    return rows[rows["scene"].isin(norms.index[norms > 0.0])]
 
 
 def excess_energy(run: Run, rows: pd.DataFrame, method: str) -> tuple[float | None, str]:

@@ -8,8 +8,12 @@ deviation over seeds (n - 1), absent for a single seed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
+from statistics import fmean, stdev
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -66,54 +70,89 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
         keys: columns that make a group, such as "garment", "method", "metric"; the last two are among them.
     """
     names = list(keys)
-    places, ends = ([key for key in names if key != name] for name in ("method", "metric"))
-    tried = frame[frame["status"] != "skipped"]
-    asked = tried.groupby(places)["scene"].nunique().to_dict()
-    failed = tried[~tried["usable"]].groupby(ends)["seed"].agg(set).to_dict()
-    usable = frame.assign(stalled=frame["status"] == "stalled")[frame["usable"]]
-    of_seed, of_all = (usable.groupby(group, sort=False) for group in ([*names, "seed"], names))
-    seeds = of_seed["value"].mean()
-    cells: dict[tuple, dict[tuple[str, int], float]] = {}
-    changes: dict[tuple, dict[tuple[str, int], dict[str, float]]] = {}
-    if "moved" not in usable:
-        usable = usable.assign(moved=[()] * len(usable))
-    for *key, scene, seed, value, moved in usable[[*names, "scene", "seed", "value", "moved"]].itertuples(
-        index=False
-    ):
-        cells.setdefault(tuple(key), {})[scene, int(seed)] = float(value)
-        if moved:
-            changes.setdefault(tuple(key), {})[scene, int(seed)] = dict(moved)
-    across = seeds.groupby(names, sort=False)
-    unsure = of_all["uncertainty"].mean() if "uncertainty" in frame else [None] * len(cells)
-    columns = (
-        across.mean(), across.std(), of_all["stalled"].any(),
-        of_all["seeded"].any(), of_all["pairing_group"].first(), unsure,
-    )  # fmt: skip
-    result = {}
-    for key, value, spread, stalled, seeded, pairing_group, moved in zip(cells, *columns):
-        group = dict(zip(names, key))
-        seeds_here = {seed for _, seed in cells[key]}
-        every_seed = seeds_here | failed.get(_key(group, ends), set())
-        result[key] = Mean(
-            value=float(value),
-            spread=None if pd.isna(spread) else float(spread),
-            seeds=len(seeds_here),
-            asked=int(asked[_key(group, places)]) * len(every_seed),
-            stalled=bool(stalled),
-            seeded=bool(seeded),
-            cells=cells[key],
-            pairing_group=pairing_group,
-            uncertainty=None if pd.isna(moved) else float(moved),
-            moved=changes.get(key, {}),
+    places, ends = ([names.index(key) for key in names if key != name] for name in ("method", "metric"))
+    asked: dict[tuple, set[str]] = defaultdict(set)
+    failed: dict[tuple, set[int]] = defaultdict(set)
+    groups: dict[tuple, _Cells] = defaultdict(_Cells)
+    for key, line in zip(zip(*(frame[name].tolist() for name in names)), _lines(frame)):
+        if line.status != "skipped":
+            asked[tuple(key[place] for place in places)].add(line.scene)
+        if line.usable:
+            groups[key].add(line)
+        elif line.status != "skipped":
+            failed[tuple(key[place] for place in ends)].add(line.seed)
+    made = [
+        cells.mean(
+            len(asked[tuple(key[place] for place in places)]), failed[tuple(key[place] for place in ends)]
         )
+        for key, cells in groups.items()
+    ]
     index = pd.MultiIndex.from_arrays(
-        [list(column) for column in zip(*result)] or [[]] * len(names), names=names
+        [list(column) for column in zip(*groups)] or [[]] * len(names), names=names
     )
-    return pd.Series(list(result.values()), index=index, dtype=object)
+    return pd.Series(made, index=index, dtype=object)
 
 
-def _key(group: Mapping[str, str], names: Sequence[str]) -> tuple | str:
-    return group[names[0]] if len(names) == 1 else tuple(group[name] for name in names)
+class _Line(NamedTuple):
+    """A row as far as means need it; uncertainty: NaN and moved: empty where the frame has no such column."""
+
+    scene: str
+    seed: int
+    status: str
+    usable: bool
+    value: float
+    seeded: bool
+    pairing_group: str
+    uncertainty: float
+    moved: tuple[tuple[str, float], ...]
+
+
+def _lines(frame: pd.DataFrame) -> Iterable[_Line]:
+    without = {"uncertainty": math.nan, "moved": ()}
+    columns = (
+        frame[name].tolist() if name in frame or name not in without else [without[name]] * len(frame)
+        for name in _Line._fields
+    )
+    return map(_Line._make, zip(*columns))
+
+
+class _Cells:
+    """Usable rows of one group while they are read."""
+
+    def __init__(self) -> None:
+        self.by_seed: dict[int, list[float]] = {}
+        self.cells: dict[tuple[str, int], float] = {}
+        self.moved: dict[tuple[str, int], Mapping[str, float]] = {}
+        self.uncertainties: list[float] = []
+        self.stalled = self.seeded = False
+        self.pairing_group = ""
+
+    def add(self, line: _Line) -> None:
+        cell = line.scene, line.seed
+        self.pairing_group = self.pairing_group if self.cells else line.pairing_group
+        self.cells[cell] = line.value
+        self.by_seed.setdefault(line.seed, []).append(line.value)
+        self.stalled |= line.status == "stalled"
+        self.seeded |= line.seeded
+        self.uncertainties += [] if math.isnan(line.uncertainty) else [line.uncertainty]
+        if line.moved:
+            self.moved[cell] = dict(line.moved)
+
+    def mean(self, scenes: int, failed: Set[int]) -> Mean:
+        """Return their mean; scenes: how many should have it, failed: seeds with a cell that failed."""
+        of_seeds = [fmean(values) for values in self.by_seed.values()]
+        return Mean(
+            value=fmean(of_seeds),
+            spread=stdev(of_seeds) if len(of_seeds) > 1 else None,
+            seeds=len(of_seeds),
+            asked=scenes * len(self.by_seed.keys() | failed),
+            stalled=self.stalled,
+            seeded=self.seeded,
+            cells=self.cells,
+            pairing_group=self.pairing_group,
+            uncertainty=fmean(self.uncertainties) if self.uncertainties else None,
+            moved=self.moved,
+        )
 
 
 def mean_of(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ def published_beside(run: Run, method: str) -> str:
     if run.config.get("preset") != DEFAULT or not (PUBLISHED / DEFAULT).is_dir():
         return ""
     try:
-        published = read_run(RunFolder(PUBLISHED / DEFAULT))
+        published = read_published(PUBLISHED / DEFAULT)
     except ResultsError:
         return ""  # of an earlier version
     if published.config.get("started") == run.config.get("started"):
@@ -56,6 +57,12 @@ def published_beside(run: Run, method: str) -> str:
     reach = stats.t.ppf(1.0 - LEVEL / 2.0, len(before) - 1) * before.std(ddof=1)
     reach *= math.sqrt(1.0 + 1.0 / len(before))
     return f"{text}: {'reproduced' if np.all(np.abs(now - before.mean()) <= reach) else 'not reproduced'}"
+
+
+@cache
+def read_published(folder: Path) -> Run:
+    """Return a published run, read once. Raises ResultsError for a run of an earlier version."""
+    return read_run(RunFolder(folder))
 
 
 def _frames(run: Run, scenes: Sequence[str]) -> list[int | None]:

@@ -172,4 +172,6 @@ def compared_excess(
     run: Run, rows: pd.DataFrame, one: str, other: str, metric: str = TOTAL
 ) -> tuple[Mean | None, Mean | None]:
     """Return the mean relative excesses of two methods over the scenes that both have."""
-    return pair(with_relative_excess(run, rows, metric), one, other, relative_metric(metric).name)
+    relative = relative_metric(metric).name
+    rows = rows[rows["metric"].isin([metric, TOTAL, relative]) | ~rows["usable"]]
+    return pair(with_relative_excess(run, rows, metric), one, other, relative)

@@ -26,7 +26,7 @@ def shapes(run: Run) -> list[Table]:
     lines: list[tuple[Cell, ...]] = []
     for name, part in (
         (OTHERS, rows_of_other_shapes(run)),
-        (MEAN_BODY, rows[rows["scene"].map(norms) == 0.0]),
+        (MEAN_BODY, rows[rows["scene"].isin(norms.index[norms == 0.0])]),
     ):
         cells = means(part, "method", "metric")
         lines += [

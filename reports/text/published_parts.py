@@ -18,9 +18,7 @@ from pathlib import Path
 from benchmarks.results.protocol import BEFORE
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks.page_one_sentences import headline
-from reports.run.finished_run import Run
-from reports.run.reading import read_run_with_trainings
-from reports.statistics.published import PUBLISHED
+from reports.statistics.published import PUBLISHED, read_published
 from reports.tables import TABLES
 from reports.tables.table import Table
 from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
@@ -119,9 +117,3 @@ def _table(folder: Path, name: str) -> Table:
 @cache
 def _made(folder: Path, place: int) -> list[Table]:
     return TABLES[place](read_published(folder))
-
-
-@cache
-def read_published(folder: Path) -> Run:
-    """Return a published run, read once."""
-    return read_run_with_trainings(RunFolder(folder))

@@ -165,8 +165,8 @@ def test_a_tie_upholds_what_is_claimed_to_be_on_par(rival, verdict):
 def test_within_the_uncertainty_of_the_reference_is_a_tie():
     run = run_of(seeds("snug", (0.5, 0.51, 0.52)) + seeds("pbns", (1.0, 1.01, 1.0)))
     assert judged(run)[0].verdict == "holds"
-    run.frame["uncertainty"] = 0.5
-    assert judged(run)[0].verdict == "tie"
+    unsure = replace(run, frame=run.frame.assign(uncertainty=0.5))
+    assert judged(unsure)[0].verdict == "tie"
 
 
 def test_means_are_compared_over_the_scenes_that_both_have():
