@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from reference_sim.trajectory.trajectory import Trajectory
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
-COMPARED = ("scene", "method", "metric")  # columns kept as numbers of their texts, compared a hundred times faster
+COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster
 SUITES = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "engines", "performance")
 
 
