@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ PACKAGES = (
 )  # fmt: skip
 
 
+@cache  # of the code that this process has loaded
 def commit() -> str:
     """Return the commit of the checkout, "+changes" where tracked files differ; else the package version."""
     root = Path(__file__).resolve().parent.parent

@@ -102,35 +102,8 @@ RUNS = {
         },
     ),
     "equal_data": PublishedRun(
-        "networks with the same frames and numbers of steps",
-        _validation("snug-data-[01]*,pbns-data-[01]*,supervised-data-[01]*,tailornet-data-[01]*,*-data-3,"
-                    "santesteban2019-data-[01]*,nearest-poses-data-*,pose-regression-data-*"),
-    ),
-    "equal_data_converged": PublishedRun(
-        "the same until a held-out motion no longer improves",
-        _validation("snug-data-converged-*,supervised-data-converged-*,pbns-data-converged-*"),
+        "SNUG and the supervised network with the same frames and steps, on eight validation motions",
+        _validation("snug-data-3,supervised-data-3"),
         ("training",),
-    ),
-    "garments": PublishedRun(
-        "tank top, trousers, shorts, long sleeves",
-        {
-            "": f"--suite garments --split validation {THREE} --methods {REFERENCES},snug,pbns --scenes "
-            "'tank_top/*,long_sleeves/*,trousers/*,shorts/*'"
-        },
-    ),
-    "shapes": PublishedRun(
-        "12 bodies of other shapes",
-        {
-            "": f"--suite shapes {THREE} --methods {REFERENCES},snug,snug-shapes,snug-paper,pbns,"
-            "fast-lbfgs-10,snug+fast-lbfgs-1"
-        },
-    ),
-    "dynamics": PublishedRun(
-        "garments that swing; networks that learn dynamics",
-        {
-            "": f"--suite garments {THREE} --scenes 'tshirt/*,tunic/*' --methods {REFERENCES},snug,"
-            "snug-dynamic,snug-dynamic+fast-lbfgs-2,supervised,pbns,fast-lbfgs-10"
-        },
-        ("hem_tunic-dance_turn",),
     ),
 }  # fmt: skip

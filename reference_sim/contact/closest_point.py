@@ -90,7 +90,8 @@ class FaceSearch:
         count, blocks = -(-len(points) // LANES), len(whole.blocks)
         masks = np.zeros((count, blocks), np.int64)
         list_leaves(*_boxes(points[order]), *_boxes(self._mesh.centroids), region * region, masks)
-        group, block = masks.nonzero()
+        # Without strides, as in the list of all: numba compiles the search once.
+        group, block = map(np.ascontiguousarray, masks.nonzero())
         ends = np.searchsorted(group, np.arange(count + 1))
         met = np.bitwise_or.reduce(masks, axis=0, initial=0)[:, None] >> np.arange(LANES) & 1
         return Listed(

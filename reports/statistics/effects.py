@@ -59,6 +59,7 @@ class Effect:
         covers: the resampled factors: "motions and seeds", "motions", "seeds" or nothing; RANGE of costs.
         motions: how many independent motions both methods have: segments of one recording are one.
         limits: of costs, the least and the greatest of what was measured, on the scale.
+        possible: the least and the greatest effect that there can be, which cut the interval.
         uncertainty: standard deviation of the value over the reference's ensemble; 0 where no member changes
             it, or none ran.
         unit: of a plain difference, what 1 is of: TIE of it is no difference; 0 where that is unknown.
@@ -74,6 +75,7 @@ class Effect:
     covers: str = ""
     motions: int = 1
     limits: tuple[float, float] | None = None
+    possible: tuple[float, float] = (-math.inf, math.inf)
     uncertainty: float = 0.0
     unit: float = 0.0
     complete: bool = True
@@ -95,8 +97,8 @@ class Effect:
         """Ends of the interval on the scale."""
         if self.error is None:
             return self.limits
-        reach = self._quantile * self.error
-        return self.value - reach, self.value + reach
+        reach, (least, greatest) = self._quantile * self.error, self.possible
+        return max(self.value - reach, least), min(self.value + reach, greatest)
 
     @property
     def margin(self) -> float:

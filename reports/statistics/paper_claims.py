@@ -16,7 +16,7 @@ import pandas as pd
 from benchmarks.results.row import BEFORE_FRAMES
 from reports.run.finished_run import Metric, Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
-from reports.statistics.frame_shares import half_of, share_of_frames, with_shares
+from reports.statistics.frame_shares import HALF, half_of, share_of_frames, with_shares
 from reports.statistics.means_and_spreads import pair
 from reports.statistics.verdicts import (
     LESS,
@@ -228,6 +228,7 @@ def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
         rows = rows[(rows["metric"] == metric.name) | ~rows["usable"]]
         one, other = pair(rows, claim.lower, claim.higher, metric.name)
         far = effect(one, half_of(one), DIFFERENCE) if one and other else None
+        far = replace(far, possible=(-HALF, HALF)) if far else None
         if far and far.error is None and far.motions > 1:  # all or none of the frames in every motion
             far = replace(far, error=0.0, covers="motions")
         return Comparison(metric, one, other, far)

@@ -109,6 +109,7 @@ def test_an_engine_that_explodes_says_when():
         roll_out(fake(gravity=1e9), specimen("falling"))
 
 
+@pytest.mark.slow
 def test_the_reference_keeps_all_laws():
     for case in CASES:
         if case.method == "reference" and case.function == "law" and "strip" not in case.options.values():

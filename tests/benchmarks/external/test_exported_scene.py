@@ -156,7 +156,9 @@ def exported(folder: Path):
     return names["Exported"](folder)
 
 
-@pytest.mark.parametrize("name", ["skinning", "simulation", "sunk"])
+@pytest.mark.parametrize(
+    "name", ["simulation", *(pytest.param(name, marks=pytest.mark.slow) for name in ("skinning", "sunk"))]
+)
 def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name):
     """In numpy, by the example of the documents, which shares nothing with the project's code."""
     folder, scene = home

@@ -159,7 +159,10 @@ def fail(settings):
 
 @pytest.mark.parametrize(
     ("function", "reason"),
-    [("die", "the process ended with status 7"), ("fail", "ValueError: no such thing")],
+    [
+        pytest.param("die", "the process ended with status 7", marks=pytest.mark.slow),
+        ("fail", "ValueError: no such thing"),
+    ],
 )
 def test_one_that_dies_or_raises_is_a_row_and_exit_1(function, reason, tmp_path, without_report, capsys):
     bad = Microbenchmark(name="bad/one", description="", module=__name__, function=function)

@@ -50,8 +50,10 @@ def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, message, 
 
 
 SWALLOWED = """
-import sys, time
+import signal, sys, time
 from reference_sim.command.command_line import command
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever starts tests in the background has it off
 
 class Swallows:  # its end interrupts, as a Ctrl-C that comes while h5py's weak references are called back
     def __del__(self):

@@ -161,6 +161,7 @@ def test_an_edit_of_a_kernel_that_is_an_argument_is_seen(project, run):
     assert run(CALL_GIVEN, project) == ["25.0 0.0", "1"]
 
 
+@pytest.mark.slow
 def test_a_copy_takes_its_compiled_kernels_along(project, call):
     call(project)
     copy = project / "elsewhere" / "copy"
@@ -189,6 +190,7 @@ def test_without_any_folder_kernels_are_compiled_in_the_process(project, run):
     assert run(code, project, NUMBA_CACHE_DIR=str(project / "no")) == ["640 None"]
 
 
+@pytest.mark.slow
 def test_old_folders_go_and_those_of_other_modules_stay(project, call):
     for k in range(KEPT + 1):
         (project / "constants.py").write_text(f"FACTOR = {k}\n")

@@ -292,3 +292,13 @@ def test_a_claim_of_frames_is_judged_by_the_share_of_them(snug, verdict):
     share = 25.0 * sum(1.0 / frames for frames in (10, 9, 8, 7))
     assert line.compared.one.value == pytest.approx(share if verdict == "holds" else 100.0 - share)
     assert line.claim.relation == "< in most frames" and "%" in line.compared.metric.heading
+
+
+def test_the_interval_of_a_share_of_frames_ends_where_shares_do():
+    run = run_of(seeds("snug", (1.0, 1.1)) + seeds("pbns", (1.2, 1.15)))
+    frames = frame_table(snug=[[1.0] * 10] * 2, pbns=[[2.0] * 10] * 2)
+    one = (frames["method"] == "snug") & (frames["scene"] == MOTIONS[0]) & (frames["seconds"] < 0.05)
+    frames.loc[one, "strain"] = 3.0  # in one frame of one motion: Student's interval reaches below no frame
+    name = share_of_frames("strain").name
+    (line,) = (f for f in judged(replace(run, frame_energies=frames)) if f.claim.metric == name)
+    assert line.compared.effect.interval[0] == -50.0 < line.compared.effect.value

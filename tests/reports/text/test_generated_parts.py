@@ -68,9 +68,9 @@ def test_every_claim_has_a_row_whether_or_not_a_run_judges_it(kind, claims):
 
 
 def test_each_run_has_a_row_with_its_commit_and_a_metric_its_definition():
-    lines = published_part("runs of quick, shapes").splitlines()[2:]
-    assert [line.split(" | ")[0] for line in lines] == ["| quick", "| shapes"]  # quick was merged of two
-    commits = [RunFolder(PUBLISHED / name).read_config()["commit"] for name in ("quick", "shapes")]
+    lines = published_part("runs of quick, handles").splitlines()[2:]
+    assert [line.split(" | ")[0] for line in lines] == ["| quick", "| handles"]  # quick was merged of two
+    commits = [RunFolder(PUBLISHED / name).read_config()["commit"] for name in ("quick", "handles")]
     assert [line.split(" | ")[2] for line in lines] == commits
     assert "| `energy/wind` |" not in published_part("metrics")
     assert f"| `distance/rms` | mm | {find_metric('distance/rms').definition} |" in published_part("metrics")

@@ -19,7 +19,7 @@ PLAIN = replace(DEFAULT, mixed=0.0)
 
 
 def made(recipe, kind="snug"):
-    return Trainer(kind, tube_dress(), [swaying(144)], steps=20, seed=0, recipe=recipe, kernels=False)
+    return Trainer(kind, tube_dress(), [swaying(48)], steps=20, seed=0, recipe=recipe, kernels=False)
 
 
 class Replayed(CudaGraph):
@@ -66,8 +66,14 @@ def equal_states(plain, captured):
         assert torch.allclose(tensor.double(), theirs[name].double(), rtol=1e-4, atol=1e-6), name
 
 
-@pytest.mark.parametrize("kind", ["snug", "pbns"])
-@pytest.mark.parametrize("recipe", [PLAIN, PAPER], ids=["default", "paper"])
+@pytest.mark.parametrize(
+    ("kind", "recipe"),
+    [
+        ("snug", PLAIN),
+        ("pbns", PAPER),
+        *(pytest.param(*both, marks=pytest.mark.slow) for both in (("pbns", PLAIN), ("snug", PAPER))),
+    ],
+)
 def test_a_captured_step_is_the_step(kind, recipe, monkeypatch):
     """The replayed step gives the numbers of the step in single operations, and leaves the same behind."""
     recipe = replace(recipe, contact_refresh=0.1, window_stride=1)  # frames that come twice in a step of snug
@@ -83,7 +89,9 @@ def test_a_captured_step_is_the_step(kind, recipe, monkeypatch):
     equal_states(plain, captured)
 
 
-@pytest.mark.parametrize("energy", [0.0, np.nan], ids=["high", "not finite"])
+@pytest.mark.parametrize(
+    "energy", [pytest.param(0.0, id="high", marks=pytest.mark.slow), pytest.param(np.nan, id="not finite")]
+)
 def test_a_batch_that_is_not_followed_is_left_to_single_operations(energy, monkeypatch):
     """A window above the limit, or without an energy: the guard sees the batch once; later steps go on."""
     plain, captured = capturing(monkeypatch, PLAIN)
