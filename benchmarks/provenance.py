@@ -17,7 +17,7 @@ PACKAGES = (
 )  # fmt: skip
 
 
-@cache  # of the code that this process has loaded
+@cache  # that of the first call, which is nearer to the code that was loaded than a later one
 def commit() -> str:
     """Return the commit of the checkout, "+changes" where tracked files differ; else the package version."""
     root = Path(__file__).resolve().parent.parent

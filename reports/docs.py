@@ -23,13 +23,12 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
         ValueError: for a part of no known form or without an end; names the document.
     """
     from reports.entries.page import ENTRIES, PAGE, page_of
-    from reports.statistics.published import DEFAULT, PUBLISHED
+    from reports.statistics.published import DEFAULT, PUBLISHED, read_published
     from reports.text.generated_parts import fill  # loads pandas
     from reports.text.published_parts import (
         LIBRARY_FILES,
         library_file,
         published_part,
-        read_published,
     )
 
     for path in sorted([root / "README.md", *(root / "docs").rglob("*.md")]):

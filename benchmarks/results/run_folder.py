@@ -175,11 +175,11 @@ class RunFolder:
         names = tuple(next(reader, ()))
         if names != tuple(name for name in COLUMNS if name in names or name not in LATER):
             raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
-        for cells in reader:
+        for cells in filter(None, reader):  # a blank line is no row
             try:
-                if cells and len(cells) != len(names):
+                if len(cells) != len(names):
                     raise ResultsError(f"{len(names)} cells are expected")
-                rows += [cells_to_row(dict(zip(names, cells)))] if cells else []
+                rows.append(cells_to_row(dict(zip(names, cells))))
             except ResultsError as error:
                 raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
         return rows

@@ -13,6 +13,7 @@ from reports.run.finished_run import Run
 from reports.statistics import paper_claims
 from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
 from reports.statistics.break_even import NETWORK, compared_scenes
+from reports.statistics.effects import RECORDING, recording_of
 from reports.statistics.means_and_spreads import pair, value_of
 from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads, subjects
 from reports.statistics.pareto import (
@@ -95,11 +96,15 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
 
 def _repeated(excess: Excess) -> str:
     """Return what the means are taken over: "motions", or "11 independent sources" and what these are."""
+    sources = {recording_of(scene) for scene in excess.by_motion}
+    recordings = sum(bool(RECORDING.search(name)) for name in sources)
     count = excess.effect.motions
     if count == len(excess.by_motion):
         return "motions"
-    sources = "recordings, whose segments are averaged first, and motions made by code"
-    return f"{count} independent sources: {sources}"
+    others = count - recordings
+    more = f", and {others} other motion{'' if others == 1 else 's'}" if others else ""
+    recorded = f"{recordings} recording{'' if recordings == 1 else 's'}"
+    return f"{count} independent sources: {recorded}, whose segments are averaged first{more}"
 
 
 def _joined(sentences: Sequence[str]) -> str:

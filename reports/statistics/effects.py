@@ -255,13 +255,17 @@ def _moved_by(mean: Mean, name: str, scale: str) -> float:
     return float(np.mean(list(mean_by_recording(changes).values())))
 
 
+SEGMENT = re.compile(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)")
+RECORDING = re.compile(r"/\d+_\d+(@|$)")  # names of clips of the library, as `recording_of` gives them
+
+
 def recording_of(scene: str) -> str:
     """Return the name of a scene, for a segment of a recording that of the whole: without its letter.
 
     >>> recording_of("tshirt/01_01_a@clip"), recording_of("tshirt/06_15"), recording_of("tshirt/kick")
     ('tshirt/01_01@clip', 'tshirt/06_15', 'tshirt/kick')
     """
-    return re.sub(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)", r"\1", scene)
+    return SEGMENT.sub(r"\1", scene)
 
 
 def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:

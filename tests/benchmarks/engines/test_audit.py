@@ -109,14 +109,18 @@ def test_an_engine_that_explodes_says_when():
         roll_out(fake(gravity=1e9), specimen("falling"))
 
 
-@pytest.mark.slow
-def test_the_reference_keeps_all_laws():
-    for case in CASES:
-        if case.method == "reference" and case.function == "law" and "strip" not in case.options.values():
-            row = case.run()
-            assert row.status == "ok", row.reason
-            assert row.tolerance is None or abs(row.value - row.expected) < 1e-3 * row.tolerance
-            assert "MIT" in row.reason and row.method == "reference"
+HUNG = [pytest.param(name, marks=pytest.mark.slow) for name in ("hanging", "strip")]
+
+
+@pytest.mark.parametrize("sample", ["falling", "thrown", *HUNG])
+def test_the_reference_keeps_all_laws(sample):
+    laws = [case for case in CASES if case.method == "reference" and case.options.get("sample") == sample]
+    for case in laws:
+        row = case.run()
+        assert row.status == "ok", row.reason
+        assert row.tolerance is None or abs(row.value - row.expected) < 1e-3 * row.tolerance
+        assert "MIT" in row.reason and row.method == "reference"
+    assert laws
 
 
 def test_the_least_budget_is_one_from_which_all_are_near():

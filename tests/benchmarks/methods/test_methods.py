@@ -1,4 +1,4 @@
-"""Every method on every scene, tiny: a whole trajectory or an explained skip; and what metrics make of it."""
+"""Every method on every scene (sweeps on two), tiny: a trajectory or an explained skip; and its metrics."""
 
 from __future__ import annotations
 

@@ -49,6 +49,15 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     assert near(rows + on_two_scenes("simulation-perturbed-1e-4", 0.5, 7.0)) == near(rows)
 
 
+def test_page_one_says_what_the_independent_sources_are():
+    scenes = [f"tshirt/{name}" for name in ("01_01_a", "01_01_b", "05_03", "kick")]
+    energies = {"simulation": 0.0, "skinning": 10.0, "snug": 1.0}
+    rows = [row(s, method, "energy/total", e) for s in scenes for method, e in energies.items()]
+    sources = "3 independent sources: 2 recordings, whose segments are averaged first, and 1 other motion."
+    assert f"geometric means over {sources}" in near(rows)
+    assert "2 recordings, whose segments are averaged first. The" in near(rows[:9])
+
+
 def test_of_a_family_of_networks_page_one_has_the_last():
     handles = [
         dataclasses.replace(r, family="handles", level=level)
