@@ -61,7 +61,7 @@ def published_beside(run: Run, method: str) -> str:
 
 @cache
 def read_published(folder: Path) -> Run:
-    """Return a published run, read once; it has no networks. Raises ResultsError for a run of an earlier version."""
+    """Return a published run, read once. Raises ResultsError for a run of an earlier version."""
     return read_run(RunFolder(folder))
 
 
