@@ -102,7 +102,7 @@ RUNS = {
         },
     ),
     "equal_data": PublishedRun(
-        "SNUG and the supervised network with the same frames and steps, on eight validation motions",
+        "SNUG and the supervised network with as many frames and steps, on eight validation motions",
         _validation("snug-data-3,supervised-data-3"),
         ("training",),
     ),

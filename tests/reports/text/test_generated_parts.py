@@ -21,7 +21,7 @@ from reports.text.published_parts import (
 from snug.motion.library import TEST
 from snug.motion.recorded.table import CLIPS, clip_of
 
-JUDGED = "quick, paper_text, ablations"  # as in the documents: what has been judged is kept
+JUDGED = "quick, paper_text, ablations, equal_data"  # as in the documents: what has been judged is kept
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_a_later_run_judges_what_those_before_it_cannot_and_nothing_else():
     ]  # names of methods are not
     assert len(judged) > 3
     assert all(before[-2] == "not measured" for before, _ in judged)
-    assert {after[-1] for _, after in judged} == {"paper_text |", "ablations |"}
+    assert {after[-1] for _, after in judged} == {"paper_text |", "ablations |", "equal_data |"}
 
 
 def test_files_of_the_library_are_documents_and_have_every_clip_and_motion(project):
