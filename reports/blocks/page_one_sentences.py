@@ -96,11 +96,11 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
 
 def _repeated(excess: Excess) -> str:
     """Return what the means are taken over: "motions", or "11 independent sources" and what these are."""
-    sources = {recording_of(scene) for scene in excess.by_motion}
-    recordings = sum(bool(RECORDING.search(name)) for name in sources)
     count = excess.effect.motions
     if count == len(excess.by_motion):
         return "motions"
+    sources = {recording_of(scene) for scene in excess.by_motion}
+    recordings = sum(bool(RECORDING.search(name)) for name in sources)
     others = count - recordings
     more = f", and {others} other motion{'' if others == 1 else 's'}" if others else ""
     recorded = f"{recordings} recording{'' if recordings == 1 else 's'}"

@@ -96,6 +96,7 @@ class Run:
     histories: Sequence[History] = ()
     roll_outs: NoRollOuts = field(default_factory=NoRollOuts)
     problems: list[str] = field(default_factory=list)
+    _cells: dict[tuple[str, ...], pd.DataFrame] = field(default_factory=dict, init=False)
 
     def suite(self, *names: str) -> pd.DataFrame:
         """Return the rows of these suites."""
@@ -104,17 +105,11 @@ class Run:
     def cells(self, *suites: str) -> pd.DataFrame:
         """Return the rows of these suites that are no case, each cell from the first suite that has it."""
         if suites not in self._cells:
-            self._cells[suites] = self._cells_of(suites)
+            kept = self.suite(*suites)
+            kept = kept[kept["case"] == ""]
+            kept = kept.sort_values("suite", key=lambda s: s.map(suites.index), kind="stable")
+            self._cells[suites] = kept.drop_duplicates(["scene", "method", "seed", "metric"])
         return self._cells[suites]
-
-    @cached_property
-    def _cells(self) -> dict[tuple[str, ...], pd.DataFrame]:
-        return {}
-
-    def _cells_of(self, suites: Sequence[str]) -> pd.DataFrame:
-        kept = self.suite(*suites)
-        kept = kept[kept["case"] == ""].sort_values("suite", key=lambda s: s.map(suites.index), kind="stable")
-        return kept.drop_duplicates(["scene", "method", "seed", "metric"])
 
     @cached_property
     def garment_rows(self) -> pd.DataFrame:

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from statistics import fmean, stdev
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -70,23 +71,21 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
         keys: columns that make a group, such as "garment", "method", "metric"; the last two are among them.
     """
     names = list(keys)
-    places, ends = ([names.index(key) for key in names if key != name] for name in ("method", "metric"))
-    asked: dict[tuple, set[str]] = defaultdict(set)
-    failed: dict[tuple, set[int]] = defaultdict(set)
-    groups: dict[tuple, _Cells] = defaultdict(_Cells)
+    place, end = (
+        itemgetter(*(names.index(key) for key in names if key != name)) for name in ("method", "metric")
+    )
+    asked: dict[Any, set[str]] = defaultdict(set)
+    failed: dict[Any, set[int]] = defaultdict(set)
+    groups: dict[tuple, list[_Line]] = defaultdict(list)
     for key, line in zip(zip(*(frame[name].tolist() for name in names)), _lines(frame)):
-        if line.status != "skipped":
-            asked[tuple(key[place] for place in places)].add(line.scene)
+        if line.status == "skipped":
+            continue
+        asked[place(key)].add(line.scene)
         if line.usable:
-            groups[key].add(line)
-        elif line.status != "skipped":
-            failed[tuple(key[place] for place in ends)].add(line.seed)
-    made = [
-        cells.mean(
-            len(asked[tuple(key[place] for place in places)]), failed[tuple(key[place] for place in ends)]
-        )
-        for key, cells in groups.items()
-    ]
+            groups[key].append(line)
+        else:
+            failed[end(key)].add(line.seed)
+    made = [_mean(lines, len(asked[place(key)]), failed[end(key)]) for key, lines in groups.items()]
     index = pd.MultiIndex.from_arrays(
         [list(column) for column in zip(*groups)] or [[]] * len(names), names=names
     )
@@ -116,43 +115,25 @@ def _lines(frame: pd.DataFrame) -> Iterable[_Line]:
     return map(_Line._make, zip(*columns))
 
 
-class _Cells:
-    """Usable rows of one group while they are read."""
-
-    def __init__(self) -> None:
-        self.by_seed: dict[int, list[float]] = {}
-        self.cells: dict[tuple[str, int], float] = {}
-        self.moved: dict[tuple[str, int], Mapping[str, float]] = {}
-        self.uncertainties: list[float] = []
-        self.stalled = self.seeded = False
-        self.pairing_group = ""
-
-    def add(self, line: _Line) -> None:
-        cell = line.scene, line.seed
-        self.pairing_group = self.pairing_group if self.cells else line.pairing_group
-        self.cells[cell] = line.value
-        self.by_seed.setdefault(line.seed, []).append(line.value)
-        self.stalled |= line.status == "stalled"
-        self.seeded |= line.seeded
-        self.uncertainties += [] if math.isnan(line.uncertainty) else [line.uncertainty]
-        if line.moved:
-            self.moved[cell] = dict(line.moved)
-
-    def mean(self, scenes: int, failed: Set[int]) -> Mean:
-        """Return their mean; scenes: how many should have it, failed: seeds with a cell that failed."""
-        of_seeds = [fmean(values) for values in self.by_seed.values()]
-        return Mean(
-            value=fmean(of_seeds),
-            spread=stdev(of_seeds) if len(of_seeds) > 1 else None,
-            seeds=len(of_seeds),
-            asked=scenes * len(self.by_seed.keys() | failed),
-            stalled=self.stalled,
-            seeded=self.seeded,
-            cells=self.cells,
-            pairing_group=self.pairing_group,
-            uncertainty=fmean(self.uncertainties) if self.uncertainties else None,
-            moved=self.moved,
-        )
+def _mean(lines: Sequence[_Line], scenes: int, failed: Set[int]) -> Mean:
+    """Return the mean of usable rows; scenes: how many should have it, failed: seeds with a failed cell."""
+    by_seed: dict[int, list[float]] = {}
+    for line in lines:
+        by_seed.setdefault(line.seed, []).append(line.value)
+    of_seeds = [fmean(values) for values in by_seed.values()]
+    uncertainties = [line.uncertainty for line in lines if not math.isnan(line.uncertainty)]
+    return Mean(
+        value=fmean(of_seeds),
+        spread=stdev(of_seeds) if len(of_seeds) > 1 else None,
+        seeds=len(of_seeds),
+        asked=scenes * len(by_seed.keys() | failed),
+        stalled=any(line.status == "stalled" for line in lines),
+        seeded=any(line.seeded for line in lines),
+        cells={(line.scene, line.seed): line.value for line in lines},
+        pairing_group=lines[0].pairing_group,
+        uncertainty=fmean(uncertainties) if uncertainties else None,
+        moved={(line.scene, line.seed): dict(line.moved) for line in lines if line.moved},
+    )
 
 
 def mean_of(

@@ -232,9 +232,10 @@ def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
         rows = with_shares(frame, run.frame_energies, claim.of_frames, claim.lower, claim.higher)
         rows = rows[(rows["metric"] == metric.name) | ~rows["usable"]]
         one, other = pair(rows, claim.lower, claim.higher, metric.name)
-        far = effect(one, half_of(one), DIFFERENCE) if one and other else None
-        far = replace(far, possible=(-HALF, HALF)) if far else None
-        if far and far.error is None and far.motions > 1:  # all or none of the frames in every motion
+        if one is None or other is None:
+            return Comparison(metric, one, other, None)
+        far = replace(effect(one, half_of(one), DIFFERENCE), possible=(-HALF, HALF))
+        if far.error is None and far.motions > 1:  # all or none of the frames in every motion
             far = replace(far, error=0.0, covers="motions")
         return Comparison(metric, one, other, far)
     metric = BEFORE if claim.metric == BEFORE.name else run.metrics.get(claim.metric, Metric(claim.metric))
