@@ -57,7 +57,9 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
             return 0
         from benchmarks.process.isolated_process import LOADED_BY_DRESSED, start_loading
         from benchmarks.runner.execute_plan import check_roll_outs, execute
+        from reference_sim.progress import announce_compilation
 
+        announce_compilation()
         dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
         start_loading(*(LOADED_BY_DRESSED if dressed else ()))
         assets = check_roll_outs(plan)

@@ -1,8 +1,11 @@
-"""Progress bar of long work, with the time left."""
+"""What long work shows while it goes on: a bar with the time left, and a word before kernels are compiled."""
 
 from __future__ import annotations
 
+import os
 import sys
+from itertools import chain
+from pathlib import Path
 from typing import Any
 
 SECONDS_OF_A_LOG = 30.0  # between two lines; on a terminal the line is drawn ten times a second
@@ -28,3 +31,17 @@ def progress_bar(*args: Any, expected_rate: float = 0.0, **options: Any) -> Any:
 
     seconds = 0.1 if sys.stderr.isatty() else SECONDS_OF_A_LOG
     return SteadyBar(*args, mininterval=seconds, maxinterval=max(10.0, seconds), **options)
+
+
+def announce_compilation() -> None:
+    """Say on stderr that kernels will be compiled, where none lies compiled on disk.
+
+    The places are those of reference_sim.kernels.kernel_cache, which is not imported: it loads numba.
+    """
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        folders = [Path(given)]
+    else:
+        of_user = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folders = [Path(__file__).parent, Path(of_user, "numba")]
+    if not any(chain.from_iterable(folder.rglob("reference_sim.*-*/*.nbi") for folder in folders)):
+        print("first use: kernels are compiled, which takes one to five minutes once", file=sys.stderr)

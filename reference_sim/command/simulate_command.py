@@ -18,7 +18,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     @command(PROGRAM, goes_on=f"--resume goes on from {options.output}")
     def run() -> int:
         from reference_sim.command.simulate_run import simulate_files  # loads the solver: not for --help
+        from reference_sim.progress import announce_compilation
 
+        announce_compilation()
         return simulate_files(options)
 
     return run()

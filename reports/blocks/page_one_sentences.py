@@ -31,12 +31,13 @@ from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods,
 from reports.tables.number_texts import duration, number
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
+SENTENCE = re.compile(r"(?<=[^\d]\.) (?=[A-Z0-9])")  # its end
 SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
 
 
 @lru_cache(maxsize=4)
 def headline(run: Run) -> list[tuple[str, str]]:
-    """Return (topic, sentence) for each topic of page one that the run can tell."""
+    """Return (topic, sentences) for each topic of page one that the run can tell."""
     scenes = next(iter(run.garments(run.garment_rows).values()), [])
     worn = run.garment_rows[run.garment_rows["scene"].isin(scenes)]
     cells = run.cells("speed", "garments")
@@ -49,6 +50,11 @@ def headline(run: Run) -> list[tuple[str, str]]:
         "Textile tests": textile_tests(run), "Engines": engines(run),
     }  # fmt: skip
     return [(topic, unbroken(sentence)) for topic, sentence in sentences.items() if sentence]
+
+
+def first_sentences(run: Run) -> list[str]:
+    """Return the first sentence of each topic of page one that the run can tell."""
+    return [SENTENCE.split(sentences)[0] for _, sentences in headline(run)]
 
 
 def _near(run: Run, worn: pd.DataFrame) -> str:
@@ -65,13 +71,15 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     count = len(excess.by_motion)
     beside = published_beside(run, first)
     motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
+    paired = [f"; {says}" for says in _paired(run, worn, first, others)]
+    shares = [
+        f"{run.label(first)} has a relative excess of {_share(excess)}{f', {beside}' if beside else ''}",
+        *(f"{run.label(name)} of {_share(known[name])}" for name in others),
+    ]
     sentences = [
-        f"On {motions} {run.label(first)} has a "
-        f"relative excess of {_share(excess)}{f', {beside}' if beside else ''}, where the energy of the "
-        "reference simulation is 0 % and that of skinning alone 100 %",
-        _against_reference(excess),
-        *(f"{run.label(name)} has {_share(known[name])}" for name in others),
-        *_paired(run, worn, first, others),
+        f"On {motions} {listed(shares)}, where the energy of the reference simulation is 0 % and that of "
+        f"skinning alone 100 %{''.join(paired)}",
+        _against_reference(run.label(first), excess),
     ]
     if count > 1:
         scene, worst = excess.worst
@@ -119,14 +127,14 @@ def _share(excess: Excess) -> str:
     return f"{number(excess.typical, 2)} %{ends}"
 
 
-def _against_reference(excess: Excess) -> str:
-    """Say how the energy of a method compares with the reference's."""
+def _against_reference(label: str, excess: Excess) -> str:
+    """Say how the energy of the method with this label compares with the reference's."""
     stands = standing(excess.effect, excess.effect.p_value())
     return {
-        TIED: "this is a tie with the reference",
-        MORE: "the excess is larger than the uncertainty of the reference",
-        LESS: "this is less than the reference has, which is no better: cloth that moves less has less",
-    }.get(stands, "whether this differs from the reference is inconclusive")
+        TIED: f"{label} ties with the reference",
+        MORE: f"the excess of {label} is larger than the uncertainty of the reference",
+        LESS: f"{label} has less energy than the reference, which is no better: still cloth has less",
+    }.get(stands, f"whether {label} differs from the reference is inconclusive")
 
 
 def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> list[str]:
@@ -202,17 +210,25 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
     training = value_of(run.garment_rows, network, "cost/train")
     whole = " end to end" if compared.metric.name == "cost/whole" else ""
     where = f" {_in_scenes(len(scenes))}" if scenes else ""
+    solver, gaps = _rivals(run, run.cells("speed", "garments"), scenes) if scenes else ("", "")
     return _joined([
         f"{run.label(network)} takes {own} ms a frame{whole} on one core{where}, the simulation {times} "
-        "times as long",
-        f"its training took {duration(training)}" if training else "",
-        *(_rivals(run, run.cells("speed", "garments"), scenes) if scenes else ()),
+        f"times as long{solver}",
+        gaps,
+        f"the training of {run.label(network)} took {duration(training)}" if training else "",
     ])  # fmt: skip
 
 
 def _trust(run: Run, timed: pd.DataFrame) -> str:
-    """Say how uncertain the reference itself is, what its time step leaves out, and how claims came out."""
+    """Say which claims hold, how uncertain the reference itself is, and what its time step leaves out."""
     sentences = []
+    lines = paper_claims.judged(run)
+    counted = paper_claims.counts(lines)
+    if counted:
+        total = counted.total()
+        claims = f"{total} primary claim{'' if total == 1 else 's'}"
+        sentences.append(f"of {claims} taken from the paper {paper_claims.in_words(counted)}")
+        sentences += _claims_that_fail(run, lines)
     where = _in_scenes(timed[timed["method"] == run.reference]["scene"].nunique())
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
@@ -235,13 +251,6 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
             "The reference is converged in each time step of 1/30 s, but not in the step size: with "
             f"{steps} steps a frame {' and '.join(words)} as large{distance}, {where}"
         )
-    lines = paper_claims.judged(run)
-    counted = paper_claims.counts(lines)
-    if counted:
-        total = counted.total()
-        claims = f"{total} primary claim{'' if total == 1 else 's'}"
-        sentences.append(f"of {claims} taken from the paper {paper_claims.in_words(counted)}")
-        sentences += _claims_that_fail(run, lines)
     return _joined(sentences)
 
 
@@ -262,34 +271,34 @@ def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
     return [name for name, method in run.methods.items() if method.family == SMALLER_STEPS and name in have]
 
 
-def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
-    """Say what beats the network by energy gap, and which solver stopped early is as accurate."""
+def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> tuple[str, str]:
+    """Return a clause on the solver stopped early that is as accurate, and a sentence on energy gaps."""
     points = points_of(run, frame, scenes, GAP)
     network = next((p for p in points if p.method == NETWORK), None)
     if network is None:
-        return []
+        return "", ""
     snug = run.label(network.method)
     best, solver = beaten_by(points, network), fastest(truncated(run, points), network.error)
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
         others = f"of the methods measured {'in all of these scenes' if partly_measured else 'here'}"
-        sentences = [
+        gaps = (
             f"{snug} has an energy gap, the energy above the minimum of each time step, of "
             f"{number(network.error)} J{network.fewer}; {others} none is as fast and has a smaller gap"
-        ]
+        )
     else:
         within = " within repeats" if best.time > network.time else ""
         apart = network.error - best.error > network.error_spread + best.error_spread
         scatter = "" if apart else ", by less than seeds and equally valid simulations scatter"
-        sentences = [
+        gaps = (
             f"{run.label(best.method)} is no slower{within} and has an energy gap of {number(best.error)} J"
             f"{best.fewer}, below the {number(network.error)} J{network.fewer} of {snug}{scatter}"
-        ]
-    if solver:
-        costs = f"{run.label(solver.method)}, {number(solver.time)} ms a frame"
-        sentences.append(f"the fastest solver stopped early whose gap is no larger is {costs}")
-    return sentences
+        )
+    if solver is None:
+        return "", gaps
+    costs = f"{number(solver.time)} ms ({run.label(solver.method)})"
+    return f", the fastest solver stopped early whose energy gap is no larger {costs}", gaps
 
 
 def _on_other_bodies(run: Run) -> str:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 
-from reports.blocks.page_one_sentences import headline
+from reports.blocks.page_one_sentences import first_sentences
 from reports.run.finished_run import Run
 from reports.tables.table import Table
 from reports.text.text_table import aligned_text, remarks_on, text_rows
@@ -17,7 +16,6 @@ COLUMNS = (
     "gap/energy", "faster",
 )  # fmt: skip
 MOST_COLUMNS = 5  # of COLUMNS, without the intervals of effects
-SENTENCE = re.compile(r"(?<=[^\d]\.) (?=[A-Z0-9])")  # its end
 
 
 def answer(run: Run, tables: Mapping[str, Table]) -> str:
@@ -32,8 +30,7 @@ def answer(run: Run, tables: Mapping[str, Table]) -> str:
         rows = text_rows(run, table, [name for name in COLUMNS if name in names][:MOST_COLUMNS])
         lines.append(aligned_text(rows))
         notes = [remarks_on(rows), f"The report also has {', '.join(left_out)}." if left_out else ""]
-    sentences = [SENTENCE.split(sentence)[0] for _, sentence in headline(run)[:1]]
-    lines.append(" ".join(filter(None, [*sentences, *notes])))
+    lines.append(" ".join(filter(None, [*first_sentences(run)[:1], *notes])))
     return "\n".join(filter(None, lines)).replace("\u00a0", " ")
 
 

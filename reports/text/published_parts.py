@@ -1,11 +1,12 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
-`headline of RUN`, `table NAME of RUN; COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN,
-...`, `counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of reports/published, and the first run that
-has both methods of a claim judges it. `attributes of MODULE.CLASS`, `docstring of MODULE` (its table),
-`recipes of NAME, ...`, `sources of the library` and the parts that `code_parts.PARTS` names come from the
-code, `evaluations of published runs` from the run.json of each run; `attributes` and `options of
-benchmarks.run` take names after a semicolon, whose rows alone are shown, in that order.
+`headline of RUN`, `answer of RUN` (first sentence of each topic of the headline), `table NAME of RUN;
+COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN, ...`, `counts of RUN, ...`, `runs of
+RUN, ...`; RUN is a folder of reports/published, and the first run that has both methods of a claim judges it.
+`attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of NAME, ...`, `sources of the
+library` and the parts that `code_parts.PARTS` names come from the code, `evaluations of published runs` from
+the run.json of each run; `attributes` and `options of benchmarks.run` take names after a semicolon, whose
+rows alone are shown, in that order.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.results.protocol import BEFORE
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks.page_one_sentences import headline
+from reports.blocks.page_one_sentences import first_sentences, headline
 from reports.statistics.published import PUBLISHED, read_published
 from reports.tables import TABLES
 from reports.tables.table import Table
@@ -28,9 +29,10 @@ from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.motion.composition import clip_rows, distance_rows, source_rows
 
 FORMS = (
-    "headline of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; claims exploratory of RUN, "
-    "...; counts of RUN, ...; runs of RUN, ...; attributes of MODULE.CLASS; NAME, ...; docstring of MODULE; "
-    f"recipes of NAME, ...; sources of the library; evaluations of published runs; {'; '.join(PARTS)}"
+    "headline of RUN; answer of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; claims "
+    "exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; attributes of MODULE.CLASS; NAME, ...; "
+    "docstring of MODULE; recipes of NAME, ...; sources of the library; evaluations of published runs; "
+    f"{'; '.join(PARTS)}"
 )
 
 LIBRARY_FILES = {"library_clips.csv": clip_rows, "library_distances.csv": distance_rows}  # in docs/
@@ -59,6 +61,8 @@ def published_part(words: str) -> str:
         return markdown_table(evaluation_rows(PUBLISHED))
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
+    if kind == "answer":
+        return " ".join(first_sentences(read_published(folders[0])))
     if kind == "table":
         table = _table(folders[0], name)
         rows = text_rows(read_published(folders[0]), table, wanted)

@@ -2,7 +2,7 @@
 
 import io
 
-from reference_sim.progress import BELIEVED, progress_bar
+from reference_sim.progress import BELIEVED, announce_compilation, progress_bar
 
 
 def _time_left(*, done, seconds, **options):
@@ -25,3 +25,14 @@ def test_time_left_follows_what_is_measured_in_the_end():
     measured = (hour - 1800.0) / 0.5  # half of the work in an hour: twice as slow as expected of one worker
     left = _time_left(done=1800.0, seconds=hour, expected_rate=1.0)
     assert measured * hour / (hour + 2.0 * BELIEVED) < left < measured
+
+
+def test_compilation_is_announced_where_no_compiled_kernel_lies_on_disk(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    announce_compilation()
+    assert capsys.readouterr().err.startswith("first use: kernels are compiled")
+    folder = tmp_path / "reference_sim.kernels.element_sweeps-0123456789abcdef"
+    folder.mkdir()
+    (folder / "sweep-1.py311.nbi").touch()
+    announce_compilation()
+    assert capsys.readouterr().err == ""

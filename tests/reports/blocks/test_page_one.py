@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from reports.blocks.page_one_sentences import headline
+from reports.blocks.page_one_sentences import first_sentences, headline
 from reports.blocks.printed_tables import shortened
 from reports.blocks.what_went_wrong import endings, failures
 from reports.document.content import content
@@ -38,13 +38,14 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
         f"On 2 unseen motions SNUG has a relative excess of {number_texts.number(typical, 2)} % ("
     )
     assert (
-        "where the energy of the reference simulation is 0 % and that of skinning alone 100 %. Whether"
+        "where the energy of the reference simulation is 0 % and that of skinning alone 100 %. Whether SNUG"
         in said
     )
     assert "geometric means over motions. The arithmetic mean of SNUG over motions is 12 %" in said
     assert said.endswith("and its worst motion, jump, has 20 %.")
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
-    assert "PBNS has 15 %. Whether SNUG or PBNS has less is inconclusive. These" in near(rows)
+    assert " and PBNS of 15 %, where" in near(rows)
+    assert "; whether SNUG or PBNS has less is inconclusive. Whether" in near(rows)
     # A member of the reference's ensemble is no rival, however near it is.
     assert near(rows + on_two_scenes("simulation-perturbed-1e-4", 0.5, 7.0)) == near(rows)
 
@@ -66,8 +67,8 @@ def test_of_a_family_of_networks_page_one_has_the_last():
     ]
     rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE + handles
     said = near(rows)
-    assert "Handles-80 has 20 %" in said and "andles-40" not in said
-    assert "Whether SNUG or handles-80 has less is inconclusive." in said
+    assert "handles-80 of 20 %" in said and "handles-40" not in said
+    assert "; whether SNUG or handles-80 has less is inconclusive." in said
     methods = [line[0] for line in make_tables(run_of(rows))["overview"].rows]
     assert "handles-80" in methods and "handles-40" not in methods
 
@@ -88,6 +89,7 @@ def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
     said = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
     assert "Of 1 primary claim taken from the paper 1 does not hold. What does not hold: Figure 7: cl" in said
     assert said.endswith("(relative excess: SNUG ≤ Simulation).")
+    assert first_sentences(run_of(rows))[-1] == "Of 1 primary claim taken from the paper 1 does not hold."
 
 
 def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
