@@ -3,7 +3,8 @@
 numba keeps on disk what it compiled, and compiles a kernel anew when the kernel's own file has changed. It
 does not see a change in another file: in a kernel that is called, or in a constant that is imported. So each
 module's kernels are kept in a folder whose name holds a digest of the file and of both. Processes with the
-same sources find the same folder.
+same sources find the same folder. Of processes that want a kernel at the same time one compiles it, and the
+others wait for it.
 
 The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR
 where that is set. No list of modules is kept: what counts for a kernel is what its module has imported.
@@ -21,7 +22,9 @@ from typing import Any
 
 import numba
 import numpy as np
+from filelock import FileLock
 from numba.core.caching import InTreeCacheLocator
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 from numba.misc.appdirs import AppDirs
@@ -30,10 +33,12 @@ KEPT = 4  # folders of one module, so that going back to another branch compiles
 CONSTANTS = (bool, int, float, complex, str, tuple, np.generic)
 FLAGS = (set, frozenset)  # of fastmath
 USED = ".used"  # file whose date says when a folder was last asked for
+LONGEST = 300.0  # [s] to wait for a kernel that another process compiles
 
 _config: Any = numba.config
 _digests: dict[str, str] = {}  # of modules that hold kernels, by name
 _folders: dict[str, Path | None] = {}
+_being_compiled: set[Path] = set()  # files of locks
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
@@ -48,11 +53,32 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         if module not in _digests:
             _digests[module] = _digest(function)
             _folders[module] = _folder(function, _digests[module])
-        cached = {"cache": bool(options.get("cache")) and _folders[module] is not None}
+        folder = _folders[module] if options.get("cache") else None
         with _locator_in_use():
-            return numba.njit(**(options | cached))(function)
+            kernel = numba.njit(**(options | {"cache": folder is not None}))(function)
+        if folder is not None:
+            kernel.compile = _in_turn(kernel.compile, folder / f"{function.__qualname__}.lock")
+        return kernel
 
     return decorate
+
+
+def _in_turn(compile_kernel: Callable[[Any], Any], file: Path) -> Callable[[Any], Any]:
+    """Return the method `compile` of a kernel, called by one process at a time, which looks on disk first.
+
+    numba's lock of threads is taken before that of processes, so two threads cannot wait for each other.
+    """
+
+    def compile_in_turn(signature: Any) -> Any:
+        with global_compiler_lock, contextlib.ExitStack() as held:
+            if file not in _being_compiled:  # by this process, which would wait for itself
+                _being_compiled.add(file)
+                held.callback(_being_compiled.remove, file)
+                with contextlib.suppress(OSError):  # no locks on this disk, or LONGEST is over
+                    held.enter_context(FileLock(file, timeout=LONGEST))
+            return compile_kernel(signature)
+
+    return compile_in_turn
 
 
 class KernelLocator(InTreeCacheLocator):
