@@ -16,7 +16,7 @@ from snug.motion.motion import MotionError
 HERE = Path(__file__).resolve().parent
 
 
-@pytest.mark.parametrize("count", [70, pytest.param(2001, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [40, pytest.param(2001, marks=pytest.mark.slow)])
 def test_mutated_files_are_refused_in_one_line(count, tmp_path):
     paths = os.pathsep.join(map(str, (HERE.parent.parent,)))
     done = subprocess.run(

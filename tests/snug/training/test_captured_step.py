@@ -89,9 +89,8 @@ def test_a_captured_step_is_the_step(kind, recipe, monkeypatch):
     equal_states(plain, captured)
 
 
-@pytest.mark.parametrize(
-    "energy", [pytest.param(0.0, id="high", marks=pytest.mark.slow), pytest.param(np.nan, id="not finite")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("energy", [pytest.param(0.0, id="high"), pytest.param(np.nan, id="not finite")])
 def test_a_batch_that_is_not_followed_is_left_to_single_operations(energy, monkeypatch):
     """A window above the limit, or without an energy: the guard sees the batch once; later steps go on."""
     plain, captured = capturing(monkeypatch, PLAIN)

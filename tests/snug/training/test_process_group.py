@@ -61,7 +61,8 @@ leave_group()
 """
 
 
-@pytest.mark.parametrize("name", ["default", pytest.param("paper", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["default", "paper"])
 def test_two_processes_train_what_one_trains(name, tmp_path):
     """Equal to rounding, for sums are taken in another order; and the two are equal to the bit."""
     script = tmp_path / "child.py"
