@@ -22,9 +22,9 @@ def commit() -> str:
     """Return the commit of the checkout, "+changes" where tracked files differ; else the package version."""
     root = Path(__file__).resolve().parent.parent
 
-    def git(*words: str) -> str:
+    def git(*arguments: str) -> str:
         # No lock on the index: one would stay there where the disk is full.
-        command = ["git", "--no-optional-locks", "-C", str(root), *words]
+        command = ["git", "--no-optional-locks", "-C", str(root), *arguments]
         answer = subprocess.run(command, capture_output=True, text=True, timeout=20)
         return answer.stdout.strip() if answer.returncode == 0 else ""
 

@@ -102,10 +102,10 @@ def write_onnx(
         theirs, worst = [tensor.numpy() for tensor in state], 0.0
         for now, turn in zip(features, transforms):
             given = {"features": now.numpy(), "transforms": turn.numpy()} | dict(zip(["state"], theirs))
-            found, *theirs = session.run(None, given)
+            exported, *theirs = session.run(None, given)
             with torch.no_grad():
                 positions, *state = frame(now, turn, *state)
-            worst = max(worst, float(np.abs(found - positions.numpy()).max()))
+            worst = max(worst, float(np.abs(exported - positions.numpy()).max()))
         if not worst <= TOLERANCE:
             raise OnnxError(f"{path}: a coordinate differs by {worst:.2g} m from the network's; not written")
     return worst

@@ -44,6 +44,6 @@ def narrow(monkeypatch) -> None:
 
 
 def _files(folder: Path) -> dict[Path, int]:
-    """Return each path in a folder, with the time of a file's last change; Python's own caches do not count."""
+    """Return each path in a folder, with the time of a file's last change; caches of Python do not count."""
     paths = [path for path in folder.rglob("*") if "__pycache__" not in path.parts]
     return {path: path.stat().st_mtime_ns if path.is_file() else 0 for path in paths}

@@ -97,8 +97,8 @@ class Row:
         if self.status == "ok" and (self.value is None or not math.isfinite(self.value)):
             raise self._error(f"status ok needs a finite value, got {self.value}")
 
-    def _error(self, said: str) -> ResultsError:
-        return ResultsError(f"row {self.scene} x {self.method} / {self.metric}: {said}")
+    def _error(self, problem: str) -> ResultsError:
+        return ResultsError(f"row {self.scene} x {self.method} / {self.metric}: {problem}")
 
     @property
     def passed(self) -> bool:
@@ -113,8 +113,8 @@ class Row:
     @property
     def pretrained(self) -> str:
         """Remark on the row's network where it is of a file; empty where there is none or it was trained."""
-        found = re.search(rf"(?:^|; )({PRETRAINED} .*)", self.reason)
-        return found[1] if found else ""
+        remark = re.search(rf"(?:^|; )({PRETRAINED} .*)", self.reason)
+        return remark[1] if remark else ""
 
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))

@@ -113,18 +113,18 @@ class Entry:
         Raises:
             ValueError: one line for what cannot be met.
         """
-        said = self.metadata
+        metadata = self.metadata
         option = RollOutOption(
-            self.name, str(self.path / said.roll_outs), FileConventions(), said.milliseconds
+            self.name, str(self.path / metadata.roll_outs), FileConventions(), metadata.milliseconds
         )
-        programs = (str(self.path / said.program),) if said.program else ()
+        programs = (str(self.path / metadata.program),) if metadata.program else ()
         plan = make_plan(
             Request(
                 preset=PRESET,
                 scenes=self.scenes,
                 methods=(*MEASURED_BESIDE, *programs),
-                seeds=said.seeds if said.program else (0,),
-                roll_outs=() if said.program else (option,),
+                seeds=metadata.seeds if metadata.program else (0,),
+                roll_outs=() if metadata.program else (option,),
                 folder=folder,
             )
         )
@@ -133,10 +133,10 @@ class Entry:
             mine = cell.method not in MEASURED_BESIDE
             if mine and cell.method != self.name:
                 raise EntryError(
-                    f"{self.path / said.program}: declares method '{cell.method}': one of the folder's name, "
-                    f"'{self.name}', is expected"
+                    f"{self.path / metadata.program}: declares method '{cell.method}': one of the folder's "
+                    f"name, '{self.name}', is expected"
                 )
-            declared = said.milliseconds if mine else None
+            declared = metadata.milliseconds if mine else None
             cells.append(replace(cell, entry=replace(cell.entry, timed=False, declared_ms=declared)))
         return replace(plan, cells=tuple(cells), cases=(), microbenchmarks=())
 
@@ -288,9 +288,9 @@ def faults_of_scores(entry: Entry) -> Iterator[str]:
         yield f"{entry.scores.path}: scores of protocol {number}, this is {NUMBER}: score with --replace"
     for name in entry.scores.changed(config):
         yield f"{entry.scores.path / name}: is not as it was written: score with --replace"
-    said, before = json.loads(json.dumps(asdict(entry.metadata))), config.get("metadata") or {}
-    for name in said:
-        if said[name] != before.get(name):
+    metadata, before = json.loads(json.dumps(asdict(entry.metadata))), config.get("metadata") or {}
+    for name in metadata:
+        if metadata[name] != before.get(name):
             yield f"{entry.path / METADATA}: {name} is not what was scored: score with --replace"
     scored, now = config.get("entry") or {}, entry.digests()
     for name in sorted(scored.keys() | now.keys()):

@@ -103,8 +103,8 @@ def write(entry: Entry, rows: Sequence[Row], config: dict[str, Any]) -> None:
     folder = entry.scores
     folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)
-    said = dataclasses.asdict(entry.metadata)
+    metadata = dataclasses.asdict(entry.metadata)
     folder.write_config({
-        "protocol": {"number": NUMBER, "digest": DIGEST}, **config, "metadata": said,
+        "protocol": {"number": NUMBER, "digest": DIGEST}, **config, "metadata": metadata,
         "entry": entry.digests(), "digests": {folder.rows_path.name: digest_of_file(folder.rows_path)},
     })  # fmt: skip

@@ -102,13 +102,13 @@ def _search_groups(some, points, samples, exact, mesh, pose, faces, barycentric,
             useful[g] = _useful(best[g if g < count else 0], scale[g], exact)
             worst = max(worst, useful[g])
         number = min(first // LANES, len(starts) - 1)
-        found, nearest = _near_leaves(
+        near_count, nearest = _near_leaves(
             starts[number], stops[number], blocks, masks, boxes, x32, worst, apart, leaves, bounds
         )
-        if found > 0:  # the nearest first
+        if near_count > 0:  # the nearest first
             leaves[0], leaves[nearest] = leaves[nearest], leaves[0]
             bounds[0], bounds[nearest] = bounds[nearest], bounds[0]
-        for n in range(found):
+        for n in range(near_count):
             if bounds[n] > worst:
                 continue
             leaf, changed = leaves[n], False
@@ -183,7 +183,7 @@ def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, apart, leaves, b
     for g in range(LANES):
         l0, l1, l2 = min(l0, x32[0, g]), min(l1, x32[1, g]), min(l2, x32[2, g])
         h0, h1, h2 = max(h0, x32[0, g]), max(h1, x32[1, g]), max(h2, x32[2, g])
-    zero, found, nearest = np.float32(0.0), 0, 0
+    zero, near_count, nearest = np.float32(0.0), 0, 0
     for n in range(start, stop):
         block, mask = blocks[n], masks[n]
         for lane in range(LANES):
@@ -195,8 +195,8 @@ def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, apart, leaves, b
         while near:
             lane = lowest_bit(near)
             near &= near - 1
-            leaves[found], bounds[found] = LANES * block + lane, apart[lane]
-            if bounds[found] < bounds[nearest]:
-                nearest = found
-            found += 1
-    return found, nearest
+            leaves[near_count], bounds[near_count] = LANES * block + lane, apart[lane]
+            if bounds[near_count] < bounds[nearest]:
+                nearest = near_count
+            near_count += 1
+    return near_count, nearest

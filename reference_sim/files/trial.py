@@ -39,10 +39,10 @@ def try_out(read: Callable[[Path], object], *paths: Path) -> str:
     # Each thread of a linear algebra library takes addresses for itself: on many cores more than the cap.
     alone = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     caps, names = (str(memory), str(seconds)), (str(path.absolute()) for path in paths)
-    words = [read.__module__, read.__name__, *caps, *names]
+    arguments = [read.__module__, read.__name__, *caps, *names]
     try:
         done = subprocess.run(
-            [sys.executable, "-m", __name__, *words],
+            [sys.executable, "-m", __name__, *arguments],
             env=os.environ | alone, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE * seconds,
         )  # fmt: skip
         endless = done.returncode == ENDLESS

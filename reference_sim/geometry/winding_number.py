@@ -31,19 +31,19 @@ def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray)
     >>> winding_numbers(corners, faces, np.array([[0.1, 0.1, 0.1], [0.5, 0.5, 0.5]])).tolist()
     [1, 0]
     """
-    found = np.zeros(len(points), np.int64)
+    numbers = np.zeros(len(points), np.int64)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     inside = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
     if len(inside) == 0:
-        return found
+        return numbers
     along = int(np.argmin(high - low))
     axes = [(along + 1) % 3, (along + 2) % 3, along]  # the ray runs along the last
     x, rays = np.ascontiguousarray(vertices[:, axes]), np.ascontiguousarray(points[inside][:, axes])
     sides = np.maximum((high - low)[axes[:2]], np.finfo(float).tiny)
     cells = np.maximum(np.sqrt(len(faces) * sides / sides[::-1]), 1.0).astype(np.int64)  # as many as faces
     starts, met = _faces_of_cells(x, faces, low[axes], cells / sides, cells)
-    found[inside] = _crossings(x, faces, rays, low[axes], cells / sides, cells, starts, met)
-    return found
+    numbers[inside] = _crossings(x, faces, rays, low[axes], cells / sides, cells, starts, met)
+    return numbers
 
 
 @njit(cache=True, error_model="numpy")
@@ -92,7 +92,7 @@ def _area(x, i, j, u, v):
 @njit(cache=True, error_model="numpy")
 def _crossings(x, faces, rays, low, scale, cells, starts, met):
     """Return the signed crossings (P,) of the rays from points, in the direction of the last axis."""
-    found = np.zeros(len(rays), np.int64)
+    numbers = np.zeros(len(rays), np.int64)
     for p in range(len(rays)):
         u, v, height = rays[p, 0], rays[p, 1], rays[p, 2]
         cell = _cell(u, low[0], scale[0], cells[0]) * cells[1] + _cell(v, low[1], scale[1], cells[1])
@@ -106,5 +106,5 @@ def _crossings(x, faces, rays, low, scale, cells, starts, met):
                 continue
             total = of_i + of_j + of_k
             if (of_i * x[i, 2] + of_j * x[j, 2] + of_k * x[k, 2]) / total > height:
-                found[p] += 1 if total > 0.0 else -1
-    return found
+                numbers[p] += 1 if total > 0.0 else -1
+    return numbers

@@ -153,13 +153,13 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
     return [text.format(listed(standings[stands])) for stands, text in says.items() if stands in standings]
 
 
-def listed(words: Sequence[str]) -> str:
+def listed(items: Sequence[str]) -> str:
     """Return the words as "a, b and c".
 
     >>> listed(["a", "b", "c"]), listed(["a"]), listed([])
     ('a, b and c', 'a', '')
     """
-    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+    return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))
 
 
 def _in_scenes(count: int) -> str:
@@ -206,14 +206,14 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
         return ""
     ends = compared.effect.interval
     times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
-    own = number(compared.other.value)
+    milliseconds = number(compared.other.value)
     training = value_of(run.garment_rows, network, "cost/train")
     whole = " end to end" if compared.metric.name == "cost/whole" else ""
     where = f" {_in_scenes(len(scenes))}" if scenes else ""
     solver, gaps = _rivals(run, run.cells("speed", "garments"), scenes) if scenes else ("", "")
     return _joined([
-        f"{run.label(network)} takes {own} ms a frame{whole} on one core{where}, the simulation {times} "
-        f"times as long{solver}",
+        f"{run.label(network)} takes {milliseconds} ms a frame{whole} on one core{where}, the simulation "
+        f"{times} times as long{solver}",
         gaps,
         f"the training of {run.label(network)} took {duration(training)}" if training else "",
     ])  # fmt: skip
@@ -240,7 +240,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if finest:
         steps = int(run.methods[finest].level or 0)
         strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
-        words = [
+        ratios = [
             f"{what} {number(one.value / other.value, 2)} times"
             for what, (one, other) in (("its strain is", strain), ("its hem amplitude", amplitude))
             if one and other and other.value
@@ -249,7 +249,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
         distance = "" if away is None else f", and its cloth is {number(away, 2)} mm away"
         sentences.append(
             "The reference is converged in each time step of 1/30 s, but not in the step size: with "
-            f"{steps} steps a frame {' and '.join(words)} as large{distance}, {where}"
+            f"{steps} steps a frame {' and '.join(ratios)} as large{distance}, {where}"
         )
     return _joined(sentences)
 

@@ -36,8 +36,8 @@ def _list(names: pd.Series) -> str:
 
 def _size(rows: pd.DataFrame) -> str:
     scenes, seeds = rows["scene"].nunique(), sorted(rows["seed"].unique())
-    words = f"{scenes} scene{'s' * (scenes > 1)}, seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}"
-    return f"not in the later run: {words}"
+    extent = f"{scenes} scene{'s' * (scenes > 1)}, seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}"
+    return f"not in the later run: {extent}"
 
 
 def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:

@@ -136,8 +136,8 @@ def _scatter(runs: list[np.ndarray]) -> tuple[np.ndarray, float]:
     freedom = sum(np.isfinite(x).sum(axis=1) - 1 for x in runs)
     if not freedom.any() or not squares.any():
         return squares * 0.0, math.inf
-    own = np.sqrt(squares / np.maximum(freedom, 1))
-    pool = (freedom > 0) & (own <= ODD * np.median(own[freedom > 0]))
+    spread = np.sqrt(squares / np.maximum(freedom, 1))
+    pool = (freedom > 0) & (spread <= ODD * np.median(spread[freedom > 0]))
     if not squares[pool].any():
         pool = freedom > 0
     total = float(freedom[pool].sum())
@@ -147,4 +147,4 @@ def _scatter(runs: list[np.ndarray]) -> tuple[np.ndarray, float]:
     common = sum(float((np.nanmean(x, axis=0) ** 2).sum()) for x in residuals) / seeds
     rho = (scenes * common / pooled - 1.0) / (scenes - 1) if scenes > 1 else 0.0
     total /= 1.0 + (scenes - 1) * min(max(rho, 0.0), 1.0) ** 2
-    return np.maximum(own, math.sqrt(pooled)), total
+    return np.maximum(spread, math.sqrt(pooled)), total

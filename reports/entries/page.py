@@ -41,10 +41,10 @@ def entries_page(path: Path, tables: Sequence[tuple[Table, Sequence[Scored]]]) -
 
 def entries_in(folder: Path) -> list[Path]:
     """Return the folders of entries, by name. Raises ResultsError where there is none."""
-    found = sorted(path.parent for path in folder.glob("*/entry.toml"))
-    if not found:
+    entries = sorted(path.parent for path in folder.glob("*/entry.toml"))
+    if not entries:
         raise ResultsError(f"{folder}: holds no entry, a folder with entry.toml")
-    return found
+    return entries
 
 
 def page_of(folder: Path, path: Path, published: tuple[RunFolder, Run]) -> tuple[str, list[Path]]:
@@ -58,8 +58,8 @@ def page_of(folder: Path, path: Path, published: tuple[RunFolder, Run]) -> tuple
     Raises:
         ResultsError: no entry, or scores that cannot be read.
     """
-    found = entries_in(folder)
-    scores = {entry: RunFolder(entry / "scores") for entry in found}
-    without = [entry for entry in found if not scores[entry].config_path.is_file()]
-    scored = [of_entry(scores[entry], read_run(scores[entry])) for entry in found if entry not in without]
+    entries = entries_in(folder)
+    scores = {entry: RunFolder(entry / "scores") for entry in entries}
+    without = [entry for entry in entries if not scores[entry].config_path.is_file()]
+    scored = [of_entry(scores[entry], read_run(scores[entry])) for entry in entries if entry not in without]
     return entries_page(path, entries_tables(scored, published)), without

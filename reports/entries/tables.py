@@ -75,10 +75,12 @@ class Scored:
 
 def of_entry(folder: RunFolder, run: Run) -> Scored:
     """Return the entry whose scores a folder holds. Raises KeyError where run.json has no metadata."""
-    said = run.config["metadata"]
+    metadata = run.config["metadata"]
     name = folder.path.resolve().parent.name
     scenes = tuple(sorted(set(run.frame[run.frame["method"] == name]["scene"])))
-    return Scored(run, folder, name, f"{said['title']}; {said['authors']}", said["training_data"], scenes)
+    return Scored(
+        run, folder, name, f"{metadata['title']}; {metadata['authors']}", metadata["training_data"], scenes
+    )
 
 
 def of_published(folder: RunFolder, run: Run, scenes: Sequence[str]) -> list[Scored]:

@@ -274,7 +274,10 @@ def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str,
     for (scene, seed), value in cells.items():
         values.setdefault((recording_of(scene), seed), []).append(value)
     # Where all are one number their mean is it, to the bit: what every motion repeats is certain.
-    return {cell: own[0] if len(set(own)) == 1 else float(np.mean(own)) for cell, own in values.items()}
+    return {
+        cell: of_seeds[0] if len(set(of_seeds)) == 1 else float(np.mean(of_seeds))
+        for cell, of_seeds in values.items()
+    }
 
 
 def _grid(mean: Mean, scale: str) -> np.ndarray:

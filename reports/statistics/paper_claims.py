@@ -189,11 +189,11 @@ def counts(lines: Iterable[Judged]) -> Counter[str]:
 
 def in_words(verdicts: Counter[str]) -> str:
     """Return the counts as "3 hold, 1 is a tie"."""
-    words = {
+    forms = {
         HOLDS: (HOLDS, "hold"), FAILS: (FAILS, "do not hold"),
         TIED: ("is a tie", "are ties"), OPEN: (f"is {OPEN}", f"are {OPEN}"),
     }  # fmt: skip
-    return ", ".join(f"{n} {words[word][n != 1]}" for word in words if (n := verdicts[word]))
+    return ", ".join(f"{n} {forms[word][n != 1]}" for word in forms if (n := verdicts[word]))
 
 
 def judged(run: Run) -> list[Judged]:
@@ -204,7 +204,8 @@ def judged(run: Run) -> list[Judged]:
     asked = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= ran]
     compared = [_compared(run, frame, claim) for claim in asked]
     p_values = [
-        found.effect.p_value(claim.factor) if found.effect else None for claim, found in zip(asked, compared)
+        comparison.effect.p_value(claim.factor) if comparison.effect else None
+        for claim, comparison in zip(asked, compared)
     ]
     tested = [claim for claim in PRIMARY if claim.tested]
     places = [k for k, (claim, p) in enumerate(zip(asked, p_values)) if claim in tested and p is not None]
@@ -213,15 +214,15 @@ def judged(run: Run) -> list[Judged]:
         p_values[place] = p
     diverged = set(frame[frame["status"] == "diverged"]["method"])
     lines = []
-    for claim, found, p in zip(asked, compared, p_values):
-        if found.effect is not None and found.one is not None and found.other is not None:
-            outcome = verdict(claim, found.effect, p)
-            remark = untested(found.effect) if outcome == OPEN else ""
-            remark += found.one.fewer or found.other.fewer
+    for claim, comparison, p in zip(asked, compared, p_values):
+        if comparison.effect is not None and comparison.one is not None and comparison.other is not None:
+            outcome = verdict(claim, comparison.effect, p)
+            remark = untested(comparison.effect) if outcome == OPEN else ""
+            remark += comparison.one.fewer or comparison.other.fewer
         else:
-            outcome, remark = verdict_of_diverged(claim, found, diverged)
+            outcome, remark = verdict_of_diverged(claim, comparison, diverged)
         if outcome:
-            lines.append(Judged(claim, found, p, outcome, remark))
+            lines.append(Judged(claim, comparison, p, outcome, remark))
     return lines
 
 

@@ -46,8 +46,10 @@ def relative_metric(metric: str) -> Metric:
     if metric == TOTAL:
         return RELATIVE_EXCESS
     term = metric.partition("/")[2]
-    words = f"{term} above the reference's as a share of skinning's excess of total energy"
-    return Metric(f"relative_excess/{term}", "%", f"Relative excess of {term}", words, lower_is_better=True)
+    definition = f"{term} above the reference's as a share of skinning's excess of total energy"
+    return Metric(
+        f"relative_excess/{term}", "%", f"Relative excess of {term}", definition, lower_is_better=True
+    )
 
 
 def with_relative_excess(

@@ -97,14 +97,14 @@ def relative_excess_by_motion(run: Run) -> list[Table]:
 
 def _measured(run: Run) -> list[tuple[str, str, Excess]]:
     """Return (garment, method, excess) of each method but skinning, the reference and its variants."""
-    found = []
+    excesses = []
     for garment in run.garments(run.garment_rows):
         rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
         zero = {*run.with_role("reference", "reference-variant"), *run.with_role("baseline")[:1]}
         for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):
-                found.append((garment, method, excess))
-    return found
+                excesses.append((garment, method, excess))
+    return excesses
 
 
 def errors_in_spreads(run: Run) -> list[Table]:

@@ -80,7 +80,8 @@ def attribute_rows(path: str) -> Rows:
     if not entries:
         raise ValueError(f"class '{path}' has no attributes in its docstring")
     rows = [
-        (f"`{names.replace(', ', '`, `')}`", " ".join(words.split()).rstrip(".")) for names, words in entries
+        (f"`{names.replace(', ', '`, `')}`", " ".join(content.split()).rstrip("."))
+        for names, content in entries
     ]
     return [("Field", "Content"), *rows]
 

@@ -40,14 +40,14 @@ TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
 
 
-def published_part(words: str) -> str:
+def published_part(request: str) -> str:
     """Return the Markdown of a generated part. Raises ValueError for words of no known form."""
-    what, _, source = words.partition(" of ")
+    what, _, source = request.partition(" of ")
     runs, _, columns = source.partition(";")
     folders = [PUBLISHED / name.strip() for name in runs.split(",")]
     wanted = [column.strip() for column in columns.split(",") if column.strip()]
     kind, _, name = what.partition(" ")
-    if (part := words.partition(";")[0]) in PARTS:
+    if (part := request.partition(";")[0]) in PARTS:
         return markdown_table(chosen_rows(PARTS[part](), wanted))
     if kind == "docstring":
         return markdown_table(docstring_rows(source))
@@ -55,9 +55,9 @@ def published_part(words: str) -> str:
         return markdown_table(recipe_rows(source))
     if kind == "attributes":
         return markdown_table(chosen_rows(attribute_rows(runs), wanted))
-    if words == "sources of the library":
+    if request == "sources of the library":
         return markdown_table(list(source_rows()))
-    if words == "evaluations of published runs":
+    if request == "evaluations of published runs":
         return markdown_table(evaluation_rows(PUBLISHED))
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
@@ -75,7 +75,7 @@ def published_part(words: str) -> str:
         parts = [(folder, part) for folder in folders for part in origins(RunFolder(folder).read_config())]
         lines = dict.fromkeys((folder.name, *part[:3]) for folder, part in parts)
         return markdown_table([ORIGIN, *lines])
-    raise ValueError(f"no part is generated from '{words}'; known: {FORMS}")
+    raise ValueError(f"no part is generated from '{request}'; known: {FORMS}")
 
 
 def library_file(name: str) -> str:

@@ -17,12 +17,12 @@ class Deviation:
     Attributes:
         name: part of the name of a recipe without it, or with it alone.
         options: fields of Recipe that it changes.
-        words: what the default recipe has and the text has not, to be read behind "with" or "without".
+        description: what the default recipe has and the text has not, to be read behind "with" or "without".
     """
 
     name: str
     options: tuple[str, ...]
-    words: str
+    description: str
 
 
 DEVIATIONS = (

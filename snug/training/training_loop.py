@@ -98,8 +98,10 @@ class TrainingLoop:
                 self.log(row)
         stopping = self.trainer.group.agreed(float(self.stop())) > 0
         if self.checkpoint and self.trainer.group.writes:
-            due = not last and self.checkpoint.is_due(self.done, time.perf_counter() - self._saved)
-            if stopping or due:
+            checkpoint_is_due = not last and self.checkpoint.is_due(
+                self.done, time.perf_counter() - self._saved
+            )
+            if stopping or checkpoint_is_due:
                 self._save(self.checkpoint)
         if stopping:
             where = (

@@ -29,8 +29,8 @@ RECIPES = tuple(
 # Each a training of its own, of equal steps: their times stand beside them.
 RECIPE_DEVIATIONS = tuple(
     network(
-        f"{base}-{verb}-{deviation.name}", f"{label} {verb} {deviation.words}",
-        f"{base} {verb} {deviation.words}", role="ablation", base=base, pairing_group="snug",
+        f"{base}-{verb}-{deviation.name}", f"{label} {verb} {deviation.description}",
+        f"{base} {verb} {deviation.description}", role="ablation", base=base, pairing_group="snug",
     )
     for base, label, verb in (("snug", "SNUG", "without"), ("snug-paper", "SNUG, paper's text,", "with"))
     for deviation in DEVIATIONS

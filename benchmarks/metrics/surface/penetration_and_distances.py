@@ -168,7 +168,7 @@ def penetration(
         obstacle: with a signed distance, as a body.
     """
     samples = [SurfaceSamples(each) for each in faces]
-    found = [
+    penetrations = [
         Penetration(share=np.empty(len(x)), depth=np.empty(x.shape[:2]), area=np.empty(len(x)))
         for x in trajectories
     ]
@@ -179,11 +179,11 @@ def penetration(
         for k, distance in zip(present, np.split(distances, np.cumsum([len(each) for each in points])[:-1])):
             x, inside = trajectories[k][frame], distance < 0.0
             weights = samples[k].weights(x)
-            found[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])
-            found[k].share[frame] = inside[: len(x)].mean()
+            penetrations[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])
+            penetrations[k].share[frame] = inside[: len(x)].mean()
             # Of a cloth drawn together to a point nothing is inside or outside by area.
-            found[k].area[frame] = weights @ inside / max(weights.sum(), np.finfo(float).tiny)
-    return found
+            penetrations[k].area[frame] = weights @ inside / max(weights.sum(), np.finfo(float).tiny)
+    return penetrations
 
 
 def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats) -> Floats:

@@ -42,8 +42,8 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     strains = principal_stretches(roll_out.positions[roll_out.judged], cloth) - 1.0
     values: dict[str, float] = {}
     for side, strain in zip(SIDES, np.moveaxis(strains, -1, 0)):
-        found = weighted_percentiles(strain, np.broadcast_to(cloth.areas, strain.shape), PERCENTILES)
-        values |= {f"stretch/{side}_p{p:02}": 100.0 * float(v) for p, v in zip(PERCENTILES, found)}
+        of_percentiles = weighted_percentiles(strain, np.broadcast_to(cloth.areas, strain.shape), PERCENTILES)
+        values |= {f"stretch/{side}_p{p:02}": 100.0 * float(v) for p, v in zip(PERCENTILES, of_percentiles)}
     return values
 
 

@@ -56,12 +56,12 @@ def _sweep(x, faces, low, high, order, hit):
                 continue
             if _neighbours(faces[e], faces[f]):
                 continue
-            found = _crossings(x, faces[e], faces[f], ends, 0)
-            found = _crossings(x, faces[f], faces[e], ends, found)
-            if found > 0:
+            crossings = _crossings(x, faces[e], faces[f], ends, 0)
+            crossings = _crossings(x, faces[f], faces[e], ends, crossings)
+            if crossings > 0:
                 hit[e] = True
                 hit[f] = True
-            if found > 1:
+            if crossings > 1:
                 length += np.sqrt(((ends[0] - ends[1]) ** 2).sum())
     return length
 
@@ -85,7 +85,7 @@ def _volume(x, a, b, c, d):
 
 
 @njit(cache=True)
-def _crossings(x, edges_of, face, ends, found):
+def _crossings(x, edges_of, face, ends, crossings):
     """Append to ends[:found] where edges of a triangle cross the inside of a face; return the new `found`."""
     a, b, c = face[0], face[1], face[2]
     for i in range(3):
@@ -97,6 +97,6 @@ def _crossings(x, edges_of, face, ends, found):
         if (first > 0.0 and second > 0.0 and third > 0.0) or (first < 0.0 and second < 0.0 and third < 0.0):
             share = before / (before - behind)
             for axis in range(3):
-                ends[found, axis] = (1.0 - share) * x[p, axis] + share * x[q, axis]
-            found += 1
-    return found
+                ends[crossings, axis] = (1.0 - share) * x[p, axis] + share * x[q, axis]
+            crossings += 1
+    return crossings

@@ -60,8 +60,8 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
         return {}
     faces, others = roll_out.trajectory.faces, reference.trajectory.faces
     sampled = np.unique(np.linspace(0, len(x) - 1, SAMPLED_FRAMES).round().astype(int))
-    found = [chamfer_and_angle(x[frame], faces, y[frame], others) for frame in sampled]
-    distance, angle = np.mean(found, axis=0)
+    measures = [chamfer_and_angle(x[frame], faces, y[frame], others) for frame in sampled]
+    distance, angle = np.mean(measures, axis=0)
     return {"surface/chamfer": MM * float(distance), "surface/normals": float(np.rad2deg(angle))}
 
 
@@ -93,9 +93,9 @@ def _one_way(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[flo
     squared, nearest, points = igl.point_mesh_squared_distance(x, y, others)
     corners = others[nearest]
     shares = _barycentric(points, y[corners])
-    there = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
+    opposite = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
     here = vertex_normals(np.ascontiguousarray(x), faces)
-    angles = np.arctan2(np.linalg.norm(np.cross(here, there), axis=1), (here * there).sum(axis=1))
+    angles = np.arctan2(np.linalg.norm(np.cross(here, opposite), axis=1), (here * opposite).sum(axis=1))
     sides = x[faces[:, 1:]] - x[faces[:, :1]]
     doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     weights = np.bincount(faces.ravel(), np.repeat(doubled, 3), len(x))

@@ -43,20 +43,20 @@ WORDS = tuple(band.replace("_", " ") + " mm" for band in BANDS)
 METRICS = (
     *(
         Metric(
-            name=f"wrinkles/{band}", unit="1/m", title=f"Waves {words}", table="wrinkles",
-            definition=f"root mean square of the part of the signed mean curvature with wavelengths {words}, "
-            "mean over frames",
+            name=f"wrinkles/{band}", unit="1/m", title=f"Waves {interval}", table="wrinkles",
+            definition=f"root mean square of the part of the signed mean curvature with wavelengths "
+            f"{interval}, mean over frames",
         )
-        for band, words in zip(BANDS, WORDS)
+        for band, interval in zip(BANDS, WORDS)
     ),
     *(
         Metric(
-            name=f"wrinkles/error_{band}", unit="1/m", title=f"Error {words}", table="wrinkle_errors",
+            name=f"wrinkles/error_{band}", unit="1/m", title=f"Error {interval}", table="wrinkle_errors",
             lower_is_better=True,
-            definition=f"|a - a_ref|, a that root mean square at the same frame, wavelengths {words}, mean "
-            "over frames; wherever the wrinkles sit",
+            definition=f"|a - a_ref|, a that root mean square at the same frame, wavelengths {interval}, "
+            "mean over frames; wherever the wrinkles sit",
         )
-        for band, words in zip(BANDS, WORDS)
+        for band, interval in zip(BANDS, WORDS)
     ),
 )  # fmt: skip
 

@@ -86,10 +86,10 @@ def fabric_order(run: Run) -> list[Table]:
         counts, worst = [], ""
         for test, of_test in read.items():
             reference = of_test.get(run.reference, {})
-            found = order(of_test.get(method, {}), reference, APART[test])
-            counts.append(f"{len(found.turned)} of {found.pairs}" if found.pairs else "")
-            if found.turned:
-                worst = f"{found.turned[0][0]} above {found.turned[0][1]} ({test})"
+            ranking = order(of_test.get(method, {}), reference, APART[test])
+            counts.append(f"{len(ranking.turned)} of {ranking.pairs}" if ranking.pairs else "")
+            if ranking.turned:
+                worst = f"{ranking.turned[0][0]} above {ranking.turned[0][1]} ({test})"
         lines.append((
             method, errors["drape"].get((method, TIME)),
             errors["cantilever"].get((method, ERROR)), errors["drape"].get((method, ERROR)), *counts, worst,

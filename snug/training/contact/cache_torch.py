@@ -143,8 +143,8 @@ class TensorContactCache:
     def _searched_in_parts(self, points: Tensor, positions: Tensor) -> Anchors:
         """Return the closest anchors of samples (S, 3) on a body (P, 3), part by part."""
         parts = zip(points.split(CHUNK), self.sample_rest.split(CHUNK))
-        found = [self._searched(point, home, positions) for point, home in parts]
-        faces, barycentric = (torch.cat(pieces) for pieces in zip(*found))
+        searches = [self._searched(point, home, positions) for point, home in parts]
+        faces, barycentric = (torch.cat(pieces) for pieces in zip(*searches))
         return quantise_tensors(faces, barycentric, self.faces.dtype)
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
