@@ -74,7 +74,7 @@ def _in_turn(compile_kernel: Callable[[Any], Any], file: Path) -> Callable[[Any]
             if file not in _being_compiled:  # by this process, which would wait for itself
                 _being_compiled.add(file)
                 held.callback(_being_compiled.remove, file)
-                with contextlib.suppress(OSError):  # no locks on this disk, or LONGEST is over
+                with contextlib.suppress(OSError, NotImplementedError):  # no locks here, or LONGEST is over
                     held.enter_context(FileLock(file, timeout=LONGEST))
             return compile_kernel(signature)
 
