@@ -234,7 +234,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean "
-            f"curvature from the reference, {where}: a smaller error shows no difference from it"
+            f"curvature from the reference, {where}: smaller errors mean nothing"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -282,10 +282,10 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> tuple[str, 
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
-        others = f"of the methods measured {'in all of these scenes' if partly_measured else 'here'}"
+        where = "timed in all of these scenes" if partly_measured else "timed here"
         gaps = (
             f"{snug} has an energy gap, the energy above the minimum of each time step, of "
-            f"{number(network.error)} J{network.fewer}; {others} none is as fast and has a smaller gap"
+            f"{number(network.error)} J{network.fewer}; no method {where} is as fast with a smaller gap"
         )
     else:
         within = " within repeats" if best.time > network.time else ""

@@ -146,7 +146,7 @@ def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize(
-    ("how", "words"),
+    ("how", "message"),
     [
         ("raise", "prepare() raises RuntimeError: broken on purpose"),
         ("hungry", "run() raises MemoryError: no room"),
@@ -156,20 +156,20 @@ def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatc
         ("torn", "batch() raises RuntimeError: no two bodies"),
     ],
 )
-def test_the_check_catches_every_known_misbehaviour(how, words, tmp_path, monkeypatch):
+def test_the_check_catches_every_known_misbehaviour(how, message, tmp_path, monkeypatch):
     from tests.benchmarks.runner import misbehaving
 
     # What is still at work after run() would also be in the time of a batch.
     fields = {"options": {"how": how}, "batched": how != "early"}
     before = set(threading.enumerate())
     (wrong,) = look(misbehaving.make, tmp_path, monkeypatch, **fields)
-    assert words in wrong
+    assert message in wrong
     for left in set(threading.enumerate()) - before:  # or they would be at work in the next test
         left.join(2.0)
 
 
-@pytest.mark.parametrize(("how", "words"), [("segfault", "SIGSEGV"), ("hang", "no answer within 4 s")])
-def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("how", "message"), [("segfault", "SIGSEGV"), ("hang", "no answer within 4 s")])
+def test_the_check_survives_what_dies_and_what_hangs(how, message, tmp_path, monkeypatch):
     entry = MethodEntry(
         name=how,
         description="",
@@ -179,8 +179,8 @@ def test_the_check_survives_what_dies_and_what_hangs(how, words, tmp_path, monke
         needs_no_obstacle=True,
     )
     monkeypatch.setattr("benchmarks.contract.check_files.BARE", ("free_fall",))
-    found = list(check_files(Declarations([entry]), tmp_path, 4.0))
-    assert [fine for _, fine in found] == [False] and words in found[0][0]
+    verdicts = list(check_files(Declarations([entry]), tmp_path, 4.0))
+    assert [fine for _, fine in verdicts] == [False] and message in verdicts[0][0]
 
 
 def test_the_check_says_what_is_skipped_everywhere(tmp_path):
@@ -254,8 +254,8 @@ def test_a_method_that_is_bound_to_a_mesh_is_checked_in_the_scene_that_has_it(in
     assert check.main([str(path)]) == 1
     assert "bound to 49 vertices, not 25" in capsys.readouterr().out
     (tmp_path / "highest.py").write_text(METRIC_FILE)
-    for words in (["hanging"], ["hanging_sheet", "--preset", "tiny"]):
-        assert check.main([str(path), "--scene", *words]) == 2
+    for arguments in (["hanging"], ["hanging_sheet", "--preset", "tiny"]):
+        assert check.main([str(path), "--scene", *arguments]) == 2
     assert check.main([str(tmp_path / "highest.py"), "--scene", "hanging_sheet"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 3 and "unknown scene 'hanging'" in error and "declares no METHODS" in error
@@ -264,13 +264,13 @@ def test_a_method_that_is_bound_to_a_mesh_is_checked_in_the_scene_that_has_it(in
 def test_the_command_asks_metrics_for_their_judgement_and_takes_curves_of_vertices(
     in_process, tmp_path, capsys
 ):
-    for name, said in (
+    for name, judgement in (
         ("none", "None"),
         ("lost", "('diverged', 'lost')"),
         ("word", "'lost'"),
         ("no", "0 / 0"),
     ):
-        (tmp_path / f"{name}.py").write_text(JUDGED.replace("SAID", said))
+        (tmp_path / f"{name}.py").write_text(JUDGED.replace("SAID", judgement))
     assert check.main([str(tmp_path / "none.py"), str(tmp_path / "lost.py")]) == 0
     assert check.main([str(tmp_path / "word.py"), str(tmp_path / "no.py")]) == 1
     out = capsys.readouterr().out
@@ -289,10 +289,10 @@ def test_a_wrong_gradient_is_found_however_many_vertices_do_not_feel_it(factor, 
             value, gradient = super().value_and_gradient(x)
             return value, factor * gradient
 
-    found = Findings("mine.py")
-    check_derivatives(found, Pulled(sheet.cloth, forces), sheet)
-    assert (not found.wrong) == fine
-    assert fine or "gradient is not the derivative of its value" in found.wrong[0]
+    findings = Findings("mine.py")
+    check_derivatives(findings, Pulled(sheet.cloth, forces), sheet)
+    assert (not findings.wrong) == fine
+    assert fine or "gradient is not the derivative of its value" in findings.wrong[0]
 
 
 def test_a_hessian_that_is_wrong_in_the_half_that_the_solver_does_not_read_is_found():
@@ -303,18 +303,18 @@ def test_a_hessian_that_is_wrong_in_the_half_that_the_solver_does_not_read_is_fo
             elements, blocks = super().active_hessian_blocks(x, convexity)
             return elements, np.tril(blocks) - np.triu(blocks, 1)
 
-    found = Findings("mine.py")
-    check_derivatives(found, StretchSpring(sheet.cloth), sheet)
-    assert not found.wrong
-    check_derivatives(found, Skewed(sheet.cloth), sheet)
-    assert "Hessian is not symmetric" in found.wrong[0]
+    findings = Findings("mine.py")
+    check_derivatives(findings, StretchSpring(sheet.cloth), sheet)
+    assert not findings.wrong
+    check_derivatives(findings, Skewed(sheet.cloth), sheet)
+    assert "Hessian is not symmetric" in findings.wrong[0]
 
 
 @pytest.mark.parametrize(
-    ("word", "words"),
+    ("word", "message"),
     [("gone.py", "gone.py: no such file"), ("empty.py", "declares none of METHODS, SCENES, METRICS")],
 )
-def test_the_command_refuses_in_one_line(word, words, tmp_path, monkeypatch, refused):
+def test_the_command_refuses_in_one_line(word, message, tmp_path, monkeypatch, refused):
     (tmp_path / "empty.py").write_text("")
     monkeypatch.chdir(tmp_path)
-    refused(words, check.main, [word])
+    refused(message, check.main, [word])

@@ -50,7 +50,7 @@ def test_a_metric_is_declared_once(declared, word, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("wrong", "words"),
+    ("wrong", "message"),
     [
         ({"unit": ""}, "metric 'mine/x' has no unit: say '1' where it has no dimension"),
         ({"unit": 1}, "metric 'mine/x': unit=1: give a string"),
@@ -58,8 +58,8 @@ def test_a_metric_is_declared_once(declared, word, monkeypatch):
         ({"of": "clock"}, "metric 'mine/x': of='clock'"),
     ],
 )
-def test_a_metric_says_its_unit_and_says_it_in_words(wrong, words):
-    with pytest.raises(ValueError, match=words):
+def test_a_metric_says_its_unit_and_says_it_in_words(wrong, message):
+    with pytest.raises(ValueError, match=message):
         Metric(**{"name": "mine/x", "unit": "J", "title": "Mine", "definition": "mine"} | wrong)
 
 
@@ -75,5 +75,5 @@ def test_a_role_and_a_size_that_nobody_knows_are_named():
 def test_the_command_says_it_in_one_line_and_leaves_nothing(more, tmp_path, monkeypatch, refused):
     wrong = dataclasses.replace(scenes.SCENES[0], name="kite", module="benchmarks.scenes.kite")
     monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, wrong))
-    words = ["--preset", "smoke", "--scenes", "kite", "--methods", "simulation", "-o", str(tmp_path / "run")]
-    refused("no module benchmarks.scenes.kite", run.main, [*words, *more])
+    flags = ["--preset", "smoke", "--scenes", "kite", "--methods", "simulation", "-o", str(tmp_path / "run")]
+    refused("no module benchmarks.scenes.kite", run.main, [*flags, *more])

@@ -76,8 +76,8 @@ def test_seeds_of_two_machines_are_one_run(folder, tmp_path, capsys):
     )  # fmt: skip
     out = RunFolder(tmp_path / "both")
     assert command.main([str(one), str(two), "-o", str(out.path)]) == 0
-    said = capsys.readouterr()
-    assert "4 rows in" in said.out and "1 times of other machines" in said.err
+    streams = capsys.readouterr()
+    assert "4 rows in" in streams.out and "1 times of other machines" in streams.err
     config, rows = out.read_config(), out.read_rows()
     assert config["seeds"] == [0, 1] and config["suites"] == ["garments", "speed"]
     assert list(config["methods"]) == ["snug", "pbns"] and "started" not in config
@@ -124,7 +124,7 @@ def test_nobody_goes_on_in_a_merged_folder_or_merges_it_again(folder, tmp_path, 
 
 
 @pytest.mark.parametrize(
-    ("changes", "inputs", "said"),
+    ("changes", "inputs", "message"),
     [
         ({"preset": "quick"}, {}, "another preset in"),
         ({"preset_values": {"frames": 21}}, {}, "another preset values in"),
@@ -137,15 +137,15 @@ def test_nobody_goes_on_in_a_merged_folder_or_merges_it_again(folder, tmp_path, 
         ({}, {"speed": 1}, None),
     ],
 )
-def test_runs_of_other_inputs_are_refused_by_name(folder, tmp_path, changes, inputs, said, capsys):
+def test_runs_of_other_inputs_are_refused_by_name(folder, tmp_path, changes, inputs, message, capsys):
     one = folder("one", [row("energy/total", 1.0)])
     two = folder("two", [row("energy/total", 1.0)], changes=changes, **inputs)
     status = command.main([str(one), str(two), "-o", str(tmp_path / "both")])
-    if said is None:
+    if message is None:
         assert status == 0
         return
     error = capsys.readouterr().err
-    assert status == 2 and said in error and error.count("\n") == 1 and str(two) in error
+    assert status == 2 and message in error and error.count("\n") == 1 and str(two) in error
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "two"]
 
 
@@ -168,7 +168,7 @@ def test_what_cannot_be_merged_is_named(folder, tmp_path, what, refused):
     import shutil
 
     one, two = folder("one", [row("energy/total", 1.0)]), folder("two", [row("energy/total", 1.0)])
-    names, said = [one, two], {"file": "kick.npy: is not as the run wrote it", "entry": "damaged",
+    names, message = [one, two], {"file": "kick.npy: is not as the run wrote it", "entry": "damaged",
         "no cache": "has no cache", "twice": "two or more different", "no run": "no such file",
         "taken": "name a new folder", "outside": "which lies outside of the folder"}[what]  # fmt: skip
     if what == "file":
@@ -187,7 +187,7 @@ def test_what_cannot_be_merged_is_named(folder, tmp_path, what, refused):
         (tmp_path / "both").mkdir()
         (tmp_path / "both" / "letter").write_text("dear")
     names = [one, one] if what == "twice" else [one, tmp_path / "none"] if what == "no run" else names
-    refused(said, command.main, [*map(str, names), "-o", str(tmp_path / "both")])
+    refused(message, command.main, [*map(str, names), "-o", str(tmp_path / "both")])
 
 
 def test_numbers_that_differ_are_refused_by_their_cell():

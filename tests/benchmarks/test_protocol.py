@@ -28,8 +28,8 @@ def parts():
 
 
 def test_the_recorded_digests_are_those_of_the_code(parts):
-    found = {part: digest(content) for part, content in parts.items()}
-    changed = {part: found[part] for part in found if found[part] != DIGESTS.get(part)}
+    digests = {part: digest(content) for part, content in parts.items()}
+    changed = {part: digests[part] for part in digests if digests[part] != DIGESTS.get(part)}
     assert changed == {}, (
         f"no longer protocol {NUMBER}: raise NUMBER and set these DIGESTS in benchmarks/results/protocol.py, "
         "and write down what changed in docs/protocol.md and CHANGELOG.md"

@@ -33,17 +33,17 @@ ROOT = Path(__file__).resolve().parents[2]
 def test_the_help_names_every_exit_status(capsys):
     with pytest.raises(SystemExit):
         run.main(["--help"])
-    said = capsys.readouterr().out.partition("exit status: ")[2]
-    assert all(f"{status} when " in said for status in (0, 1, 2, 130))
+    help_text = capsys.readouterr().out.partition("exit status: ")[2]
+    assert all(f"{status} when " in help_text for status in (0, 1, 2, 130))
 
 
 def test_the_list_names_everything(capsys):
     assert run.main(["--list"]) == 0
-    words = capsys.readouterr().out
+    listing = capsys.readouterr().out
     names = [m.name for m in METHODS] + [c.name for c in KNOWN_ANSWERS]
     names += [c.name for c in STEPS] + [f"{name}/*" for name in MAPS]
     for name in [*names, "tshirt/", "garments", "paper", "walk"]:
-        assert name in words
+        assert name in listing
 
 
 @pytest.mark.parametrize("split", ["test", "validation"])
@@ -73,7 +73,7 @@ def test_the_list_has_the_scenes_that_the_preset_and_suites_measure(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "hint"),
+    ("options", "hint"),
     [
         (["--preset", "huge"], "smoke, quick, paper"),
         (["--suite", "garment"], "garments"),
@@ -103,7 +103,7 @@ def test_the_list_has_the_scenes_that_the_preset_and_suites_measure(capsys):
         (["--list", "--suite", "garment"], "garments"),
     ],
 )
-def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monkeypatch, refused):
+def test_a_wrong_word_is_one_line_and_leaves_nothing(options, hint, tmp_path, monkeypatch, refused):
     (tmp_path / "empty.amc").write_text("")
     (tmp_path / "broken.npz").write_bytes(b"PK no zip")
     np.savez(tmp_path / "back.npz", poses=np.zeros((3, 72)), trans=np.zeros((3, 3)), fps=30)
@@ -116,7 +116,7 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(words, hint, tmp_path, monk
     monkeypatch.setattr(
         "benchmarks.runner.execute_plan.execute", lambda *_, **__: pytest.fail("the run was begun")
     )
-    refused(hint, run.main, words)
+    refused(hint, run.main, options)
 
 
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
@@ -139,8 +139,8 @@ def misbehaving(monkeypatch):
 
 def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, capsys):
     out = tmp_path / "run"
-    words = ["--preset", "smoke", "--scenes", "free_fall", "--suite", "speed", "-o", str(out)]
-    assert run.main([*words, "--methods", "simulation,newton-1,newton-4,skinning"]) == 1
+    options = ["--preset", "smoke", "--scenes", "free_fall", "--suite", "speed", "-o", str(out)]
+    assert run.main([*options, "--methods", "simulation,newton-1,newton-4,skinning"]) == 1
     rows = RunFolder(out).read_rows()
     by_method = {row.method: row for row in rows if row.metric == "cost/frame"}
     assert by_method["newton-1"].status == "failed"
@@ -152,9 +152,9 @@ def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, caps
     config = RunFolder(out).read_config()
     assert config["finished"] and config["commit"] and config["versions"]["numpy"]
     assert {stage["name"] for stage in config["stages"]} >= {"cells", "metrics"}
-    shown, said = capsys.readouterr()
+    shown, log = capsys.readouterr()
     assert shown.strip().splitlines()[-1] == str((out / "report.pdf").resolve())
-    assert "newton-1" in said and (out / "report.pdf").stat().st_size > 1000
+    assert "newton-1" in log and (out / "report.pdf").stat().st_size > 1000
     fields = array_names(RunFolder(out).curves_path("free_fall", "simulation"))
     assert {"energy/gravity", "energy/inertia", "energy/total"} <= set(fields)
     assert not [path for path in out.rglob("*") if "part" in path.name]

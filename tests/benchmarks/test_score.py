@@ -52,10 +52,10 @@ def no_processes():
 def made(tmp_path_factory):
     """A run of the simulation and of Newton cut after one iteration."""
     out = tmp_path_factory.mktemp("made") / "run"
-    words = ["--preset", "smoke", "--scenes", "hanging_sheet", "-o", str(out)]
+    options = ["--preset", "smoke", "--scenes", "hanging_sheet", "-o", str(out)]
     with pytest.MonkeyPatch.context() as patch:
         without_report(patch)
-        assert run.main([*words, "--methods", "simulation,newton-1"]) == 0
+        assert run.main([*options, "--methods", "simulation,newton-1"]) == 0
     return RunFolder(out)
 
 
@@ -65,21 +65,22 @@ def numbers(folder: RunFolder, method: str) -> dict[str, float | None]:
 
 def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path, capsys):
     files = [str(made.trajectory_path("hanging_sheet", name)) for name in ("newton-1", "simulation")]
-    words = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "-o", str(tmp_path / "out")]
-    assert score.main([files[0], *words, "--reference", files[1], "--declared-ms", "2.5"]) == 0
-    said = capsys.readouterr().out
+    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "-o", str(tmp_path / "out")]
+    assert score.main([files[0], *options, "--reference", files[1], "--declared-ms", "2.5"]) == 0
+    line = capsys.readouterr().out
     assert (
-        said.count("\n") == 1
-        and said.startswith("mine in hanging_sheet: total -0.03")
-        and "report.pdf" in said
+        line.count("\n") == 1
+        and line.startswith("mine in hanging_sheet: total -0.03")
+        and "report.pdf" in line
     )
-    scored, own = RunFolder(tmp_path / "out"), numbers(made, "newton-1")
-    found = numbers(scored, "mine")
-    costs = {name for name in {**own, **found} if name.startswith(("cost/", "solver/"))}
-    assert {name: found[name] for name in found.keys() - costs} == {
-        name: own[name] for name in own.keys() - costs
+    scored, expected = RunFolder(tmp_path / "out"), numbers(made, "newton-1")
+    metrics = numbers(scored, "mine")
+    costs = {name for name in {**expected, **metrics} if name.startswith(("cost/", "solver/"))}
+    assert {name: metrics[name] for name in metrics.keys() - costs} == {
+        name: expected[name] for name in expected.keys() - costs
     }
-    assert {name: found[name] for name in found.keys() & costs} == {"cost/frame": 2.5}  # copying is not timed
+    # Copying is not timed.
+    assert {name: metrics[name] for name in metrics.keys() & costs} == {"cost/frame": 2.5}
     row = next(row for row in scored.read_rows() if row.method == "mine" and row.metric == "cost/frame")
     assert (row.status, row.reason, row.role) == ("ok", "declared by its author, not measured", "external")
     assert scored.read_config()["methods"]["mine"]["label"] == "mine (declared time)"
@@ -89,21 +90,21 @@ def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path,
 
 def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, capsys):
     files = [str(made.trajectory_path("hanging_sheet", name)) for name in ("newton-1", "simulation")]
-    words = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "--reference", files[1]]
+    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "--reference", files[1]]
     printed = ["--json", "--no-report", "-o", str(tmp_path / "out")]
-    assert score.main([files[0], *words, *printed]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["name"], said["scene"], said["status"]) == ("mine", "hanging_sheet", "ok")
+    assert score.main([files[0], *options, *printed]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["name"], summary["scene"], summary["status"]) == ("mine", "hanging_sheet", "ok")
     strain = numbers(made, "newton-1")["energy/strain"]
-    assert said["metrics"]["energy/strain"] == {"value": strain, "unit": "J"}
+    assert summary["metrics"]["energy/strain"] == {"value": strain, "unit": "J"}
     assert not (tmp_path / "out" / "report.pdf").exists() and (tmp_path / "out" / "results.csv").is_file()
-    assert said["metrics"]["gap/energy"]["value"] == numbers(made, "newton-1")["gap/energy"]
+    assert summary["metrics"]["gap/energy"]["value"] == numbers(made, "newton-1")["gap/energy"]
     beside = numbers(RunFolder(tmp_path / "out"), "reference")
     assert "energy/total" in beside and "cost/frame" not in beside
-    returned = score.score(files[0], *words, "-o", str(tmp_path / "again"))
+    returned = score.score(files[0], *options, "-o", str(tmp_path / "again"))
     assert returned["metrics"]["energy/strain"]["value"] == strain
     with pytest.raises(ValueError, match="no such file"):
-        score.score(tmp_path / "absent.npz", *words, "-o", str(tmp_path / "none"))
+        score.score(tmp_path / "absent.npz", *options, "-o", str(tmp_path / "none"))
     assert not (tmp_path / "none").exists()
 
 
@@ -113,7 +114,7 @@ def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_pat
     cloth = Trajectory.load(simulated)
     positions, faces = thirds(cloth.positions, cloth.faces)
     np.savez(tmp_path / "fine.npz", positions=positions + np.array([0.0, 0.0, 2e-3]), faces=faces)
-    words = [
+    options = [
         "--scene",
         "hanging_sheet",
         "--preset",
@@ -123,46 +124,46 @@ def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_pat
         "-o",
         str(tmp_path / "out"),
     ]
-    assert score.main([str(tmp_path / "fine.npz"), *words]) == 2
+    assert score.main([str(tmp_path / "fine.npz"), *options]) == 2
     assert "give --other-mesh" in capsys.readouterr().err
-    assert score.main([str(tmp_path / "fine.npz"), *words, "--other-mesh"]) == 0
+    assert score.main([str(tmp_path / "fine.npz"), *options, "--other-mesh"]) == 0
     assert "Chamfer distance" in capsys.readouterr().out
-    found = numbers(RunFolder(tmp_path / "out"), "fine")
-    assert set(found) == {"surface/chamfer", "surface/normals"}
-    assert 0.0 < found["surface/chamfer"] <= 2.0  # mm: it is shifted along itself too
+    metrics = numbers(RunFolder(tmp_path / "out"), "fine")
+    assert set(metrics) == {"surface/chamfer", "surface/normals"}
+    assert 0.0 < metrics["surface/chamfer"] <= 2.0  # mm: it is shifted along itself too
     assert "energy/total" in numbers(RunFolder(tmp_path / "out"), "reference")
 
 
 def test_without_a_reference_the_reason_is_said(made, tmp_path, monkeypatch):
     without_report(monkeypatch)
     file = str(made.trajectory_path("hanging_sheet", "newton-1"))
-    words = ["--scene", "hanging_sheet", "--preset", "smoke", "--no-reference", "-o", str(tmp_path / "out")]
-    assert score.main([file, *words, "--name", "mine"]) == 0
+    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--no-reference", "-o", str(tmp_path / "out")]
+    assert score.main([file, *options, "--name", "mine"]) == 0
     rows = RunFolder(tmp_path / "out").read_rows()
     assert [(row.status, row.reason) for row in rows if row.role == "reference"] == [
         ("skipped", NO_REFERENCE)
     ]
-    found = {row.metric for row in rows if row.role == "external"}
-    assert {"energy/total", "gap/energy", "curvature/mean"} <= found
-    assert not found & {"curvature/error", "distance/rms", "gap/relative", "cost/frame"}
+    metrics = {row.metric for row in rows if row.role == "external"}
+    assert {"energy/total", "gap/energy", "curvature/mean"} <= metrics
+    assert not metrics & {"curvature/error", "distance/rms", "gap/relative", "cost/frame"}
 
 
 def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_changed(made, tmp_path):
     def of_mine() -> Cell:
-        plan = planned(*words)
+        plan = planned(*flags)
         (stored,) = (cell for cell in plan.cells if cell.method == "mine")  # the flag has no file
         return digest(Schedule(plan).cell(stored).inputs), stored
 
     frames = Trajectory.load(made.trajectory_path("hanging_sheet", "newton-1")).positions
     np.savez(tmp_path / "hanging_sheet.npz", positions=frames)
-    words = ["--preset", "smoke", "--scenes", "hanging_sheet,flag", "--suite", "speed", "-o", str(made.path)]
-    words += ["--methods", "simulation,newton-1", "--rollout", f"mine={tmp_path}/{{scene}}.npz,ms=1"]
+    flags = ["--preset", "smoke", "--scenes", "hanging_sheet,flag", "--suite", "speed", "-o", str(made.path)]
+    flags += ["--methods", "simulation,newton-1", "--rollout", f"mine={tmp_path}/{{scene}}.npz,ms=1"]
     key, stored = of_mine()
     assert stored.scene.name == "hanging_sheet" and stored.suites == ("speed",) and not stored.timed
     assert of_mine()[0] == key
     np.savez(tmp_path / "hanging_sheet.npz", positions=frames + 1e-3)
     assert of_mine()[0] != key
-    words[-1] = f"mine={tmp_path}/hanging_sheet.npz"
+    flags[-1] = f"mine={tmp_path}/hanging_sheet.npz"
     with pytest.raises(PlanError, match="2 are asked for: name it with"):
         of_mine()
 
@@ -178,9 +179,9 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, monkeypatch,
     held |= {"obstacle": obstacle, "obstacle_faces": scene.obstacle.faces}
     (tmp_path / "pred.pkl").write_bytes(pickle.dumps(held))
     write_obj(tmp_path / "rest.obj", scene.cloth.rest_positions, scene.cloth.faces, None)
-    words = [str(tmp_path / "pred.pkl"), "--rest-mesh", str(tmp_path / "rest.obj"), "--no-reference"]
-    assert score.main([*words, "--preset", "smoke", "-o", str(tmp_path / "out")]) == 0
-    found = {
+    arguments = [str(tmp_path / "pred.pkl"), "--rest-mesh", str(tmp_path / "rest.obj"), "--no-reference"]
+    assert score.main([*arguments, "--preset", "smoke", "-o", str(tmp_path / "out")]) == 0
+    metrics = {
         row.metric: row.value for row in RunFolder(tmp_path / "out").read_rows() if row.role == "external"
     }
     group = SceneRollOuts(scene, gap_samples=SMOKE.gap_samples)
@@ -188,16 +189,18 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, monkeypatch,
     values = measured(group.roll_outs[0])[0]
     expected = {name: value.value if isinstance(value, Estimate) else value for name, value in values.items()}
     expected.pop("solver/relaxed_frames")  # which a file does not say
-    assert found == expected and found["penetration/vertices"] >= 0.0 and found["energy/collision"] > 0.0
-    assert score.main([words[0], "--rest-mesh", words[0], "-o", str(tmp_path / "no")]) == 2
+    assert (
+        metrics == expected and metrics["penetration/vertices"] >= 0.0 and metrics["energy/collision"] > 0.0
+    )
+    assert score.main([arguments[0], "--rest-mesh", arguments[0], "-o", str(tmp_path / "no")]) == 2
     assert capsys.readouterr().err.splitlines()[-1].count("pred.pkl") >= 1 and not (tmp_path / "no").exists()
     # All of it in centimetres, and nobody says so: nothing in the file contradicts it but its size.
     large = {**held, "pred": 100.0 * held["pred"], "obstacle": 100.0 * obstacle}
     (tmp_path / "pred.pkl").write_bytes(pickle.dumps(large))
     write_obj(tmp_path / "rest.obj", 100.0 * scene.cloth.rest_positions, scene.cloth.faces, None)
-    assert score.main([*words, "--preset", "smoke", "-o", str(tmp_path / "no")]) == 2
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert "m across in --units m: say --units cm" in said and not (tmp_path / "no").exists()
+    assert score.main([*arguments, "--preset", "smoke", "-o", str(tmp_path / "no")]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert "m across in --units m: say --units cm" in error and not (tmp_path / "no").exists()
 
 
 REFUSED = {
@@ -218,7 +221,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_refusal_is_one_line_and_leaves_nothing(name, tmp_path, monkeypatch, refused):
-    words, hint = REFUSED[name]
+    arguments, hint = REFUSED[name]
     np.savez(tmp_path / "mine.npz", positions=np.ones((10, 5, 3)))
     monkeypatch.chdir(tmp_path)
-    refused(hint, score.main, [*words, "--preset", "smoke", "-o", "out"])
+    refused(hint, score.main, [*arguments, "--preset", "smoke", "-o", "out"])

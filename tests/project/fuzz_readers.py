@@ -186,8 +186,8 @@ def frame_energies_csv() -> bytes:
 
 
 def run_json() -> bytes:
-    said = {"preset": "smoke", "stages": [{"name": "cells", "seconds": 1.0}], "earlier": []}
-    RunFolder(".").write_config(declaration(all_rows(), **said, started="2030-01-02T03:04:05+00:00"))
+    settings = {"preset": "smoke", "stages": [{"name": "cells", "seconds": 1.0}], "earlier": []}
+    RunFolder(".").write_config(declaration(all_rows(), **settings, started="2030-01-02T03:04:05+00:00"))
     return Path("run.json").read_bytes()
 
 
@@ -288,8 +288,8 @@ def bytes_of(data: bytes, draw: random.Random) -> bytes:
             data = data[:end] + data[at:]
         elif kind == 4:
             data = data[:at] + draw.choice((b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0" * 16)) + data[at + 8 :]
-        elif kind == 5 and (found := list(re.finditer(rb"\d+(\.\d+)?", data))):
-            number = draw.choice(found)
+        elif kind == 5 and (matches := list(re.finditer(rb"\d+(\.\d+)?", data))):
+            number = draw.choice(matches)
             data = data[: number.start()] + draw.choice(NUMBERS) + data[number.end() :]
         else:
             data = data[:at] + draw.randbytes(draw.randint(0, 40)) + data[at:]
@@ -395,22 +395,22 @@ def problem_of(reader: Reader, path: Path) -> tuple[str, bool]:
 @contextmanager
 def quiet() -> Iterator[list[str]]:
     """Everything printed meanwhile, also by libraries in C, in place of printing it."""
-    said: list[str] = []
+    output: list[str] = []
     with open("printed", "w+b") as file:
         kept = [os.dup(1), os.dup(2)]
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
         try:
-            yield said
+            yield output
         finally:
             sys.stdout.flush()
             sys.stderr.flush()
-            for number, there in zip((1, 2), kept):
-                os.dup2(there, number)
-                os.close(there)
+            for number, descriptor in zip((1, 2), kept):
+                os.dup2(descriptor, number)
+                os.close(descriptor)
             file.seek(0)
             if printed := file.read().decode(errors="replace"):
-                said.append(printed)
+                output.append(printed)
 
 
 def main(count: int, folder: Path, first: int = 0) -> dict[str, Any]:

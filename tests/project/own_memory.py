@@ -23,11 +23,11 @@ def own_memory(pid: int | str = "self") -> int:
 
 def children(pid: int) -> list[int]:
     """Processes that its threads have started."""
-    found: list[int] = []
+    pids: list[int] = []
     for thread in Path(f"/proc/{pid}/task").glob("*/children"):
         with suppress(OSError):  # it has just ended
-            found += map(int, thread.read_text().split())
-    return found
+            pids += map(int, thread.read_text().split())
+    return pids
 
 
 def slope(samples: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -53,10 +53,10 @@ def files_up_to(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def limited(size: int, *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+def limited(size: int, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """The command in a process of its own under that limit."""
     return subprocess.run(
-        [sys.executable, "-m", *words],
+        [sys.executable, "-m", *arguments],
         cwd=cwd, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
     )  # fmt: skip
@@ -118,14 +118,14 @@ def test_a_simulation_stops_in_one_line_and_resumes_to_the_same_bits(tmp_path, m
     positions, faces = grid(6, 6, width=0.4, depth=0.4)
     lines = [f"v {x} {y} {z}\n" for x, y, z in positions] + [f"f {a} {b} {c}\n" for a, b, c in faces + 1]
     Path("sheet.obj").write_text("".join(lines))
-    words = ["sheet.obj", "--pins", "0,6", "--frames", "12", "--quiet", "-o"]
-    assert command.main([*words, "whole.vtkhdf"]) == 0
+    arguments = ["sheet.obj", "--pins", "0,6", "--frames", "12", "--quiet", "-o"]
+    assert command.main([*arguments, "whole.vtkhdf"]) == 0
     limit = Path("whole.vtkhdf").stat().st_size + ROOM_FOR_HDF5 - 10_000
-    stopped = limited(limit, "reference_sim.simulate", *words, "a.vtkhdf", cwd=tmp_path)
+    stopped = limited(limit, "reference_sim.simulate", *arguments, "a.vtkhdf", cwd=tmp_path)
     assert stopped.returncode == 1 and stopped.stderr.count("\n") == 1
     assert stopped.stderr.startswith("simulate: a.vtkhdf: File too large") and "--resume" in stopped.stderr
     assert 1 <= Trajectory.load("a.vtkhdf").frames < 12
-    assert command.main([*words, "a.vtkhdf", "--resume"]) == 0
+    assert command.main([*arguments, "a.vtkhdf", "--resume"]) == 0
     whole, resumed = Trajectory.load("whole.vtkhdf"), Trajectory.load("a.vtkhdf")
     np.testing.assert_array_equal(resumed.positions, whole.positions)
     for name, values in whole.frame_fields.items():
@@ -157,7 +157,7 @@ def in_process(folder, assets, workers) -> InProcess:
 @pytest.mark.parametrize("own_processes", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(execution, "make_report", lambda log: "")
-    words = [
+    arguments = [
         "--preset",
         "smoke",
         "--suite",
@@ -170,18 +170,18 @@ def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatc
     ]
     folder, other = RunFolder(tmp_path / "a"), RunFolder(tmp_path / "b")
     if own_processes:
-        stopped = limited(100_000, "benchmarks.run", *words, str(folder.path), cwd=ROOT)
-        status, said = stopped.returncode, stopped.stderr
+        stopped = limited(100_000, "benchmarks.run", *arguments, str(folder.path), cwd=ROOT)
+        status, errors = stopped.returncode, stopped.stderr
     else:
         monkeypatch.setattr(execution, "LocalExecutor", in_process)
         with files_up_to(100_000):
-            status = run.main([*words, str(folder.path)])
-        said = capsys.readouterr().err
-    (line,) = (line for line in said.splitlines() if line.startswith("benchmarks.run: "))
-    assert status == 1 and "Traceback" not in said and line.endswith("the same command goes on from there")
+            status = run.main([*arguments, str(folder.path)])
+        errors = capsys.readouterr().err
+    (line,) = (line for line in errors.splitlines() if line.startswith("benchmarks.run: "))
+    assert status == 1 and "Traceback" not in errors and line.endswith("the same command goes on from there")
     assert "simulation.vtkhdf.part: File too large" in line
     assert folder.read_config()["interrupted"] and not list(folder.path.rglob("*.part*"))
-    assert run.main([*words, str(folder.path)]) == run.main([*words, str(other.path)]) == 0
+    assert run.main([*arguments, str(folder.path)]) == run.main([*arguments, str(other.path)]) == 0
     rows, others = (
         [(r.metric, r.value, r.status) for r in made.read_rows() if "cost/" not in r.metric]
         for made in (folder, other)

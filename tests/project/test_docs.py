@@ -33,8 +33,8 @@ LONG = (
 
 def blocks(text: str) -> Iterator[tuple[str, str, str]]:
     """(line before, language, content) of each block of code."""
-    for found in re.finditer(r"(?:^([^\n]*)\n\n?)?^```(\w*)\n(.*?)^```$", text, re.M | re.S):
-        yield (found[1] or "").strip(), found[2], found[3]
+    for match in re.finditer(r"(?:^([^\n]*)\n\n?)?^```(\w*)\n(.*?)^```$", text, re.M | re.S):
+        yield (match[1] or "").strip(), match[2], match[3]
 
 
 def sections(text: str) -> dict[str, str]:
@@ -54,16 +54,16 @@ def user(tmp_path_factory) -> Path:
         (folder / path.name).write_bytes(path.read_bytes())
     for section in SECTIONS.values():
         for before, _, content in blocks(section):
-            if found := FILE.search(before):
-                (folder / found[1]).write_text(content, encoding="utf-8")
+            if match := FILE.search(before):
+                (folder / match[1]).write_text(content, encoding="utf-8")
     return folder
 
 
 def run(folder: Path, line: str) -> None:
-    found = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PATH": found, "MPLBACKEND": "Agg"}
-    words = ["bash", "-ec", line]
-    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    search_path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PATH": search_path, "MPLBACKEND": "Agg"}
+    command = ["bash", "-ec", line]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
 
 

@@ -26,9 +26,9 @@ def test_mutated_files_are_refused_in_one_line(count, tmp_path):
     last = tmp_path / "last"
     at = last.read_text() if last.is_file() else "the valid files"
     assert done.returncode == 0, f"ended at {at}: {done.stderr[-2000:]}"
-    found = json.loads(done.stdout)
-    assert found["problems"] == []
-    assert found["refused"] > 0.7 * count and found["peak"] < 2000.0 and found["slowest"] < 10.0
+    summary = json.loads(done.stdout)
+    assert summary["problems"] == []
+    assert summary["refused"] > 0.7 * count and summary["peak"] < 2000.0 and summary["slowest"] < 10.0
 
 
 @pytest.mark.parametrize("name", [b"a" * 246, b"walk\xff", b"two\nlines", b"=1+1", b"@walk"])

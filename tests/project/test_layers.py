@@ -157,8 +157,8 @@ def demand_no_circle(sources: Mapping[str, str]) -> None:
         inside = f"{module}."
         package = module if any(name.startswith(inside) for name in sources) else module.rpartition(".")[0]
         named = [name for _, name in imports(ast.parse(source), package)]
-        found = {name if name in sources else name.rpartition(".")[0] for name in named}
-        graph[module] = found & set(sources) - {module}
+        modules = {name if name in sources else name.rpartition(".")[0] for name in named}
+        graph[module] = modules & set(sources) - {module}
     TopologicalSorter(graph).prepare()
 
 

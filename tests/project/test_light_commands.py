@@ -23,7 +23,7 @@ print("LOADED", *sys.modules)
 LIBRARIES = {"torch", "numba", "igl", "scipy", "pyvista"}
 MEASURED = LIBRARIES | {"vtk", "vtkmodules", "pandas", "skfem", "matplotlib"}
 
-# module, its words, a word of its answer, what must not be loaded.
+# module, its arguments, a word of its answer, what must not be loaded.
 LIGHT = [
     ("benchmarks.run", ["--help"], "hanging_sheet", MEASURED),
     ("benchmarks.run", ["--list"], "hanging_sheet", MEASURED),
@@ -44,19 +44,21 @@ LIGHT = [
 
 
 @pytest.mark.parametrize(
-    ("module", "words", "answer", "heavy"), LIGHT, ids=[" ".join([name, *words]) for name, words, *_ in LIGHT]
+    ("module", "arguments", "answer", "heavy"),
+    LIGHT,
+    ids=[" ".join([name, *arguments]) for name, arguments, *_ in LIGHT],
 )
-def test_nothing_heavy_is_loaded_before_there_is_something_to_do(module, words, answer, heavy, tmp_path):
+def test_nothing_heavy_is_loaded_before_there_is_something_to_do(module, arguments, answer, heavy, tmp_path):
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
-        [sys.executable, "-c", PROBE, module, *words],
+        [sys.executable, "-c", PROBE, module, *arguments],
         capture_output=True, text=True, timeout=120, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     after = resource.getrusage(resource.RUSAGE_CHILDREN)  # of the processor: others may have the machine
     assert done.returncode == 0 and done.stderr == "", done.stderr
-    said, _, modules = done.stdout.rpartition("LOADED")
+    output, _, modules = done.stdout.rpartition("LOADED")
     loaded = set(modules.split())
-    assert answer in said and "runpy" in loaded and loaded.isdisjoint(heavy), loaded & heavy
+    assert answer in output and "runpy" in loaded and loaded.isdisjoint(heavy), loaded & heavy
     assert list(tmp_path.iterdir()) == []
-    if words != ["--dry-run"]:  # which reads clips
+    if arguments != ["--dry-run"]:  # which reads clips
         assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1.0

@@ -24,10 +24,10 @@ LOOP = 120  # frames in which the ball goes round
 def growth(samples: list[tuple[int, int]], unit: str) -> tuple[float, float]:
     """Slope and its error [bytes] of what is left once everything is loaded and compiled."""
     late = [(number, 1024 * kilobytes) for number, kilobytes in samples[len(samples) // 10 :]]
-    found, error = slope(late)
+    rate, error = slope(late)
     first, last = late[0][1] / 1e6, late[-1][1] / 1e6
-    print(f"{first:.1f} to {last:.1f} MB, {found:.0f} ± {error:.0f} bytes a {unit}")
-    return found, error
+    print(f"{first:.1f} to {last:.1f} MB, {rate:.0f} ± {error:.0f} bytes a {unit}")
+    return rate, error
 
 
 def test_a_simulation_of_many_frames_keeps_the_frames_alone(tmp_path):
@@ -54,9 +54,9 @@ def test_a_simulation_of_many_frames_keeps_the_frames_alone(tmp_path):
     assert made.frames == FRAMES and made.frame_fields["converged"].mean() > 0.99
     moved = np.abs(made.positions[-1] - made.positions[-1 - LOOP // 2]).max()
     assert moved > 0.01  # it was not at rest
-    found, error = growth(samples, "frame")
+    rate, error = growth(samples, "frame")
     kept = 24 * cloth.vertex_count + 3000  # positions; times, counts and energies by name
-    assert found < kept + 3 * error
+    assert rate < kept + 3 * error
 
 
 def test_a_training_of_many_steps_keeps_its_history_alone(tmp_path):
@@ -71,5 +71,5 @@ def test_a_training_of_many_steps_keeps_its_history_alone(tmp_path):
     train_network("snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, recipe=recipe,
           progress=False, every=100, checkpoint=checkpoint, stop=look)  # fmt: skip
     assert len(samples) == STEPS
-    found, _ = growth(samples[::400], "step")
-    assert found < 1000  # positions of one frame, kept in each, would be 1800
+    rate, _ = growth(samples[::400], "step")
+    assert rate < 1000  # positions of one frame, kept in each, would be 1800

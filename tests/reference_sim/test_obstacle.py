@@ -278,9 +278,9 @@ def test_as_many_samples_from_elsewhere_meet_their_own_faces():
     obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.15)
     left, right = rest[rest[:, 0] < -0.3][:40], rest[rest[:, 0] > 0.3][:40]
     for home in (left, right, left):
-        found = obstacle.planes(rest[:40], 0, home)
+        planes = obstacle.planes(rest[:40], 0, home)
         fresh = Obstacle(rest, faces, rest_positions=rest, region=0.15).planes(rest[:40], 0, home)
-        assert (found.faces == fresh.faces).all() and (found.points == fresh.points).all()
+        assert (planes.faces == fresh.faces).all() and (planes.points == fresh.points).all()
 
 
 def test_each_frame_has_its_own_surface_and_the_last_one_stays():

@@ -158,13 +158,13 @@ def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
 def test_a_residual_within_the_tolerance_up_to_round_off_alone_says_so():
     """A hundred kilometres away the computed residual is small; round-off of positions may be 3e-6 of it."""
     cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    there = simulate(cloth, terms_of(cloth), start=SHEET + np.array([1e5, 0.0, 0.0]), frames=3)
-    residual, relaxed = (there.frame_fields[name] for name in ("gradient_norm", "relaxed"))
+    trajectory = simulate(cloth, terms_of(cloth), start=SHEET + np.array([1e5, 0.0, 0.0]), frames=3)
+    residual, relaxed = (trajectory.frame_fields[name] for name in ("gradient_norm", "relaxed"))
     hidden = 1 + int(np.flatnonzero(residual[1:] <= 1e-6)[0])
-    assert relaxed[1:].all() and there.status == "converged" and residual[hidden] > 0.0
+    assert relaxed[1:].all() and trajectory.status == "converged" and residual[hidden] > 0.0
     here = simulate(cloth, terms_of(cloth), frames=3)
     assert not here.frame_fields["relaxed"].any() and here.reason == ""
-    assert re.match(r"frame 1: round-off: ", there.reason)
+    assert re.match(r"frame 1: round-off: ", trajectory.reason)
 
 
 def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):

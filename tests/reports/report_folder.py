@@ -46,8 +46,8 @@ DECLARED: dict[str, dict[str, Any]] = {
         for name in ("no-bending", "no-noise", "noise-alone", "no-inertia", "no-strain", "springs", "window6")
     },
     **{
-        f"{name}-{k}": {"role": "solver", "family": name, "level": k, "label": f"{words}, {k} iterations"}
-        for name, words in SOLVERS.items()
+        f"{name}-{k}": {"role": "solver", "family": name, "level": k, "label": f"{solver}, {k} iterations"}
+        for name, solver in SOLVERS.items()
         for k in (1, 2, 4, 5, 8, 10, 16, 20)
     },
     **{
@@ -76,14 +76,14 @@ BETTER_LOWER = ("energy/strain", "energy/total", "curvature/error", "penetration
 
 def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *, seed=0, **more) -> Row:
     """A row with the columns that its scene and method declare."""
-    own = DECLARED.get(method, {})
-    network = own.get("role", "network") in ("network", "ablation", "warm-started")
+    entry = DECLARED.get(method, {})
+    network = entry.get("role", "network") in ("network", "ablation", "warm-started")
     garment, _, motion = scene.partition("/")
     declared = {
-        "role": own.get("role", "network"), "family": own.get("family", method), "base": own.get("base", ""),
-        "level": own.get("level"),
-        "seeded": own.get("seeded", network) and not metric.startswith("cost/"),
-        "pairing_group": own.get("pairing_group", method if network else ""),
+        "role": entry.get("role", "network"), "family": entry.get("family", method),
+        "base": entry.get("base", ""), "level": entry.get("level"),
+        "seeded": entry.get("seeded", network) and not metric.startswith("cost/"),
+        "pairing_group": entry.get("pairing_group", method if network else ""),
         "garment": garment if motion else "", "motion": motion, "part": "whole" if motion else "",
     }  # fmt: skip
     more = {"suite": "garments", "unit": "J", **declared, **more}
@@ -116,7 +116,7 @@ def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
             }
             for name, r in metrics.items()
         },
-        "methods": {name: {"label": own["label"]} for name, own in DECLARED.items()},
+        "methods": {name: {"label": entry["label"]} for name, entry in DECLARED.items()},
         "scenes": {r.scene: {} for r in sorted(rows, key=lambda r: r.garment != "tshirt") if r.garment},
         "cases": cases,
         **more,
@@ -176,9 +176,9 @@ def sheet(height: float) -> tuple[np.ndarray, np.ndarray]:
 def write_model(path: Path, kind: str, **last: float) -> None:
     """The header of a safetensors file, with a short history; best at step 3 on held-out motions."""
     history = [{"step": s, "seconds": 0.1 * s, "loss": 2.0 / s, **last} for s in (1, 2, 4)]
-    said = {"kind": kind, "unit": find_kind(kind).unit, "history": history}
-    said["summary"] = {"training_frames": 90, "validation": {"best_step": 3}}
-    header = json.dumps({"__metadata__": {"snug": json.dumps(said)}}).encode()
+    metadata = {"kind": kind, "unit": find_kind(kind).unit, "history": history}
+    metadata["summary"] = {"training_frames": 90, "validation": {"best_step": 3}}
+    header = json.dumps({"__metadata__": {"snug": json.dumps(metadata)}}).encode()
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(struct.pack("<Q", len(header)) + header)
 

@@ -45,15 +45,15 @@ def copy(built, tmp_path) -> RunFolder:
 
 def lines(folder, capsys) -> list[str]:
     status = check.main([str(folder.path)])
-    found = capsys.readouterr().out.splitlines()[:-1]
-    assert status == (1 if found else 0)
-    return found
+    complaints = capsys.readouterr().out.splitlines()[:-1]
+    assert status == (1 if complaints else 0)
+    return complaints
 
 
 def of_rows(rows, tmp_path, capsys) -> list[str]:
     """Without those on files of the report, which is not made."""
-    found = lines(run_folder(tmp_path / "run", rows, preset="smoke", commit="abc"), capsys)
-    return [line for line in found if not line.startswith("files")]
+    complaints = lines(run_folder(tmp_path / "run", rows, preset="smoke", commit="abc"), capsys)
+    return [line for line in complaints if not line.startswith("files")]
 
 
 def test_a_sound_run_has_no_finding(copy, capsys):
@@ -92,11 +92,11 @@ DEFECTS = {
 }
 
 
-@pytest.mark.parametrize("said", DEFECTS)
-def test_a_planted_defect_of_the_rows_is_found(said, tmp_path, capsys):
-    found = of_rows(DEFECTS[said], tmp_path, capsys)
-    assert any(said in line for line in found), found
-    assert len(found) == 1
+@pytest.mark.parametrize("complaint", DEFECTS)
+def test_a_planted_defect_of_the_rows_is_found(complaint, tmp_path, capsys):
+    complaints = of_rows(DEFECTS[complaint], tmp_path, capsys)
+    assert any(complaint in line for line in complaints), complaints
+    assert len(complaints) == 1
 
 
 def test_a_time_that_a_program_declares_was_repeated_by_nobody_here(tmp_path, capsys):
@@ -116,11 +116,11 @@ def test_tables_that_were_edited_are_found(copy, capsys):
     path = copy.tables / "energies.csv"
     path.write_text(path.read_text().replace("1.25", "1.26"))
     (copy.tables / "cost.csv").unlink()
-    found = lines(copy, capsys)
-    said = f"run python -m reports.build {copy.path}"
-    assert f"files     tables/energies.csv is not what results.csv gives: {said}" in found
-    assert f"files     tables/cost.csv is absent: {said}" in found
-    assert len(found) == 2
+    complaints = lines(copy, capsys)
+    advice = f"run python -m reports.build {copy.path}"
+    assert f"files     tables/energies.csv is not what results.csv gives: {advice}" in complaints
+    assert f"files     tables/cost.csv is absent: {advice}" in complaints
+    assert len(complaints) == 2
 
 
 def test_a_report_that_is_not_there_is_a_finding(copy, capsys):

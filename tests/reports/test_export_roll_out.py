@@ -43,8 +43,8 @@ def truth(run, method="snug", seed=0) -> Trajectory:
 
 def read_obj(path):
     lines = [line.split() for line in path.read_text().splitlines()]
-    vertices = np.array([words[1:] for words in lines if words[0] == "v"], dtype=float)
-    return vertices, np.array([words[1:] for words in lines if words[0] == "f"], dtype=int) - 1
+    vertices = np.array([fields[1:] for fields in lines if fields[0] == "v"], dtype=float)
+    return vertices, np.array([fields[1:] for fields in lines if fields[0] == "f"], dtype=int) - 1
 
 
 def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp_path, capsys):
@@ -108,16 +108,16 @@ def test_usd_has_the_same_points_times_units_and_axis(run, tmp_path):
     assert UsdGeom.GetStageUpAxis(stage) == "Y" and UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     assert (stage.GetTimeCodesPerSecond(), stage.GetEndTimeCode()) == (30.0, 31.0)
     for name, mesh in meshes.items():
-        found = UsdGeom.Mesh.Get(stage, f"/roll_out/{name}")
-        assert np.array_equal(np.array(found.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3), mesh.faces)
-        codes = found.GetPointsAttr().GetTimeSamples()
+        prim = UsdGeom.Mesh.Get(stage, f"/roll_out/{name}")
+        assert np.array_equal(np.array(prim.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3), mesh.faces)
+        codes = prim.GetPointsAttr().GetTimeSamples()
         assert codes == pytest.approx(mesh.times * 30.0)
         for code, positions in zip(codes, mesh.positions):
-            assert np.array(found.GetPointsAttr().Get(code)) == pytest.approx(positions, abs=1e-7)
+            assert np.array(prim.GetPointsAttr().Get(code)) == pytest.approx(positions, abs=1e-7)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "hint"),
     [
         (["--scene", "tshirt/run"], "no scene is called 'tshirt/run'; there are tshirt/walk, tshirt/jump"),
         (["--method", "snugg"], "no method in tshirt/walk is called 'snugg'; there are simulation, snug"),
@@ -128,17 +128,17 @@ def test_usd_has_the_same_points_times_units_and_axis(run, tmp_path):
         (["-o", "here/mine.pc2"], "mine.obj, which is to lie beside it, is there already: name another"),
     ],
 )
-def test_what_cannot_be_written_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, said):
+def test_what_cannot_be_written_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, hint):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "here").mkdir()
     (tmp_path / "here" / "mine.obj").touch()
-    assert refused(said, written, run, "x.pc2", *change).startswith("reports.export: ")
+    assert refused(hint, written, run, "x.pc2", *change).startswith("reports.export: ")
 
 
 @pytest.mark.parametrize(("ending", "extra"), [(".abc", "alembic"), (".usdc", "usd")])
 def test_a_package_that_is_not_there_is_named_by_its_extra(run, tmp_path, monkeypatch, capsys, ending, extra):
-    writer, _, own = export.ARCHIVES[ending]
-    monkeypatch.setitem(export.ARCHIVES, ending, (writer, "no_such_package", own))
+    writer, _, extra_name = export.ARCHIVES[ending]
+    monkeypatch.setitem(export.ARCHIVES, ending, (writer, "no_such_package", extra_name))
     assert written(run, tmp_path / f"x{ending}") == 2
     assert f"pip install 'neural-garment-benchmark[{extra}]'" in capsys.readouterr().err
 

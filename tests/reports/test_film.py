@@ -82,11 +82,11 @@ def test_an_mp4_has_every_frame(run, tmp_path):
 def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monkeypatch):
     from reports.run.selected_roll_outs import select_roll_outs
 
-    said: list[str] = []
-    monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: said.append(label) or label)
+    labels: list[str] = []
+    monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: labels.append(label) or label)
     frames = list(film.draw_frames(select_roll_outs(run, SCENE, ["simulation", "snug"]), 100, 25.0))
     names = ["Simulation", "SNUG"]
-    assert len(frames) == 5 and said == names + names + 3 * [*names, "ended at 0.03 s: ok"]
+    assert len(frames) == 5 and labels == names + names + 3 * [*names, "ended at 0.03 s: ok"]
 
 
 def kept_of(*positions: np.ndarray) -> SelectedRollOuts:
@@ -125,7 +125,7 @@ def test_normals_of_a_sphere_point_outwards():
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "hint"),
     [
         (["--methods", "snug,simulatoin"], "no method in tshirt/walk is called 'simulatoin'"),
         (["-o", "x.avi"], "x.avi: a film ends in .mp4 or .gif"),
@@ -134,10 +134,10 @@ def test_normals_of_a_sphere_point_outwards():
         (["--width", "7"], "--width 64 to 2000"),
     ],
 )
-def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, said):
+def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, hint):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(film, "SWATCH", "pass")
-    assert refused(said, filmed, run, "x.gif", *change).startswith("reports.film: ")
+    assert refused(hint, filmed, run, "x.gif", *change).startswith("reports.film: ")
 
 
 def test_without_opengl_or_the_extra_it_says_what_to_install(run, tmp_path, monkeypatch, capsys):

@@ -40,8 +40,8 @@ KEPT = ("mine.png", "lead_mine.png", "map.txt", "gap-relative_against_cost-frame
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> RunFolder:
     """A whole run folder with its report, drawn without OpenGL, where figures of an earlier report lay."""
-    said = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
-    run = run_folder(tmp_path_factory.mktemp("run"), all_rows(), **said)
+    metadata = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
+    run = run_folder(tmp_path_factory.mktemp("run"), all_rows(), **metadata)
     for scene in SCENES:
         body, faces = sheet(0.0)
         write_mesh(run.trajectory_path(scene, "body"), body, faces, {})
@@ -113,8 +113,8 @@ def test_figures_of_an_earlier_report_are_removed_and_others_stay(made):
 
 def test_failed_cells_are_listed_once_with_their_reason(made):
     lines = read_csv(made.tables / "unfinished.csv")
-    found = [(x["scene"], x["method"], x["status"], x["reason"]) for x in lines]
-    assert found == [
+    cells = [(x["scene"], x["method"], x["status"], x["reason"]) for x in lines]
+    assert cells == [
         ("tshirt/walk", "supervised", "failed", "diverged at step 7"),
         ("tshirt/jump", "supervised", "failed", "diverged at step 7"),
         ("hanging_sheet", "snug", "skipped", "no body here"),
@@ -145,10 +145,10 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     (run.models).mkdir()
     (run.models / "snug-seed0.safetensors").write_bytes(b"\xff" * 20)
     assert build.main([str(tmp_path)]) == 1
-    said = capsys.readouterr()
-    assert "tshirt-walk/snug.vtkhdf" in said.err and "snug-seed0.safetensors" in said.err
-    assert said.out.splitlines()[-1] == str(run.report_path) and run.report_path.is_file()
-    assert said.out.startswith("Method ") and "SNUG has a relative excess of" in said.out
+    streams = capsys.readouterr()
+    assert "tshirt-walk/snug.vtkhdf" in streams.err and "snug-seed0.safetensors" in streams.err
+    assert streams.out.splitlines()[-1] == str(run.report_path) and run.report_path.is_file()
+    assert streams.out.startswith("Method ") and "SNUG has a relative excess of" in streams.out
 
 
 def test_curves_beside_a_trajectory_are_its_own(tmp_path):
@@ -171,8 +171,8 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     assert read_run(run).changed == []
     assert changed_files(read_run(run)) == ""
     run.write_rows(all_rows()[:-1])
-    said = changed_files(read_run(run))
-    assert said.startswith("Not as the run wrote them: results.csv.")
+    sentence = changed_files(read_run(run))
+    assert sentence.startswith("Not as the run wrote them: results.csv.")
 
 
 def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, refused):
@@ -189,20 +189,20 @@ def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, refuse
 
 def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
     rows = [*all_rows(), row(SCENES[0], "snug", "sound/volume", 60.0, unit="dB")]
-    said = declaration(rows)
-    said["metrics"]["sound/volume"] |= {"table": "acoustics", "title": "Volume"}
+    config = declaration(rows)
+    config["metrics"]["sound/volume"] |= {"table": "acoustics", "title": "Volume"}
     rows.append(row(SCENES[0], "snug", "energy/heat", 5.0))
-    said["metrics"]["energy/heat"] = {
+    config["metrics"]["energy/heat"] = {
         "unit": "J",
         "title": "Heat",
         "table": "energies",
         "definition": "warmth",
     }
-    found = make_tables(make_run(said, rows))
-    assert found["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1)),)
-    found["acoustics"].write_csv(tmp_path)
+    tables = make_tables(make_run(config, rows))
+    assert tables["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1)),)
+    tables["acoustics"].write_csv(tmp_path)
     assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
-    (heat,) = (column for column in found["energies"].columns if column.name == "energy/heat")
+    (heat,) = (column for column in tables["energies"].columns if column.name == "energy/heat")
     assert (heat.title, heat.unit) == ("Heat", "J")
 
 

@@ -59,8 +59,8 @@ def test_the_file_alone_gives_the_roll_out(tmp_path, monkeypatch, dressed, name)
     expected = roll_out(model, dressed, motion).positions
     for frame, now in enumerate(features):
         given = {"features": now, "transforms": turns[frame]} | dict(zip(["state"], state))
-        found, *state = session.run(None, given)
-        assert np.abs(found + pelvis[frame] - expected[frame]).max() < 2e-5
+        positions, *state = session.run(None, given)
+        assert np.abs(positions + pelvis[frame] - expected[frame]).max() < 2e-5
     monkeypatch.setattr(onnx_file, "TOLERANCE", -1.0)
     with pytest.raises(OnnxError, match=r"b\.onnx: a coordinate differs by .* m"):
         write_onnx(model, dressed, motion, tmp_path / "b.onnx")

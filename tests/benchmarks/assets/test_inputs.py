@@ -73,14 +73,14 @@ def test_each_file_of_a_run_is_opened_once_before_its_tasks(tmp_path, openings):
     body, garment = write_body(mine / "body.npz"), write_garment(mine / "top.obj")
     motions = write_motions(mine / "clips", "sway")
     scenes = ["--scenes", "top/sway", "--methods", "skinning", "--suite", "garments", "--preset", "smoke"]
-    words = [*scenes, "--body", body, "--garment", garment, "--motions", motions, "--test-motions", "sway"]
-    empty = planned(*words, "-o", str(tmp_path / "run"))
+    options = [*scenes, "--body", body, "--garment", garment, "--motions", motions, "--test-motions", "sway"]
+    empty = planned(*options, "-o", str(tmp_path / "run"))
     scene = empty.scenes[0].build(empty.open_assets())
     positions = np.zeros((scene.frames, scene.cloth.vertex_count, 3))
     np.savez(mine / "out.npz", positions=positions, faces=scene.cloth.faces)
     openings.clear()
-    words += ["--rollout", f"out={mine}/out.npz", "-o", str(tmp_path / "run")]
-    plan = planned(*words)
+    options += ["--rollout", f"out={mine}/out.npz", "-o", str(tmp_path / "run")]
+    plan = planned(*options)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "benchmarks.methods.outside.stored_roll_out.fit_to_scene", lambda stored, *_: (stored, [])
@@ -99,8 +99,8 @@ def test_a_roll_out_that_brings_its_own_scene_is_opened_once(tmp_path, openings)
     np.savez(mine / "out.npz", positions=positions, faces=[[0, 1, 2], [0, 2, 3]])
     (mine / "rest.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n")
     openings.clear()
-    words = [f"{mine}/out.npz", "--rest-mesh", f"{mine}/rest.obj", "--no-reference"]
-    plan = plan_roll_out(score_parser().parse_args([*words, "-o", str(tmp_path / "run")]), "")
+    arguments = [f"{mine}/out.npz", "--rest-mesh", f"{mine}/rest.obj", "--no-reference"]
+    plan = plan_roll_out(score_parser().parse_args([*arguments, "-o", str(tmp_path / "run")]), "")
     check_roll_outs(plan)
     assert openings == {"out.npz": 1, "rest.obj": 1}
 

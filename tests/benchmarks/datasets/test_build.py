@@ -41,12 +41,12 @@ def complaints(folder: Path) -> dict[str, str]:
 
 
 def test_the_index_says_what_there_is(built):
-    found = DataSet.read(built)
-    assert [line.name for line in found.sequences] == ["07_01", "02_01", "02_02"]
-    assert all(line.usable and line.status == "converged" and line.seconds > 0 for line in found.sequences)
-    for line, motion in zip(found.sequences, found.motions(), strict=True):
+    data_set = DataSet.read(built)
+    assert [line.name for line in data_set.sequences] == ["07_01", "02_01", "02_02"]
+    assert all(line.usable and line.status == "converged" and line.seconds > 0 for line in data_set.sequences)
+    for line, motion in zip(data_set.sequences, data_set.motions(), strict=True):
         whole = Trajectory.load(built / line.trajectory)
-        stored = found.targets()[line.name]
+        stored = data_set.targets()[line.name]
         assert stored.shape == whole.positions.shape == (line.frames, 150, 3) and motion.frames == FRAMES
         seen = whole.positions[3:7] - tube_dress().pelvis(motion)[3:7, None]
         assert np.array_equal(stored.read(slice(3, 7), ""), seen.astype(np.float32))
@@ -113,7 +113,7 @@ def test_what_another_build_ends_while_this_one_makes_ready_is_kept(tube, here, 
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "message"),
     [
         (["--settle", "5"], "another settle_frames: 2 there, 5 here"),
         (["--method", "fast-lbfgs-10"], "another method"),
@@ -126,9 +126,9 @@ def test_what_another_build_ends_while_this_one_makes_ready_is_kept(tube, here, 
         (["--only", "new"], "unknown state 'new'"),
     ],
 )
-def test_what_is_no_part_of_the_data_set_is_refused(mine, tube, here, more, said, refused):
+def test_what_is_no_part_of_the_data_set_is_refused(mine, tube, here, more, message, refused):
     before = (mine / INDEX).read_bytes()
-    refused(said, dataset.main, [*words(tube, mine), *more])
+    refused(message, dataset.main, [*words(tube, mine), *more])
     assert here.done == 0 and (mine / INDEX).read_bytes() == before
 
 
@@ -148,7 +148,7 @@ def test_more_sequences_are_mixed_from_the_given_ones(tube, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         (lambda i: i.pop("format"), "no index of a data set"),
         (lambda i: i.update(format=9), "format '9'; this version reads 1"),
@@ -162,9 +162,9 @@ def test_more_sequences_are_mixed_from_the_given_ones(tube, tmp_path):
         (lambda i: i.update(settings=[]), "no index of a data set"),
     ],
 )
-def test_a_broken_index_is_refused_in_a_line(mine, change, said):
+def test_a_broken_index_is_refused_in_a_line(mine, change, message):
     changed_index(mine, change)
-    with pytest.raises(DataSetError, match=said) as caught:
+    with pytest.raises(DataSetError, match=message) as caught:
         DataSet.read(mine)
     assert str(mine) in str(caught.value) and "\n" not in str(caught.value)
 

@@ -24,24 +24,24 @@ from tests.snug.training.dressing import tube_dress
 
 def taught(built: Path, kind: str, *, stored: bool, steps: int = 3, **options):
     """A network of the data set, from the files or from memory."""
-    found = DataSet.read(built)
-    trajectories: dict = found.targets()
+    data_set = DataSet.read(built)
+    trajectories: dict = data_set.targets()
     if not stored:
         trajectories = {
-            line.name: Trajectory.load(built / line.trajectory).positions for line in found.sequences
+            line.name: Trajectory.load(built / line.trajectory).positions for line in data_set.sequences
         }
     return train_network(
-        kind, tube_dress(), found.motions(), steps=steps, seed=0, recipe=RECIPE_OF_KIND[kind],
+        kind, tube_dress(), data_set.motions(), steps=steps, seed=0, recipe=RECIPE_OF_KIND[kind],
         trajectories=trajectories, progress=False, every=1, **options,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ["supervised", "tailornet"])
 def test_files_teach_the_same_as_memory_to_the_last_bit(built, kind, narrow):
-    there, stored = (taught(built, kind, stored=stored) for stored in (False, True))
-    for name, tensor in there.network.state_dict().items():
+    memory_model, stored = (taught(built, kind, stored=stored) for stored in (False, True))
+    for name, tensor in memory_model.network.state_dict().items():
         assert tensor.equal(stored.network.state_dict()[name]), name
-    assert [row["loss"] for row in there.history] == [row["loss"] for row in stored.history]
+    assert [row["loss"] for row in memory_model.history] == [row["loss"] for row in stored.history]
 
 
 def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp_path):
@@ -61,7 +61,7 @@ def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp
 
 
 @pytest.mark.parametrize(
-    ("kind", "damage", "said"),
+    ("kind", "damage", "message"),
     [
         ("supervised", lambda x: x.__setitem__((5, 7, 1), np.nan) or x, "'02_01' is not finite at frame 5"),
         ("supervised", lambda x: x[:-1], "expected \\(18, 150, 3\\) of float32"),
@@ -71,11 +71,11 @@ def test_a_training_from_files_goes_on_only_with_the_same_files(built, mine, tmp
         ("tailornet", lambda x: x.__setitem__((5, 7, 1), np.nan) or x, "'02_01' is not finite at frame 5"),
     ],
 )
-def test_vertices_that_are_not_as_the_index_says_are_named(mine, kind, damage, said):
+def test_vertices_that_are_not_as_the_index_says_are_named(mine, kind, damage, message):
     path = mine / DataSet.read(mine).sequences[1].vertices
-    found = damage(np.load(path))
-    path.write_bytes(path.read_bytes()[:-9]) if found is None else np.save(path, found)
-    with pytest.raises(TargetError, match=said):
+    vertices = damage(np.load(path))
+    path.write_bytes(path.read_bytes()[:-9]) if vertices is None else np.save(path, vertices)
+    with pytest.raises(TargetError, match=message):
         taught(mine, kind, stored=True)
 
 
@@ -87,18 +87,18 @@ def test_the_command_learns_from_a_data_set(built, tube, tmp_path, capsys, refus
         assert train_command.main([*given, "--model", "supervised", "--garment", str(tube)]) == 0
         assert out.is_file() and "3 motions, 54 frames, recipe supervised" in capsys.readouterr().out
         refused("garment: tube there, tshirt here", train_command.main, [*given, "--vertices", "300"])
-    for words, said in (
+    for options, message in (
         (["--model", "supervised"], "learns from simulations; add --dataset DIR"),
         (["--dataset", "x", "--motions", "y"], "leave out --motions"),
         (["--dataset", "x", "--model", "tailornet", "--recipe", "paper"], "leave out --recipe"),
         (["--dataset", str(tmp_path)], "no such file"),
     ):
-        refused(said, train_command.main, words)
+        refused(message, train_command.main, options)
 
 
 def test_settings_tell_garments_and_bodies_apart():
     dressed = tube_dress()
-    own = settings_of(dressed.body, dressed.garment)
+    settings = settings_of(dressed.body, dressed.garment)
     moved = dressed.garment.rest_positions.copy()
     moved[3, 1] += 1e-5
     larger = dataclasses.replace(dressed.body, template=1.01 * dressed.body.template)
@@ -107,6 +107,6 @@ def test_settings_tell_garments_and_bodies_apart():
         "body": settings_of(larger, dressed.garment),
     }
     for name, other in others.items():
-        assert [key for key in own if own[key] != other[key]] == [name]
+        assert [key for key in settings if settings[key] != other[key]] == [name]
     rounded = dataclasses.replace(dressed.garment, rest_positions=dressed.garment.rest_positions + 1e-12)
-    assert settings_of(dressed.body, rounded) == own
+    assert settings_of(dressed.body, rounded) == settings

@@ -59,19 +59,19 @@ def test_asymmetry_is_that_of_one_moved_vertex():
 
 
 class Bouncing(EngineCloth):
-    """Strip whose free part bounces as one mass on a spring; it tells `told` times the force of its pins."""
+    """Strip whose free part bounces as one mass on a spring; it tells `scale` times the force of its pins."""
 
     RATE = 20.0  # [1/s] of the spring
 
-    def __init__(self, sample, explicit, told=1.0):
+    def __init__(self, sample, explicit, scale=1.0):
         self.start, self.cloth = sample.start, sample.cloth
         self.free = np.setdiff1d(np.arange(len(self.start)), self.cloth.pins)
-        self.energies, self.explicit, self.told = (self,), explicit, told
+        self.energies, self.explicit, self.scale = (self,), explicit, scale
 
     def value_and_gradient(self, x):
         force = self.cloth.masses[self.free].sum() * self.RATE**2 * self.sag(x)
         gradient = np.zeros_like(x)
-        gradient[self.cloth.pins, 1] = self.told * force / len(self.cloth.pins)
+        gradient[self.cloth.pins, 1] = self.scale * force / len(self.cloth.pins)
         return 0.5 * force * self.sag(x), gradient
 
     def sag(self, x):
@@ -87,9 +87,9 @@ class Bouncing(EngineCloth):
 
 @pytest.mark.parametrize("explicit", [False, True])
 def test_pins_carry_weight_and_inertia_of_a_strip_that_bounces(explicit):
-    def reaction(told):
+    def reaction(scale):
         engine = dataclasses.replace(
-            REFERENCE, substeps=20, make=lambda sample, iterations: Bouncing(sample, explicit, told)
+            REFERENCE, substeps=20, make=lambda sample, iterations: Bouncing(sample, explicit, scale)
         )
         return laws.reaction_over_weight(roll_out(engine, specimen("strip")))
 

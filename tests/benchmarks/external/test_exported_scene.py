@@ -66,15 +66,15 @@ def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray
     local = rodrigues(moved["poses"].reshape(frames, -1, 3))
     world, at = np.empty((frames, 24, 3, 3)), np.empty((frames, 24, 3))
     for j, parent in enumerate(parents):
-        own = (
+        rotation = (
             local[:, j]
             if j < 22 or motion == "motion_smpl.npz"
             else np.broadcast_to(np.eye(3), (frames, 3, 3))
         )
         if parent < 0:
-            world[:, j], at[:, j] = own, joints[j] + moved["trans"]
+            world[:, j], at[:, j] = rotation, joints[j] + moved["trans"]
         else:
-            world[:, j] = world[:, parent] @ own
+            world[:, j] = world[:, parent] @ rotation
             at[:, j] = at[:, parent] + world[:, parent] @ (joints[j] - joints[parent])
     local = given["rest_positions"][:, None] - joints  # (V,24,3)
     placed = np.einsum("tjab,vjb->tvja", world, local) + at[:, None]
@@ -94,8 +94,8 @@ def rows_beside(scene, entry, trajectory, static) -> dict:
     group.quasi_static = expected_positions(scene)
     fall = Trajectory(group.quasi_static + 0.01, trajectory.faces, trajectory.times)
     held = None if static is None else static.positions
-    for one, made, own in ((find_method("simulation"), fall, None), (entry, trajectory, held)):
-        group.roll_outs.append(RollOut(group, one, made, suites=("garments",), quasi_static=own))
+    for one, made, static_answer in ((find_method("simulation"), fall, None), (entry, trajectory, held)):
+        group.roll_outs.append(RollOut(group, one, made, suites=("garments",), quasi_static=static_answer))
     return measured(group.roll_outs[1])[0]
 
 
@@ -103,20 +103,22 @@ def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home
     folder, scene = home
     inside = find_method("skinning").make(models=Path(), seed=0)
     inside.prepare(scene)
-    own = inside.run()
-    expected = rows_beside(scene, find_method("skinning"), own, inside.quasi_static())
+    trajectory = inside.run()
+    expected = rows_beside(scene, find_method("skinning"), trajectory, inside.quasi_static())
     elsewhere = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
-    assert np.abs(elsewhere - own.positions).max() < 1e-6  # the method computes in float32
+    assert np.abs(elsewhere - trajectory.positions).max() < 1e-6  # the method computes in float32
     np.savez(tmp_path / "mine.npz", positions=elsewhere, fps=30.0, quasi_static=elsewhere)
-    found = measured_of(scene, tmp_path / "mine.npz")
-    assert found.keys() == expected.keys() and len(found) > 25
+    metrics = measured_of(scene, tmp_path / "mine.npz")
+    assert metrics.keys() == expected.keys() and len(metrics) > 25
     for name, value in expected.items():
-        np.testing.assert_allclose(found[name], value, rtol=2e-3, atol=2e-5, err_msg=name)
+        np.testing.assert_allclose(metrics[name], value, rtol=2e-3, atol=2e-5, err_msg=name)
     # The very positions of the method, by way of a file: to the last digit.
-    np.savez(tmp_path / "own.npz", positions=own.positions, fps=30.0, quasi_static=own.positions)
+    np.savez(
+        tmp_path / "own.npz", positions=trajectory.positions, fps=30.0, quasi_static=trajectory.positions
+    )
     assert measured_of(scene, tmp_path / "own.npz") == expected
     # Without its answer to poses held still, what needs that is left out and nothing else.
-    np.savez(tmp_path / "less.npz", positions=own.positions)
+    np.savez(tmp_path / "less.npz", positions=trajectory.positions)
     less = measured_of(scene, tmp_path / "less.npz")
     assert {name.partition("/")[0] for name in expected.keys() - less.keys()} <= {"dynamics"}
     assert "dynamics/quasi_static_difference" not in less and less.items() <= expected.items()
@@ -173,15 +175,15 @@ def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name)
     curvature = curvature_series(positions, scene.cloth.faces).means()
     for frame in (0, 2, 7):
         x, last, last_but_one = (positions[max(frame - i, 0)] for i in range(3))
-        found = {
+        energies = {
             "strain": files.strain(x), "bending": files.bending(x), "gravity": files.gravity(x, frame),
             "inertia": files.inertia(x, last, last_but_one) if frame > 1 else 0.0,
             "collision": files.collision(x, frame),
         }  # fmt: skip
-        assert found.keys() | {"total"} == ours.keys() and (name != "sunk" or found["collision"] > 0)
-        for term, value in found.items():
+        assert energies.keys() | {"total"} == ours.keys() and (name != "sunk" or energies["collision"] > 0)
+        for term, value in energies.items():
             np.testing.assert_allclose(value, ours[term][frame], rtol=1e-10, err_msg=f"{term}, {frame}")
-        np.testing.assert_allclose(sum(found.values()), ours["total"][frame], rtol=1e-10)
+        np.testing.assert_allclose(sum(energies.values()), ours["total"][frame], rtol=1e-10)
         np.testing.assert_allclose(files.mean_curvature(x), curvature[frame], rtol=1e-10)
 
 

@@ -139,9 +139,9 @@ def test_hinges_as_printed_are_those_of_the_unscaled_energy():
 
     unscaled = BendHinge(SCENE.cloth, scaling="none")
     mean = np.mean([unscaled.value_and_gradient(x)[0] for x in X[SCENE.warm_up :]])
-    found = direct(X)
-    assert found["energy/bending_printed"] == pytest.approx(mean, rel=1e-14)
-    assert found["energy/bending_printed"] > 2.0 * found["energy/bending"]
+    metrics = direct(X)
+    assert metrics["energy/bending_printed"] == pytest.approx(mean, rel=1e-14)
+    assert metrics["energy/bending_printed"] > 2.0 * metrics["energy/bending"]
 
 
 # --- what does not belong to the scene -------------------------------------------------------------------
@@ -178,11 +178,11 @@ def test_what_does_not_belong_to_the_scene_is_refused_with_the_remedy(name, tmp_
 def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
     expected = direct(X)
     path = write("npz", tmp_path, Z_UP[:, ORDER], PLACE[FACES])
-    found = rows(path, units="cm", up="z", match_vertices=True)
-    assert found.keys() == expected.keys()
+    metrics = rows(path, units="cm", up="z", match_vertices=True)
+    assert metrics.keys() == expected.keys()
     for name in expected:
         ours, theirs = ([*of[name][:2], *dict(of[name].moved).values()] if isinstance(of[name], Estimate)
-                        else of[name] for of in (found, expected))  # fmt: skip
+                        else of[name] for of in (metrics, expected))  # fmt: skip
         np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-12)
 
 
@@ -203,8 +203,8 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
     times = np.arange(SCENE.frames) * SCENE.dt
     simulated = RollOut(group, find_method("simulation"), Trajectory(X, FACES, times), suites=("speed",))
     group.roll_outs.append(simulated)
-    found = measured(RollOut(group, entry, trajectory, suites=("speed",)))[0]
-    assert set(found) == {"surface/chamfer", "surface/normals"} and found["surface/chamfer"] < 1e-9
+    metrics = measured(RollOut(group, entry, trajectory, suites=("speed",)))[0]
+    assert set(metrics) == {"surface/chamfer", "surface/normals"} and metrics["surface/chamfer"] < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,8 @@ def test_a_symmetric_mesh_is_laid_on_itself_where_it_is_nearest(flip):
     both = np.concatenate([points, points + np.array([9.0, 0.0, 0.0])])
     order = RANDOM.permutation(72)
     theirs = np.argsort(order)[two][RANDOM.permutation(len(two))]
-    found = same_topology(theirs[:, ::-1] if flip else theirs, two, both[order], both)
-    assert np.array_equal(order[found], np.arange(72))
+    correspondence = same_topology(theirs[:, ::-1] if flip else theirs, two, both[order], both)
+    assert np.array_equal(order[correspondence], np.arange(72))
     theirs[0] = theirs[0, [1, 0, 2]]
     assert same_topology(theirs[:-1], two, both[order], both) is None
 
@@ -33,6 +33,6 @@ def test_a_mesh_with_a_thousand_symmetries_is_laid_on_itself_in_a_moment():
     points, faces, _ = torus(24, 0.3, 0.1)
     order = RANDOM.permutation(len(points))
     clock = time.perf_counter()
-    found = same_topology(np.argsort(order)[faces], faces, points[order] + 0.01, points)
-    assert np.array_equal(order[found], np.arange(len(points)))
+    correspondence = same_topology(np.argsort(order)[faces], faces, points[order] + 0.01, points)
+    assert np.array_equal(order[correspondence], np.arange(len(points)))
     assert time.perf_counter() - clock < 10.0

@@ -44,8 +44,8 @@ def test_the_elastica_is_that_of_shooting(gamma):
 @pytest.mark.parametrize("gamma", [0.05, 2.0, 8.0, 30.0, 700.0])
 def test_the_bending_length_is_that_of_the_shape(gamma):
     x, drop = exact_elastica(gamma, 0.0)[1]
-    found = bending_length(0.3, float(np.arctan2(drop[-1], x[-1])))
-    assert found == pytest.approx(0.3 / gamma ** (1 / 3), rel=1e-3)
+    length = bending_length(0.3, float(np.arctan2(drop[-1], x[-1])))
+    assert length == pytest.approx(0.3 / gamma ** (1 / 3), rel=1e-3)
 
 
 def test_the_strip_has_the_fabrics_stiffness_and_overhangs_by_twice_its_bending_length():

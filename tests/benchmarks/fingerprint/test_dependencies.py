@@ -100,8 +100,8 @@ def test_words_and_blanks_do_not_count(project):
 
 def test_packages_are_those_that_the_code_imports_installed_or_not(project):
     assert set(packages_of(code_of("benchmarks.methods.one"))) == {"numpy", "nowhere"}
-    found = packages_of(code_of("benchmarks.methods.other"))
-    assert found["nowhere"] == "absent" and found["numpy"].startswith("numpy ") and "torch" in found
+    packages = packages_of(code_of("benchmarks.methods.other"))
+    assert packages["nowhere"] == "absent" and packages["numpy"].startswith("numpy ") and "torch" in packages
 
 
 def test_a_name_that_nobody_defines_makes_all_of_its_package_count(project):
@@ -188,7 +188,7 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
     modules += [entry.module for entry in (*SCENES, *FURTHER_SCENES, *METHODS)]
     modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets.assets"]
     modules += list(MODULE_OF.values())
-    assert {name: found for name in modules if (found := lists & set(code_of(name)))} == {}
+    assert {name: files for name in modules if (files := lists & set(code_of(name)))} == {}
     # A shirt of preset quick is measured.
     lists -= {"benchmarks/presets.py", "benchmarks/scenes/__init__.py"}
     assert not any(lists & set(code_of(benchmark.module)) for benchmark in MICROBENCHMARKS)

@@ -21,9 +21,9 @@ NAMES = {
 
 
 def chosen(*methods, **changes):
-    words = {"suites": ("garments", "extremes"), "preset": find_preset("paper")} | changes
+    criteria = {"suites": ("garments", "extremes"), "preset": find_preset("paper")} | changes
     motions = Motions(("walk",), ("kick",), {}, ("twist_stop",))
-    cells = choose_cells(Selection(motions=motions, methods=methods, **words))[0]
+    cells = choose_cells(Selection(motions=motions, methods=methods, **criteria))[0]
     return {cell.method for cell in cells}
 
 
@@ -43,8 +43,8 @@ def test_a_deviation_is_a_method_for_whoever_names_it():
 
 
 def test_a_recipe_is_never_chosen_by_the_test_motions():
-    words = [word for line in EXAMPLES.splitlines() if "snug-without" in line for word in line.split()]
-    assert words and "--split validation" in EXAMPLES and "--test-motions" not in words
+    arguments = [word for line in EXAMPLES.splitlines() if "snug-without" in line for word in line.split()]
+    assert arguments and "--split validation" in EXAMPLES and "--test-motions" not in arguments
     motions = split_motions([], [], find_preset("quick"), split="validation")
     assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
     with pytest.raises(PlanError, match="'dance_turn' is a test motion"):

@@ -20,12 +20,12 @@ from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress
 
 
-def plan(*words):
-    return planned("--suite", "garments", *words)
+def plan(*options):
+    return planned("--suite", "garments", *options)
 
 
-def methods(*words):
-    return {cell.method for cell in plan(*words).cells}
+def methods(*options):
+    return {cell.method for cell in plan(*options).cells}
 
 
 def test_kinds_that_learn_vertices_are_those_that_get_simulations():
@@ -90,17 +90,17 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         return task.run(context(folder, assets, tell=tell), {})
 
     def killed(steps):
-        told.append(steps)
-        if len(told) == 2:
+        reports.append(steps)
+        if len(reports) == 2:
             raise KeyboardInterrupt
 
-    told, went_on = [], []
+    reports, went_on = [], []
     models = RunFolder(tmp_path).models
     for key in ("before", "now"):  # the first is another training: of other inputs, or of other code
-        told.clear()
+        reports.clear()
         with pytest.raises(KeyboardInterrupt):
             trained(tmp_path, key, killed)
-        assert told == [4, 4] and [path.name for path in models.iterdir()] == [CHECKPOINT]
+        assert reports == [4, 4] and [path.name for path in models.iterdir()] == [CHECKPOINT]
     result = trained(tmp_path, "now", went_on.append).result
     assert sum(went_on) == result["steps"] == 12 and len(went_on) < 3  # of three reports
     (tmp_path / "damaged" / "models").mkdir(parents=True)

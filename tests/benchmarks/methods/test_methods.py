@@ -48,7 +48,9 @@ SMALL_METHODS = [
     e for e in SMALL_METHODS if e.reporting.family != "simulation-perturbed" or e.reporting.level == 1e-9
 ]
 BY_LEVEL = sorted(SMALL_METHODS, key=lambda entry: (entry.reporting.family, entry.reporting.level or 0.0))
-COARSEST = [next(own) for family, own in itertools.groupby(BY_LEVEL, lambda e: e.reporting.family) if family]
+COARSEST = [
+    next(entries) for family, entries in itertools.groupby(BY_LEVEL, lambda e: e.reporting.family) if family
+]
 COARSEST += [find_method("simulation-1e-2")]
 FINER = [e for e in SMALL_METHODS if e.reporting.level is not None and e not in COARSEST] + [
     find_method("simulation-1e-8")
@@ -110,8 +112,8 @@ def trajectory_of(run, name, method) -> Trajectory:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
-    scene, found = scenes[name], outcomes_of(run, name)
-    for method, outcome in found.items():
+    scene, outcomes = scenes[name], outcomes_of(run, name)
+    for method, outcome in outcomes.items():
         if outcome.status == "skipped":
             assert outcome.reason and (scene.dressed is None or method in EXTERNAL)
             continue
@@ -120,11 +122,11 @@ def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
         assert trajectory.positions.shape == (scene.frames, *scene.cloth.rest_positions.shape)
         assert np.isfinite(trajectory.positions).all() and np.array_equal(trajectory.faces, scene.cloth.faces)
         seconds, result = trajectory.frame_seconds[1:], outcome.result  # as the method says
-        told = bool(np.isfinite(seconds).all())
-        assert told == (method != "direct-optimisation")
+        has_times = bool(np.isfinite(seconds).all())
+        assert has_times == (method != "direct-optimisation")
         timed = find_method(method).timed
-        assert ("frame_p95" in result) == (told and timed) and ("inputs" in result) == timed
-        if told and timed:
+        assert ("frame_p95" in result) == (has_times and timed) and ("inputs" in result) == timed
+        if has_times and timed:
             assert 0.0 < result["frame_p50"] <= result["frame_p95"] <= result["frame_worst"]
             assert result["frame_p50"] * len(seconds) / 2 <= result["seconds"] and (seconds > 0).all()
         if timed:
@@ -133,7 +135,7 @@ def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
         assert trajectory.provenance["scene"] == name
         given = 0 if find_method(method).gives_first_frame else 1
         assert outcome.result["frames"] == scene.frames - given
-    skipped = {method for method, outcome in found.items() if not outcome.files}
+    skipped = {method for method, outcome in outcomes.items() if not outcome.files}
     bound = {entry.name for entry in METHODS if entry.needs_body}
     assert skipped <= bound | EXTERNAL and (scene.dressed is None or skipped <= EXTERNAL)
 
@@ -149,8 +151,8 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
         for method, outcome in outcomes_of(run, name).items():
             if outcome.status == "skipped":
                 continue
-            own = [r for r in rows if (r.suite, r.scene, r.method) == ("speed", name, method)]
-            values = {row.metric: row.value for row in own}
+            cell_rows = [r for r in rows if (r.suite, r.scene, r.method) == ("speed", name, method)]
+            values = {row.metric: row.value for row in cell_rows}
             entry, on_body = find_method(method), scene.dressed is not None
             assert costs & set(values) == (costs if entry.timed else set())
             assert not entry.timed or (values["cost/whole"] > values["cost/frame"]) == on_body
@@ -159,8 +161,8 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
             assert len(against & set(values)) == (0 if method == "simulation" else len(against))
             ladder = method == "simulation" and "simulation-dt/8" in outcomes_of(run, name)
             # Where their order is not one, the difference to dt/8 takes the place of the error.
-            told = {name.replace("/eighth", "") for name in values if name.startswith("time_error/")}
-            assert ({"time_error/total", "time_error/curvature"} <= told) == ladder
+            time_errors = {name.replace("/eighth", "") for name in values if name.startswith("time_error/")}
+            assert ({"time_error/total", "time_error/curvature"} <= time_errors) == ladder
             network = method in KINDS
             assert ("cost/train" in values) == (entry.trained is not None)
             assert ("cost/batch" in values) == (network and entry.timed)
@@ -183,7 +185,7 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
                 assert values["dynamics/amplitude"] == values["dynamics/quasi_static_difference"] == 0.0
             if network:
                 assert (values["cost/data"] > 0.0) == (method == "supervised")
-            assert all(row.status == "ok" for row in own), (name, method, values)
+            assert all(row.status == "ok" for row in cell_rows), (name, method, values)
         by_method = {r.method: r.value for r in rows if r.scene == name and r.metric == "gap/local"}
         assert by_method["simulation"] == pytest.approx(0.0, abs=1e-12)
         errors = [r for r in rows if r.scene == name and r.metric == "distance/rms" and r.suite == "speed"]
@@ -234,11 +236,11 @@ def test_a_run_that_is_done_again_gives_the_same_and_inputs_are_what_it_takes_as
     assert np.array_equal(first, again) and np.array_equal(first, trajectory_of(run, BODY, name).positions)
     last = scene.frames - 1
     made = method.inputs(scene)(last)
-    own, body = made if "+" in name else (made, made)
+    pose, body = made if "+" in name else (made, made)
     if name not in ("skinning", "snug"):
         assert np.abs(body[0] - scene.obstacle.positions[last]).max() < 1e-12
     if name.startswith(("skinning", "snug")):
-        features, transforms, pelvis = own
+        features, transforms, pelvis = pose
         assert (features is None) == name.startswith("skinning") and transforms.shape == (24, 3, 4)
         rest, shifts = scene.dressed.body.joints()[0], scene.dressed.motion.translations
         assert np.array_equal(pelvis, rest + shifts[last])
@@ -262,16 +264,16 @@ def test_another_material_is_simulated_and_judged_by_the_scenes_own(exchange, pl
     entry = find_method(f"simulation-{exchange}")
     made = entry.make(models=None, seed=0)
     made.prepare(scene)
-    own, declared = made.scene.energies, scene.energies
+    energies, declared = made.scene.energies, scene.energies
     assert [term.name for term in declared] == ["strain", "bending", "gravity"]
-    assert [mine is theirs for mine, theirs in zip(own, declared)] == [k not in places for k in range(3)]
+    assert [mine is theirs for mine, theirs in zip(energies, declared)] == [k not in places for k in range(3)]
     trained = list(static_terms(scene.cloth, RECIPES[exchange]).values())
     for place in places:  # the very energies that the recipe of that name trains on
-        assert type(own[place]) is type(trained[place])
-        assert np.array_equal(own[place].stiffness, trained[place].stiffness)
+        assert type(energies[place]) is type(trained[place])
+        assert np.array_equal(energies[place].stiffness, trained[place].stiffness)
     if exchange == "printed-bending":
         k = scene.cloth.material.bending_stiffness
-        assert (own[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
+        assert (energies[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
     assert np.array_equal(made.scene.start, scene.start)
     group, trajectory = SceneRollOuts(scene), made.run()
     assert trajectory.status == "converged"
@@ -307,10 +309,12 @@ def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks
         (row.method, row.metric): row.value for row in rows if (row.suite, row.scene) == ("garments", BODY)
     }
     for method in kept:
-        own = np.array([line[3:] for line in lines if line[1] == method])
-        assert own[:, 0] == pytest.approx(scene.dt * np.arange(scene.warm_up, scene.frames), abs=1e-4)
+        table = np.array([line[3:] for line in lines if line[1] == method])
+        assert table[:, 0] == pytest.approx(scene.dt * np.arange(scene.warm_up, scene.frames), abs=1e-4)
         for place, term in enumerate(columns[4:], start=1):
-            assert own[:, place].mean() == pytest.approx(means[method, f"energy/{term}"], rel=1e-4, abs=1e-9)
+            assert table[:, place].mean() == pytest.approx(
+                means[method, f"energy/{term}"], rel=1e-4, abs=1e-9
+            )
     other = dataclasses.replace(rows[0], suite="speed")
     frame_energies.write(folder, [other])  # nothing takes part any more
     assert not folder.frame_energies_path.is_file()
@@ -333,16 +337,16 @@ def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_
         entry = find_method(method)
         group.roll_outs.append(RollOut(group, entry, trajectory, status=status, suites=("speed",)))
     with np.errstate(all="ignore"):
-        found, curves, _ = zip(*(measured(roll_out) for roll_out in group.roll_outs))
-    found, curves = dict(zip(lost, found)), dict(zip(lost, curves))
-    plain = {m: {n: getattr(v, "value", v) for n, v in values.items()} for m, values in found.items()}
-    assert np.isfinite(list(plain["simulation"].values())).all() and found["newton-4"] == {}
+        metrics, curves, _ = zip(*(measured(roll_out) for roll_out in group.roll_outs))
+    metrics, curves = dict(zip(lost, metrics)), dict(zip(lost, curves))
+    plain = {m: {n: getattr(v, "value", v) for n, v in values.items()} for m, values in metrics.items()}
+    assert np.isfinite(list(plain["simulation"].values())).all() and metrics["newton-4"] == {}
     assert plain["newton-1"]["distance/rms"] == 0.0 and np.isfinite(plain["newton-1"]["gap/energy"])
     assert np.isnan(plain["newton-8"]["gap/energy"])
     assert (
         len(curves["newton-1"]["energy/total"]) == 3 and np.isfinite(curves["newton-1"]["energy/total"]).all()
     )
-    assert not any(name.startswith("time_error") for name in found["simulation"])  # dt/8 was not whole
+    assert not any(name.startswith("time_error") for name in metrics["simulation"])  # dt/8 was not whole
 
 
 def test_curves_of_a_roll_out_that_was_lost_end_where_it_did(tmp_path):

@@ -45,12 +45,12 @@ def test_the_simulator_keeps_every_law(dropped):
     assert series.residual.shape == (7,) and series.residual.max() <= 1e-6
     assert series.force.max() / series.weight <= 2e-6 and series.torque.max() <= 1e-6
     assert (series.rise < 0).all() and (series.climb < 0).all()
-    found = series.metrics()
-    assert set(found) == {m.name for m in conservation.METRICS if m.reference_tolerance is None}
+    metrics = series.metrics()
+    assert set(metrics) == {m.name for m in conservation.METRICS if m.reference_tolerance is None}
     assert (
-        found["conservation/energy"]
-        == found["conservation/energy_frames"]
-        == found["conservation/descent_frames"]
+        metrics["conservation/energy"]
+        == metrics["conservation/energy_frames"]
+        == metrics["conservation/descent_frames"]
         == 0.0
     )
 
@@ -87,11 +87,11 @@ def test_a_sheet_that_lifts_itself_breaks_energy_by_a_known_amount():
     mass = scene.cloth.masses.sum()
     gained = mass * 9.81 * 0.01 + 0.5 * mass * (0.01 / scene.dt) ** 2
     assert series.rise[-1] == pytest.approx(gained, rel=1e-9)
-    found = series.metrics()
+    metrics = series.metrics()
     for law in ("energy", "descent"):
         assert (
-            found[f"conservation/{law}"] == pytest.approx(gained / 2)
-            and found[f"conservation/{law}_frames"] == 50.0
+            metrics[f"conservation/{law}"] == pytest.approx(gained / 2)
+            and metrics[f"conservation/{law}_frames"] == 50.0
         )
     assert series.force[-1] == pytest.approx(mass * (9.81 + 0.01 / scene.dt**2), rel=1e-9)
 
@@ -164,20 +164,20 @@ def rows(values, tmp_path):
         preset=SMOKE, suites=("garments",), cells=(cell,), cases=(), seeds=(0,), device="cpu",
         folder=tmp_path, command="",
     )  # fmt: skip
-    found = rows_of_cell(cell, plan, {}, outcomes)
-    return {row.metric: row for row in found if row.metric in WORST}
+    cell_rows = rows_of_cell(cell, plan, {}, outcomes)
+    return {row.metric: row for row in cell_rows if row.metric in WORST}
 
 
 def test_the_simulation_alone_is_judged_and_a_stall_is_told_from_a_lie(dropped, tmp_path):
     bare, x = dropped
     scene = as_if_dressed(bare)
     (series,) = law_series(scene, [x])
-    found = measured(scene, x)
-    judged = rows(found, tmp_path)
+    metrics = measured(scene, x)
+    judged = rows(metrics, tmp_path)
     assert set(judged) == set(WORST) and {row.status for row in judged.values()} == {"ok"}
-    assert found["conservation/momentum_worst"] == series.force.max() / series.weight
-    assert found["conservation/residual_worst"] == series.residual.max()
-    assert found["conservation/energy_worst"] == 0.0  # it never rises
+    assert metrics["conservation/momentum_worst"] == series.force.max() / series.weight
+    assert metrics["conservation/residual_worst"] == series.residual.max()
+    assert metrics["conservation/energy_worst"] == 0.0  # it never rises
     for name, row in judged.items():
         assert (row.expected, row.tolerance) == (0.0, WORST[name].reference_tolerance) and row.tolerance > 0
     lie = x.copy()

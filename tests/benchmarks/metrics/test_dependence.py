@@ -44,9 +44,9 @@ def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
             made.prepare(scene)
             group.roll_outs.append(RollOut(group, find_method(method), made.run(), suites=("validation",)))
         for roll_out in group.roll_outs:
-            found, _, ended = measured(roll_out, find_scene(name).metrics)
-            assert ended == ("ok", "") and not any(metric.startswith("cost/") for metric in found)
-            value |= {(name, roll_out.entry.name, metric): number for metric, number in found.items()}
+            metrics, _, ended = measured(roll_out, find_scene(name).metrics)
+            assert ended == ("ok", "") and not any(metric.startswith("cost/") for metric in metrics)
+            value |= {(name, roll_out.entry.name, metric): number for metric, number in metrics.items()}
     for name in SCENES:
         assert abs(value[name, "simulation", "mesh/vertices"] - 200) < 40
         assert value[name, "newton-1", "curvature/error"] > 0
@@ -54,10 +54,10 @@ def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
         assert (name, "skinning", "mesh/vertices") not in value
     # Skinning knows no time step; the simulation does.
     for metric in ("energy/strain", "energy/inertia", "curvature/mean"):
-        here, there = (value[name, "skinning", metric] for name in SCENES)
-        assert here == there
-    own = [value[name, "simulation", "energy/strain"] for name in SCENES]
-    assert own[0] != own[1]
+        mesh_number, step_number = (value[name, "skinning", metric] for name in SCENES)
+        assert mesh_number == step_number
+    strains = [value[name, "simulation", "energy/strain"] for name in SCENES]
+    assert strains[0] != strains[1]
 
 
 def test_time_steps_of_a_frame_are_taken_from_the_scene(assets, monkeypatch):
@@ -86,24 +86,24 @@ def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
 def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
     request = Selection(suites=("validation",), preset=preset, motions=Motions())
-    found = choose_cells(dataclasses.replace(request, full=True))[0]
+    cells = choose_cells(dataclasses.replace(request, full=True))[0]
     sizes = preset.dependence
-    assert {cell.scene.name for cell in found} == {
+    assert {cell.scene.name for cell in cells} == {
         *(f"dependence/mesh/{count}" for count in sizes.meshes),
         *(f"dependence/dt/{30 * count}" for count in sizes.substeps[1:]),
         *(scene.name for scene in DRAPES if preset.further),
     }
     printed = {"simulation-printed-bending"} if preset.further else set()
-    assert {cell.method for cell in found} == {"simulation", "skinning", "newton-1"} | printed
+    assert {cell.method for cell in cells} == {"simulation", "skinning", "newton-1"} | printed
     assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
-    assert choose_cells(request)[0] == (() if preset.name == "quick" else found)  # where no suite is named
+    assert choose_cells(request)[0] == (() if preset.name == "quick" else cells)  # where no suite is named
 
 
 def test_drapes_of_each_size_and_family_run_where_they_are_named():
-    words = {"suites": ("validation",), "preset": find_preset("quick"), "motions": Motions()}
+    criteria = {"suites": ("validation",), "preset": find_preset("quick"), "motions": Motions()}
     methods = ("simulation", "simulation-printed-bending")
-    found = choose_cells(Selection(**words, scenes=("dependence/drape/*",), methods=methods))[0]
-    assert {(cell.scene.name, cell.method) for cell in found} == {
+    cells = choose_cells(Selection(**criteria, scenes=("dependence/drape/*",), methods=methods))[0]
+    assert {(cell.scene.name, cell.method) for cell in cells} == {
         (scene.name, method) for scene in DRAPES for method in methods
     }
     for scene in DRAPES[::4]:

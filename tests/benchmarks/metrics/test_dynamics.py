@@ -53,10 +53,10 @@ def ring(yaw=None, radius=0.25, count=40):
 def test_a_sine_of_known_gain_and_lag_is_found(gain, lag):
     static = 0.7 * np.sin(2 * np.pi * 1.0 * TIME)
     moving = gain * 0.7 * np.sin(2 * np.pi * 1.0 * (TIME - lag * DT)) + 0.3
-    found = gain_and_lag(moving, static)
+    fit = gain_and_lag(moving, static)
     # The lagging signal does not rest before its first frame, as the fit supposes: that costs a few percent.
-    assert found[0] == pytest.approx(gain, rel=0.05)
-    assert found[1] == pytest.approx(lag, abs=0.15)
+    assert fit[0] == pytest.approx(gain, rel=0.05)
+    assert fit[1] == pytest.approx(lag, abs=0.15)
 
 
 def test_a_signal_that_starts_at_rest_is_fitted_to_the_last_digit():
@@ -168,13 +168,13 @@ def measured(positions, static=None):
 
 
 def test_the_simulation_has_all_of_its_own_dynamics():
-    found = measured(a_scene()[2])
-    assert found["dynamics/amplitude"] == pytest.approx(1.0)
-    assert found["dynamics/correlation"] == pytest.approx(1.0)
-    assert found["dynamics/spectrum"] == 0.0
-    assert found["dynamics/ringing/0"] > found["dynamics/ringing/16"] > 0
-    assert found["dynamics/ringing"] == pytest.approx(
-        np.mean([found[f"dynamics/ringing/{k}"] for k in AFTER])
+    metrics = measured(a_scene()[2])
+    assert metrics["dynamics/amplitude"] == pytest.approx(1.0)
+    assert metrics["dynamics/correlation"] == pytest.approx(1.0)
+    assert metrics["dynamics/spectrum"] == 0.0
+    assert metrics["dynamics/ringing/0"] > metrics["dynamics/ringing/16"] > 0
+    assert metrics["dynamics/ringing"] == pytest.approx(
+        np.mean([metrics[f"dynamics/ringing/{k}"] for k in AFTER])
     )
 
 
@@ -192,21 +192,21 @@ def test_curves_show_the_hem_against_the_root():
 
 
 def test_half_of_the_dynamics_is_half_the_amplitude():
-    found = measured(a_scene(dynamic=0.5)[2])
-    assert found["dynamics/amplitude"] == pytest.approx(0.5, abs=0.02)
-    assert found["dynamics/correlation"] > 0.99
+    metrics = measured(a_scene(dynamic=0.5)[2])
+    assert metrics["dynamics/amplitude"] == pytest.approx(0.5, abs=0.02)
+    assert metrics["dynamics/correlation"] > 0.99
 
 
 def test_a_dresser_without_memory_has_none():
     quiet = a_scene()[3]
     shifted = quiet + np.array([0.03, 0.0, 0.0])
-    found = measured(shifted, static=shifted)
-    assert found["dynamics/amplitude"] == 0.0
-    assert "dynamics/correlation" not in found
+    metrics = measured(shifted, static=shifted)
+    assert metrics["dynamics/amplitude"] == 0.0
+    assert "dynamics/correlation" not in metrics
     assert measured(shifted[:5]) == {}  # too short to say anything
-    assert (found["dynamics/gain"], found["dynamics/lag"]) == pytest.approx((1.0, 0.0), abs=1e-9)
-    assert found["dynamics/ringing"] == pytest.approx(0.0, abs=1e-9)
-    assert found["dynamics/spectrum"] > 0.1
+    assert (metrics["dynamics/gain"], metrics["dynamics/lag"]) == pytest.approx((1.0, 0.0), abs=1e-9)
+    assert metrics["dynamics/ringing"] == pytest.approx(0.0, abs=1e-9)
+    assert metrics["dynamics/spectrum"] > 0.1
 
 
 @pytest.mark.parametrize("names", [("hem",), ("left_leg", "right_leg")])
@@ -215,17 +215,17 @@ def test_the_hem_of_a_garment_with_legs_is_both_cuffs(names):
     loops = dict(zip(names, np.array_split(np.arange(AROUND), len(names))))
     garment = replace(dressed.garment, loops=loops)
     still = dressed.skinned(motion)
-    own = 0.02 * np.sin(2 * np.pi * np.arange(40) / 15)[:, None, None] * still[:1]
+    swing = 0.02 * np.sin(2 * np.pi * np.arange(40) / 15)[:, None, None] * still[:1]
     scene = BuiltScene(
         name="legs", cloth=garment.cloth(), energies=(), dt=1 / 30, frames=40, settle=lambda: still[0],
         dressed=Dressed(dressed.body, garment, motion),
     )  # fmt: skip
     group = SceneRollOuts(scene)
     group.quasi_static = still
-    for name, x in (("simulation", still + own), ("fast-lbfgs-10", still + 0.5 * own)):
+    for name, x in (("simulation", still + swing), ("fast-lbfgs-10", still + 0.5 * swing)):
         trajectory = Trajectory(positions=x, faces=garment.faces, times=np.arange(40) / 30)
         group.roll_outs.append(RollOut(group, find_method(name), trajectory))
     reference, method = group.roll_outs
-    found = dynamics.compare(method, reference)
-    assert found["dynamics/amplitude"] == pytest.approx(0.5)
+    metrics = dynamics.compare(method, reference)
+    assert metrics["dynamics/amplitude"] == pytest.approx(0.5)
     assert dynamics.series(method)["hem/yaw"].shape == (40,)

@@ -98,11 +98,11 @@ class DenseStep:
             (slope,) = torch.autograd.grad(energy, z)
             return energy.item(), slope.numpy()
 
-        found = minimize(
+        optimum = minimize(
             value, start[self.free].ravel(), jac=True, method="trust-exact", options={"gtol": 1e-11},
             hess=lambda y: torch.autograd.functional.hessian(of, torch.tensor(y), vectorize=True).numpy(),
         )  # fmt: skip
-        return float(found.fun), spread_out(torch.tensor(found.x)).numpy()
+        return float(optimum.fun), spread_out(torch.tensor(optimum.x)).numpy()
 
 
 def module_is_scaled() -> bool:
@@ -132,15 +132,15 @@ def test_gap_and_one_step_errors_are_those_of_an_independent_dense_minimisation(
         distances.append(1e3 * np.sqrt(((x[frame] - y) ** 2).sum(1).mean()))
         pair = (curvature_series(z[None], scene.cloth.faces) for z in (x[frame], y))
         curvatures.append(curvature_error(*pair)[0])
-    found = optimality(scene, x, samples=99).metrics()
+    metrics = optimality(scene, x, samples=99).metrics()
     assert min(gaps) > 1e-9
-    assert found["gap/energy"].value == pytest.approx(np.mean(gaps), rel=1e-6)
-    assert found["step/distance"].value == pytest.approx(np.mean(distances), rel=1e-4)
-    assert found["step/curvature"].value == pytest.approx(np.mean(curvatures), rel=1e-4)
+    assert metrics["gap/energy"].value == pytest.approx(np.mean(gaps), rel=1e-6)
+    assert metrics["step/distance"].value == pytest.approx(np.mean(distances), rel=1e-4)
+    assert metrics["step/curvature"].value == pytest.approx(np.mean(curvatures), rel=1e-4)
 
 
-def values(found):
-    return {name: getattr(number, "value", number) for name, number in found.items()}
+def values(metrics):
+    return {name: getattr(number, "value", number) for name, number in metrics.items()}
 
 
 @pytest.mark.parametrize("name", ["hanging_sheet", "sheet_on_sphere"])
@@ -194,13 +194,13 @@ def test_one_scale_serves_all_methods_of_a_scene():
         above.append(potential.value(guess) - potential.value(x[frame]))
     assert scale == pytest.approx(np.mean(above), rel=1e-12)
     for roll_out in group.roll_outs:
-        found = values(module.measure(roll_out))
-        assert found["gap/relative"] == pytest.approx(found["gap/energy"] / scale, rel=1e-12)
-        assert ("gap/scale" in found) == (roll_out is group.reference)
+        metrics = values(module.measure(roll_out))
+        assert metrics["gap/relative"] == pytest.approx(metrics["gap/energy"] / scale, rel=1e-12)
+        assert ("gap/scale" in metrics) == (roll_out is group.reference)
         away = module.series(roll_out)["step/vertices"]
         assert away.shape == x.shape[:2] and np.isnan(away[: scene.warm_up]).all()
         rms = np.sqrt((away[scene.warm_up :] ** 2).mean(axis=1))
-        assert rms.mean() == pytest.approx(found["step/distance"], rel=1e-5, abs=1e-9)
+        assert rms.mean() == pytest.approx(metrics["step/distance"], rel=1e-5, abs=1e-9)
     alone = roll_outs(scene)
     assert gap_scale(alone) is None
 
@@ -256,12 +256,12 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found_and_distances_to_the_one_b
     here = potential.value(crumpled)
     # Several minima: the one reached from the frame itself is near, and not the best.
     assert here - low > 2.0 * (here - below.energy) > 0.0
-    found = optimality(scene, np.array([scene.start, scene.start, crumpled]), samples=1).metrics()
-    assert found["gap/energy"].value == pytest.approx(here - low, rel=1e-6)
-    assert found["gap/local"].value == pytest.approx(here - below.energy, rel=1e-9)
-    assert found["gap/found_by_simulator"] == 1
+    metrics = optimality(scene, np.array([scene.start, scene.start, crumpled]), samples=1).metrics()
+    assert metrics["gap/energy"].value == pytest.approx(here - low, rel=1e-6)
+    assert metrics["gap/local"].value == pytest.approx(here - below.energy, rel=1e-9)
+    assert metrics["gap/found_by_simulator"] == 1
     apart = 1e3 * np.sqrt(((crumpled - below.positions) ** 2).sum(1).mean())
-    assert found["step/distance"].value == pytest.approx(apart, rel=1e-9)
+    assert metrics["step/distance"].value == pytest.approx(apart, rel=1e-9)
 
 
 def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypatch):
@@ -269,8 +269,8 @@ def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypat
     scene = small_scene("hanging_sheet")
     still = np.repeat(scene.start[None], 3, axis=0)
     monkeypatch.setattr(replayed_step, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
-    found = optimality(scene, still, samples=1)
-    assert found.values["gap/energy"][0] >= 0.0 and sum(found.found_by.values()) == 1
+    gaps = optimality(scene, still, samples=1)
+    assert gaps.values["gap/energy"][0] >= 0.0 and sum(gaps.found_by.values()) == 1
     nowhere = still.copy()
     nowhere[2] = 1e200
     assert np.isnan(values(optimality(scene, nowhere, samples=1).metrics())["gap/energy"])

@@ -51,11 +51,11 @@ def test_penetration_counts_every_vertex_and_measures_depth():
     x = np.zeros((2, 4, 3))
     x[:, :, 1] = [0.5, -0.25, 2.0, -0.5]
     faces = np.array([[0, 1, 2], [1, 2, 3]])
-    shorter, found = penetration([x[:1], x], [faces, faces], Slab())
+    shorter, overlap = penetration([x[:1], x], [faces, faces], Slab())
     assert shorter.share == pytest.approx([0.5])
-    assert found.share == pytest.approx([0.5, 0.75])
-    assert found.depth[0] == pytest.approx([0, 0.25, 0, 0.5])
-    assert found.depth[1] == pytest.approx([0.5, 1.25, 0, 1.5])
+    assert overlap.share == pytest.approx([0.5, 0.75])
+    assert overlap.depth[0] == pytest.approx([0, 0.25, 0, 0.5])
+    assert overlap.depth[1] == pytest.approx([0.5, 1.25, 0, 1.5])
 
 
 def test_penetration_sees_the_surface_between_vertices():
@@ -66,14 +66,14 @@ def test_penetration_sees_the_surface_between_vertices():
             return np.linalg.norm(points, axis=1) - 1.0
 
     x = np.array([[[-2.0, 0.1, 0.0], [2.0, 0.1, 0.0], [0.0, 0.1, 3.0]]])
-    (found,) = penetration([x], [np.array([[0, 2, 1]])], Ball())
+    (overlap,) = penetration([x], [np.array([[0, 2, 1]])], Ball())
     # Of its seven points the midpoint of one side alone is in the ball; the centroid is at z = 1.
-    assert found.share[0] == 0.0 and found.area[0] == pytest.approx(2 / 15)
+    assert overlap.share[0] == 0.0 and overlap.area[0] == pytest.approx(2 / 15)
     finer, faces = right_grid(81, 81, 4.0, 4.0)  # with a quarter of the ball's disc
-    (found,) = penetration([np.pad(finer, ((0, 0), (0, 1)))[None]], [faces], Ball())
-    assert found.area[0] == pytest.approx(np.pi / 64, rel=1e-2)
-    (found,) = penetration([np.zeros((1, 3, 3)) + 2.0], [np.array([[0, 1, 2]])], Ball())
-    assert found.area[0] == 0.0
+    (overlap,) = penetration([np.pad(finer, ((0, 0), (0, 1)))[None]], [faces], Ball())
+    assert overlap.area[0] == pytest.approx(np.pi / 64, rel=1e-2)
+    (overlap,) = penetration([np.zeros((1, 3, 3)) + 2.0], [np.array([[0, 1, 2]])], Ball())
+    assert overlap.area[0] == 0.0
 
 
 def test_inertia_follows_the_body_where_the_cloth_is_shaken_as_the_body_is():
@@ -127,11 +127,11 @@ def test_energies_are_those_that_the_simulator_minimised():
         scene.cloth, scene.energies, dt=scene.dt, frames=10, obstacle=scene.obstacle, start=scene.start
     )
     (series,) = energy_series(scene, [trajectory.positions])
-    own = trajectory.frame_fields
+    fields = trajectory.frame_fields
     for term in ("strain", "bending", "gravity", "inertia"):
-        assert series[term][2:] == pytest.approx(own[f"energy/{term}"][2:], rel=1e-9, abs=1e-15)
+        assert series[term][2:] == pytest.approx(fields[f"energy/{term}"][2:], rel=1e-9, abs=1e-15)
     # Planes of the simulator were searched at its initial guess, those of the metric where it ended.
-    assert series["collision"][-1] == pytest.approx(own["energy/collision"][-1], rel=0.3)
+    assert series["collision"][-1] == pytest.approx(fields["energy/collision"][-1], rel=0.3)
     assert series["collision"][-1] > 0.0
 
 
@@ -163,10 +163,10 @@ def test_training_distance_is_of_judged_frames_to_the_nearest_training_pose():
     known = np.zeros((2, 24, 3))
     known[1] = poses[22]
     roll_out = SimpleNamespace(scene=scene, judged=slice(2, None), training_poses=known)
-    found = training_distance.measure(roll_out)
+    distances = training_distance.measure(roll_out)
     nearest = np.minimum(np.arange(2, 23), 22 - np.arange(2, 23)) / 2
-    assert found["training_distance/median"] == pytest.approx(np.median(nearest))
-    assert found["training_distance/p95"] == pytest.approx(np.percentile(nearest, 95))
+    assert distances["training_distance/median"] == pytest.approx(np.median(nearest))
+    assert distances["training_distance/p95"] == pytest.approx(np.percentile(nearest, 95))
     roll_out.training_poses = None
     assert training_distance.measure(roll_out) == {}
 
@@ -244,20 +244,20 @@ def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_reference
     roll_out = SimpleNamespace(
         scene=scene, positions=np.zeros((4, 1, 3)), entry=SimpleNamespace(role="reference")
     )
-    found = body_metrics.measure(roll_out)
-    assert found["body/self_intersection"] == pytest.approx(100 * (0.375 - 0.125), abs=2.0)
-    assert found["body/self_intersection_frame"] == 2.0
+    metrics = body_metrics.measure(roll_out)
+    assert metrics["body/self_intersection"] == pytest.approx(100 * (0.375 - 0.125), abs=2.0)
+    assert metrics["body/self_intersection_frame"] == 2.0
     roll_out.entry.role = "learned"
     assert body_metrics.measure(roll_out) == {}
 
 
 def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
-    found = [
+    ladder = [
         {"energy/total": 5.0 + 3.0 / n, "energy/strain": 1.0 - 2.0 / n, "curvature/mean": 7.0 + 1.0 / n}
         for n in (1, 2, 4, 8)
     ]
     expected = {"total": 3.0, "strain": -2.0, "curvature": 1.0, "order": 1.0}
-    assert time_errors(found) == pytest.approx(
+    assert time_errors(ladder) == pytest.approx(
         {f"time_error/{name}": value for name, value in expected.items()}
     )
 
@@ -273,12 +273,14 @@ def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
 )
 def test_what_shows_no_first_order_has_no_limit(of_halvings, order):
     names = {"energy/total": "total", "energy/strain": "strain", "curvature/mean": "curvature"}
-    found = time_errors([dict.fromkeys(names, of_halvings(k)) for k in range(4)])
+    errors = time_errors([dict.fromkeys(names, of_halvings(k)) for k in range(4)])
     expected = dict.fromkeys((f"eighth/{name}" for name in names.values()), of_halvings(0) - of_halvings(3))
     if order is not None:
         expected["order"] = order
-    assert found == pytest.approx({f"time_error/{name}": value for name, value in expected.items()}, abs=1e-9)
-    assert {find_metric(name).unit for name in found if name.endswith("curvature")} == {"1/m"}
+    assert errors == pytest.approx(
+        {f"time_error/{name}": value for name, value in expected.items()}, abs=1e-9
+    )
+    assert {find_metric(name).unit for name in errors if name.endswith("curvature")} == {"1/m"}
     assert find_metric("time_error/eighth/strain").unit == "J"
 
 
@@ -299,7 +301,7 @@ def test_every_metric_has_a_unit_a_title_and_a_definition_and_a_pattern_serves_a
     rare = {"N m", "% of weight", "weights", "vertex weights", "us", "h", "kB", "m/s", "m/s^2"}
     assert known <= units <= known | rare
     assert all(metric.title and metric.definition for metric in declared().values())
-    own = find_metric("energy/my_term")
-    assert (own.name, own.unit, own.title, own.table) == ("energy/my_term", "J", "My term", "energies")
+    term = find_metric("energy/my_term")
+    assert (term.name, term.unit, term.title, term.table) == ("energy/my_term", "J", "My term", "energies")
     with pytest.raises(KeyError):
         find_metric("nonsense/x")

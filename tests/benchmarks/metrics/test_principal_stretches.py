@@ -20,9 +20,9 @@ def test_simple_shear_has_its_two_stretches_in_whatever_direction_it_is_looked_a
     gradient = np.array([[1.0, shear], [0.0, 1.0]])
     larger = np.sqrt(1.0 + shear**2 / 4.0) + abs(shear) / 2.0  # their product is 1
     moved = in_space(PLANE @ gradient.T) @ random_rotation(3).T + 5.0
-    found = principal_stretches(moved[None], SHEET)
-    assert found.shape == (1, len(FACES), 2)
-    assert np.abs(found - [1.0 / larger, larger]).max() < 1e-7
+    stretches = principal_stretches(moved[None], SHEET)
+    assert stretches.shape == (1, len(FACES), 2)
+    assert np.abs(stretches - [1.0 / larger, larger]).max() < 1e-7
 
 
 def test_a_triangle_that_is_a_line_is_compressed_wholly():
@@ -48,7 +48,7 @@ def test_percentiles_are_those_of_the_area():
     areas = np.array([[0.979, 0.001, 0.02]] * 2)
     assert weighted_percentiles(stretch, areas, (1, 50, 97, 99, 100)).tolist() == [1.0, 1.0, 1.0, 2.0, 5.0]
     values, random = np.linspace(0.0, 1.0, 1001), np.random.default_rng(0).permutation(1001)
-    found = weighted_percentiles(
+    percentiles = weighted_percentiles(
         values[random], values[random], (25, 64)
     )  # density proportional to the value
-    assert found == pytest.approx([0.5, 0.8], abs=2e-3)
+    assert percentiles == pytest.approx([0.5, 0.8], abs=2e-3)

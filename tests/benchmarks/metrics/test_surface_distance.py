@@ -88,12 +88,12 @@ def test_a_lost_cloth_has_no_surface():
 def test_penetration_is_measured_here_of_another_mesh_alone():
     slab = SimpleNamespace(signed_distance=lambda points, frame: points[:, 0] - 0.25)
     frames = np.repeat(in_space(COARSE[0])[None], 3, axis=0)  # x = 0, 1/4 ... 1 in equal numbers
-    found = measure(roll_out(frames, COARSE[1], other_mesh=True, obstacle=slab))
-    assert found["penetration/vertices"] == pytest.approx(20.0)
-    assert found["penetration/surface"] == pytest.approx(
+    metrics = measure(roll_out(frames, COARSE[1], other_mesh=True, obstacle=slab))
+    assert metrics["penetration/vertices"] == pytest.approx(20.0)
+    assert metrics["penetration/surface"] == pytest.approx(
         25.0 * (1 - 17 / 120)
     )  # what lies in the plane is outside
-    assert found["penetration/deep"] == pytest.approx(20.0)
-    assert found["penetration/depth_p99"] == pytest.approx(250.0)
+    assert metrics["penetration/deep"] == pytest.approx(20.0)
+    assert metrics["penetration/depth_p99"] == pytest.approx(250.0)
     assert measure(roll_out(frames, COARSE[1], other_mesh=False, obstacle=slab)) == {}
     assert measure(roll_out(frames, COARSE[1], other_mesh=True)) == {}

@@ -50,8 +50,8 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
         simulation_perturbed_1e_4=x - 0.004 * EAST, simulation_dt__2=x + 0.05 * EAST,
         simulation_perturbed_1e_9=x + 0.3 * EAST, newton_1=x + 0.01 * EAST,
     )  # fmt: skip
-    found = compared(group.roll_outs[-1], geometry.compare)
-    value, uncertainty, moved = found["distance/rms"]
+    metrics = compared(group.roll_outs[-1], geometry.compare)
+    value, uncertainty, moved = metrics["distance/rms"]
     assert (value, uncertainty) == pytest.approx((10.0, 7.0**0.5))  # of 0, -1 and 4
     assert dict(moved) == pytest.approx({TWINS[0]: -1.0, "simulation-perturbed-1e-4": 4.0})
     # A member is compared with the others, not with itself: with one, whose spread nobody knows.
@@ -102,13 +102,13 @@ def test_numbers_of_the_reference_are_as_uncertain_as_its_ensemble_spreads():
         row(TWINS[0], "cost/frame", 9.0), row(TWINS[0], "gap/energy", 0.3),
         row("simulation-dt/8", "energy/total", 7.0),
     ]  # fmt: skip
-    told = with_uncertainty(rows)
-    found = {(r.method, r.metric): r.uncertainty for r in told}
-    assert found["simulation", "energy/total"] == pytest.approx((0.0013 / 3) ** 0.5)  # of 0, 0.01, -0.03
-    assert dict(told[0].moved) == pytest.approx({TWINS[0]: 0.01, TWINS[1]: -0.03})
-    assert not any(r.moved for r in told[1:])
-    assert found["simulation", "cost/frame"] is None and found["snug", "energy/total"] is None
-    assert found["simulation", "gap/energy"] == 0.02
+    uncertain_rows = with_uncertainty(rows)
+    spreads = {(r.method, r.metric): r.uncertainty for r in uncertain_rows}
+    assert spreads["simulation", "energy/total"] == pytest.approx((0.0013 / 3) ** 0.5)  # of 0, 0.01, -0.03
+    assert dict(uncertain_rows[0].moved) == pytest.approx({TWINS[0]: 0.01, TWINS[1]: -0.03})
+    assert not any(r.moved for r in uncertain_rows[1:])
+    assert spreads["simulation", "cost/frame"] is None and spreads["snug", "energy/total"] is None
+    assert spreads["simulation", "gap/energy"] == 0.02
 
 
 def test_means_are_over_the_judged_frames_alone():
@@ -139,12 +139,12 @@ def test_an_excess_is_a_difference_of_sums_and_the_zero_of_gravity_is_no_part_of
             dataclasses.replace(scene, origin_heights=heights), simulation=stretched, direct_optimisation=x
         )
         ours, bound = group.roll_outs
-        found = excess.measure(ours)
+        metrics = excess.measure(ours)
         terms = [{k: v[2:].mean() for k, v in energy.energies(r).items()} for r in (ours, bound)]
-        assert found["excess/total"] == pytest.approx(terms[0]["total"] - terms[1]["total"])
+        assert metrics["excess/total"] == pytest.approx(terms[0]["total"] - terms[1]["total"])
         kept = ("strain", "bending", "inertia")
         without = sum(terms[0][k] - terms[1][k] for k in kept)
-        assert found["excess/without_gravity"] == pytest.approx(without) and without > 1e-3
+        assert metrics["excess/without_gravity"] == pytest.approx(without) and without > 1e-3
         assert excess.measure(bound) == {}
     assert excess.measure(group_of(scene, simulation=x).roll_outs[0]) == {}
 
@@ -156,17 +156,17 @@ def test_dynamics_are_told_by_the_own_static_answer_and_by_the_simulators(monkey
     still = np.repeat(scene.start[None], frames, axis=0)
     swing = 0.02 * np.sin(9.0 * time) * scene.start[None, :, :1]
     group = group_of(scene, simulation=still + swing, snug=still + 0.5 * swing)
-    reference, own = group.roll_outs
-    own.quasi_static = own.positions
+    reference, method = group.roll_outs
+    method.quasi_static = method.positions
     hem = HemMotion(
         axes=np.tile(np.eye(3), (frames, 1, 1)), origins=np.zeros((frames, 3)), stop=None,
         hem=np.arange(5), simulated=reference.positions, quasi_static=still, dt=scene.dt, first=2,
     )  # fmt: skip
     monkeypatch.setattr(dynamics, "hem_motion", lambda roll_out: hem)
-    found = dynamics.compare(own, reference)
-    assert found["dynamics/amplitude"] == 0.0
-    assert found["dynamics/common_amplitude"] == pytest.approx(0.5)
-    assert found["dynamics/common_correlation"] == pytest.approx(1.0)
-    own.quasi_static = None  # as of a solver: its static answer is the simulator's
-    found = dynamics.compare(own, reference)
-    assert found["dynamics/amplitude"] == found["dynamics/common_amplitude"] == pytest.approx(0.5)
+    metrics = dynamics.compare(method, reference)
+    assert metrics["dynamics/amplitude"] == 0.0
+    assert metrics["dynamics/common_amplitude"] == pytest.approx(0.5)
+    assert metrics["dynamics/common_correlation"] == pytest.approx(1.0)
+    method.quasi_static = None  # as of a solver: its static answer is the simulator's
+    metrics = dynamics.compare(method, reference)
+    assert metrics["dynamics/amplitude"] == metrics["dynamics/common_amplitude"] == pytest.approx(0.5)

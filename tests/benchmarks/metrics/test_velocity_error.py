@@ -25,17 +25,17 @@ def roll_out(positions: np.ndarray, kept: np.ndarray | None = None) -> RollOut:
 
 def test_a_pull_that_the_other_lacks_is_the_error_of_the_acceleration():
     motion = RANDOM.normal(size=(FRAMES, 5, 3))
-    found = compare(roll_out(motion + 0.5 * TIMES**2 * PULL), roll_out(motion))
+    errors = compare(roll_out(motion + 0.5 * TIMES**2 * PULL), roll_out(motion))
     between = TIMES[WARM_UP + 1 :] - 0.5 * DT  # a difference is the velocity there
-    assert found == pytest.approx(
+    assert errors == pytest.approx(
         {"velocity/error": 2.0 * np.sqrt((between**2).mean()), "acceleration/error": 2.0}, rel=1e-9
     )
 
 
 def test_a_motion_one_frame_late_is_slower_by_one_frame_of_its_acceleration():
     whole = 0.5 * (DT * np.arange(FRAMES + 1)[:, None, None]) ** 2 * PULL + RANDOM.normal(size=(5, 3))
-    found = compare(roll_out(whole[:-1]), roll_out(whole[1:]))
-    assert found == pytest.approx({"velocity/error": 2.0 * DT, "acceleration/error": 0.0}, abs=1e-9)
+    errors = compare(roll_out(whole[:-1]), roll_out(whole[1:]))
+    assert errors == pytest.approx({"velocity/error": 2.0 * DT, "acceleration/error": 0.0}, abs=1e-9)
 
 
 def test_a_place_alone_is_no_error_and_the_opposite_motion_is_twice_it():

@@ -42,19 +42,19 @@ def amplitude(half_waves: int, height: float = HEIGHT) -> float:
 def test_a_wave_is_in_the_band_of_its_length_alone(half_waves, band):
     # 560, 280, 140 and 80 mm long.
     turned = wave(half_waves) @ random_rotation(half_waves).T + 2.0
-    (found,) = band_amplitudes(turned[None], FACES, WAVES)
-    assert found[band] == pytest.approx(amplitude(half_waves), rel=2e-3)
-    assert np.delete(found, band).max() < 0.02 * found[band]
+    (amplitudes,) = band_amplitudes(turned[None], FACES, WAVES)
+    assert amplitudes[band] == pytest.approx(amplitude(half_waves), rel=2e-3)
+    assert np.delete(amplitudes, band).max() < 0.02 * amplitudes[band]
 
 
 def test_two_waves_have_the_amplitude_of_each_and_squares_of_bands_add_up():
     both = wave(4) + wave(8, 2e-4) - in_space(PLANE)
-    (found,) = band_amplitudes(both[None], FACES, WAVES)
-    assert found[1:3] == pytest.approx([amplitude(4), amplitude(8, 2e-4)], rel=1e-2)
+    (amplitudes,) = band_amplitudes(both[None], FACES, WAVES)
+    assert amplitudes[1:3] == pytest.approx([amplitude(4), amplitude(8, 2e-4)], rel=1e-2)
     rough = both + 1e-4 * np.random.default_rng(1).normal(size=both.shape)
-    (found,) = band_amplitudes(rough[None], FACES, WAVES)
+    (amplitudes,) = band_amplitudes(rough[None], FACES, WAVES)
     curvature = signed_curvature(rough[None], FACES)[0, WAVES.vertices]
-    assert (found**2).sum() == pytest.approx((WAVES.areas * curvature**2).sum() / WAVES.areas.sum())
+    assert (amplitudes**2).sum() == pytest.approx((WAVES.areas * curvature**2).sum() / WAVES.areas.sum())
 
 
 def test_waves_are_those_of_a_square_and_orthonormal():
@@ -79,8 +79,8 @@ def test_a_fine_mesh_has_the_same_waves_by_the_sparse_solver():
 
 def test_a_sphere_has_its_curvature_in_the_longest_band():
     x, faces = icosphere(3, 0.25)
-    (found,) = band_amplitudes(x[None], faces, waves_of_rest_shape(Cloth(x, faces)))
-    assert found[0] == pytest.approx(4.0, rel=1e-3) and found[1:].max() < 0.05
+    (amplitudes,) = band_amplitudes(x[None], faces, waves_of_rest_shape(Cloth(x, faces)))
+    assert amplitudes[0] == pytest.approx(4.0, rel=1e-3) and amplitudes[1:].max() < 0.05
 
 
 def roll_out(group: SceneRollOuts, frames: np.ndarray) -> RollOut:
@@ -94,8 +94,8 @@ def test_errors_see_depth_and_length_at_the_same_frame_and_not_the_place():
     assert measure(reference)["wrinkles/100_to_200"] == pytest.approx(1.5 * half, rel=1e-2)
 
     def errors(*frames):
-        found = compare(roll_out(group, np.stack([wave(2), *frames])), reference)
-        return [found[f"wrinkles/error_{band}"] for band in BANDS]
+        metrics = compare(roll_out(group, np.stack([wave(2), *frames])), reference)
+        return [metrics[f"wrinkles/error_{band}"] for band in BANDS]
 
     assert max(errors(wave(8, -HEIGHT), wave(8, -2 * HEIGHT))) < 1e-3 * half  # crests where valleys were
     assert errors(wave(8), wave(8))[2] == pytest.approx(0.5 * half, rel=1e-2)

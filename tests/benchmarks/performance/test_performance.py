@@ -92,11 +92,11 @@ def test_a_wrong_word_is_one_line_and_exit_2(refused):
 
 
 def test_the_command_says_what_it_would_measure(tmp_path, capsys):
-    words = ["--suite", "performance", "--scenes", "scaling/*", "-o", str(tmp_path / "run"), "--dry-run"]
-    assert run.main(words) == 0
-    said = capsys.readouterr().out
-    assert "suites performance;" in said and "0 cells, 0 skipped, 0 cases, 5 microbenchmarks" in said
-    assert "  microbenchmark scaling/64x64 x simulation: run (missing)\n" in said
+    options = ["--suite", "performance", "--scenes", "scaling/*", "-o", str(tmp_path / "run"), "--dry-run"]
+    assert run.main(options) == 0
+    output = capsys.readouterr().out
+    assert "suites performance;" in output and "0 cells, 0 skipped, 0 cases, 5 microbenchmarks" in output
+    assert "  microbenchmark scaling/64x64 x simulation: run (missing)\n" in output
 
 
 def test_names_are_unique_and_of_methods_that_there_are():
@@ -111,12 +111,12 @@ def test_names_are_unique_and_of_methods_that_there_are():
 def test_the_device_reaches_what_trains_and_nothing_else(tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "hardware", lambda device: {"device": device})
     tasks = tasks_of(plan_of(tmp_path, *MICROBENCHMARKS, device="cuda", preset=QUICK))
-    told = {task.name: (task.settings.device, task.settings.steps) for task in tasks}
-    trains = {name for name, (device, _) in told.items() if device == "cuda"}
+    setups = {task.name: (task.settings.device, task.settings.steps) for task in tasks}
+    trains = {name for name, (device, _) in setups.items() if device == "cuda"}
     parts = ("training_step-", "convergence-")
-    assert trains == {name for name in told if name.startswith(parts)} and len(trains) == 13
-    assert told["convergence-4400-x-snug"] == ("cuda", QUICK.steps["snug"])
-    assert told["inference-4400-x-snug"] == ("cpu", 0)
+    assert trains == {name for name in setups if name.startswith(parts)} and len(trains) == 13
+    assert setups["convergence-4400-x-snug"] == ("cuda", QUICK.steps["snug"])
+    assert setups["inference-4400-x-snug"] == ("cpu", 0)
     # Timed: alone on the machine, each in a process of its own.
     assert len({task.process for task in tasks}) == len(tasks) and all(task.process for task in tasks)
 
@@ -191,22 +191,22 @@ def test_metrics_are_declared_once_each():
     assert all(metric.title and metric.definition for metric in METRICS)
 
 
-def values(found):
+def values(metrics):
     """The numbers, once every name is that of a metric."""
-    for name, value in found.items():
+    for name, value in metrics.items():
         assert find_metric(f"performance/{name}").table.startswith("performance"), name
         assert math.isfinite(value), name
-    return found
+    return metrics
 
 
 # --- the simulator ------------------------------------------------------------------------------------------
 
 
 def test_a_frame_of_the_sheet_has_a_time_that_is_split():
-    found = values(sheet.frames(settings(repeats=2), side=6))
-    assert 0 < found["frame"] <= found["frame_worst"] and found["vertices"] == 36
-    assert found["converged_frames"] == 100.0 and 0 < found["gradient"] < 1e-6
-    assert found["linear_solver"] > 0 and found["outside_linear_solver"] > 0
+    metrics = values(sheet.frames(settings(repeats=2), side=6))
+    assert 0 < metrics["frame"] <= metrics["frame_worst"] and metrics["vertices"] == 36
+    assert metrics["converged_frames"] == 100.0 and 0 < metrics["gradient"] < 1e-6
+    assert metrics["linear_solver"] > 0 and metrics["outside_linear_solver"] > 0
 
 
 def test_the_sheet_falls_as_a_simulation_does():
@@ -222,9 +222,9 @@ def test_the_sheet_falls_as_a_simulation_does():
 
 def test_an_iteration_has_a_cost(monkeypatch):
     monkeypatch.setattr(sheet, "SMALLEST", 4)
-    found = values(sheet.scaling(settings(), side=8, frames=1))
-    assert found["iteration_per_vertex"] == pytest.approx(1e3 * found["iteration"] / 64)
-    assert found["lbfgs_iteration"] > 0 and found["lbfgs_slope"] < 3 and found["lbfgs_memory"] >= 0
+    metrics = values(sheet.scaling(settings(), side=8, frames=1))
+    assert metrics["iteration_per_vertex"] == pytest.approx(1e3 * metrics["iteration"] / 64)
+    assert metrics["lbfgs_iteration"] > 0 and metrics["lbfgs_slope"] < 3 and metrics["lbfgs_memory"] >= 0
 
 
 def test_the_shirt_is_cut_to_its_frames_and_measured(monkeypatch):
@@ -232,13 +232,13 @@ def test_the_shirt_is_cut_to_its_frames_and_measured(monkeypatch):
     scene = garment.dressed("walk", 350)
     assert scene.frames == 3 and scene.obstacle is not None
     monkeypatch.setattr(garment, "dressed", lambda motion, vertices: scene)
-    found = values(garment.measure(settings(), motion="walk", vertices=350))
-    assert found["converged_frames"] == 100.0 and found["vertices"] == scene.cloth.vertex_count
-    assert 0 < found["iterations"] <= found["iterations_worst"]
-    assert 0 <= found["deep_vertices"] <= found["penetrating_vertices"] < 100
+    metrics = values(garment.measure(settings(), motion="walk", vertices=350))
+    assert metrics["converged_frames"] == 100.0 and metrics["vertices"] == scene.cloth.vertex_count
+    assert 0 < metrics["iterations"] <= metrics["iterations_worst"]
+    assert 0 <= metrics["deep_vertices"] <= metrics["penetrating_vertices"] < 100
     monkeypatch.setattr(search, "dressed", lambda motion, vertices: scene)
-    found = values(search.measure(settings(), motion="walk", vertices=350, frames=3))
-    assert 0 < found["search"] <= found["search_worst"] and found["samples"] > 5 * found["vertices"]
+    metrics = values(search.measure(settings(), motion="walk", vertices=350, frames=3))
+    assert 0 < metrics["search"] <= metrics["search_worst"] and metrics["samples"] > 5 * metrics["vertices"]
 
 
 # --- networks -----------------------------------------------------------------------------------------------
@@ -265,29 +265,29 @@ def lines(path: Path):
 
 @pytest.mark.parametrize("network", ["snug", "supervised", "pbns"])
 def test_a_step_has_a_time_and_parts(small, network):
-    found = values(
+    metrics = values(
         training_step.measure(settings(network, repeats=2, steps=6, files=small.files), vertices=150)
     )
-    assert 0 < found["training_step_least"] <= found["training_step"]
-    parts = {name.partition("/")[2] for name in found if name.startswith("training_step/")}
-    assert found["training_step/backward"] > 0 and ("energies" in parts) == (network != "supervised")
-    assert found["paper_training"] == pytest.approx(found["training_step"] / 120)  # 30,000 steps
+    assert 0 < metrics["training_step_least"] <= metrics["training_step"]
+    parts = {name.partition("/")[2] for name in metrics if name.startswith("training_step/")}
+    assert metrics["training_step/backward"] > 0 and ("energies" in parts) == (network != "supervised")
+    assert metrics["paper_training"] == pytest.approx(metrics["training_step"] / 120)  # 30,000 steps
 
 
 def test_a_frame_has_a_time_and_a_network_a_size(small):
-    found = values(inference.measure(small, vertices=150))
-    assert 0 < found["inference_least"] <= found["inference"] <= found["inference_p95"]
-    assert found["inference_cold"] > found["inference_least"]
-    assert found["timed_frames"] == 2 * 20
-    assert 4e-6 * found["parameters"] <= found["network_memory"] <= found["model_file"]
+    metrics = values(inference.measure(small, vertices=150))
+    assert 0 < metrics["inference_least"] <= metrics["inference"] <= metrics["inference_p95"]
+    assert metrics["inference_cold"] > metrics["inference_least"]
+    assert metrics["timed_frames"] == 2 * 20
+    assert 4e-6 * metrics["parameters"] <= metrics["network_memory"] <= metrics["model_file"]
 
 
 def test_a_killed_convergence_goes_on_to_the_same_curve(small, monkeypatch):
     curve, model_path = small.files
-    found = values(convergence.measure(small, vertices=150))
+    metrics = values(convergence.measure(small, vertices=150))
     whole = lines(curve)
-    assert [row["step"] for row in whole] == ["2", "4", "6"] and found["steps"] == 6
-    assert 20 < found["training_frames"] <= 20 * 13  # augmented motions too, the held-out one not
+    assert [row["step"] for row in whole] == ["2", "4", "6"] and metrics["steps"] == 6
+    assert 20 < metrics["training_frames"] <= 20 * 13  # augmented motions too, the held-out one not
     model = TrainedModel.load(model_path)
     assert model.steps == 6 and all(row["seconds/validation"] > 0 for row in model.history)
     assert 0 < float(whole[-1]["seconds"]) < model.history[-1]["seconds"]

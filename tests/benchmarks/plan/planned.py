@@ -7,5 +7,5 @@ from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import Plan
 
 
-def planned(*words: str) -> Plan:
-    return make_plan(request_of_run(make_parser().parse_args(words), words))
+def planned(*options: str) -> Plan:
+    return make_plan(request_of_run(make_parser().parse_args(options), options))

@@ -28,39 +28,39 @@ def chosen(suites, *, full=False, scenes=(), methods=(), seeds=(0,), test=("kick
 
 
 def test_a_cell_in_two_suites_is_run_once():
-    found, _ = chosen(("garments", "speed"))
-    keys = [(cell.scene.name, cell.method, cell.seed) for cell in found]
+    cells, _ = chosen(("garments", "speed"))
+    keys = [(cell.scene.name, cell.method, cell.seed) for cell in cells]
     assert len(set(keys)) == len(keys)
     # Whole motions and their clips are scenes of their own: a suite that times every solver takes the clips.
-    assert {cell.suites for cell in found if cell.scene.part == "clip"} == {("speed",)}
-    assert {cell.suites for cell in found if cell.scene.name == "tshirt/kick"} == {("garments",)}
+    assert {cell.suites for cell in cells if cell.scene.part == "clip"} == {("speed",)}
+    assert {cell.suites for cell in cells if cell.scene.name == "tshirt/kick"} == {("garments",)}
 
 
 def test_a_method_that_a_suite_lists_twice_is_of_it_once():
-    found, _ = chosen(("garments",), methods=("simulation", "simulation-perturbed-*", "simulation-refrozen"))
-    assert len(found) > 4 and all(cell.suites == ("garments",) for cell in found)
+    cells, _ = chosen(("garments",), methods=("simulation", "simulation-perturbed-*", "simulation-refrozen"))
+    assert len(cells) > 4 and all(cell.suites == ("garments",) for cell in cells)
 
 
 def test_the_reference_comes_first_in_every_scene():
-    found, _ = chosen(("garments", "speed"), full=True)
+    cells, _ = chosen(("garments", "speed"), full=True)
     first = {}
-    for cell in found:
+    for cell in cells:
         if not cell.scene.networks_only:
             first.setdefault(cell.scene.name, cell.method)
     assert set(first.values()) == {"simulation"} and len(first) == 8
 
 
 def test_only_what_has_a_seed_is_repeated_and_the_rest_is_the_same_whatever_the_seeds():
-    found, _ = chosen(("garments",), seeds=(3, 5))
+    cells, _ = chosen(("garments",), seeds=(3, 5))
     seeds = {}
-    for cell in found:
+    for cell in cells:
         seeds.setdefault(cell.method, set()).add(cell.seed)
     assert seeds["snug"] == seeds["untrained"] == {3, 5} and seeds["simulation"] == seeds["skinning"] == {0}
 
 
 def test_patterns_choose_scenes_methods_and_cases():
-    found, cases = chosen(("speed", "validation", "extremes"), scenes=["*sheet*", "free_fall"])
-    assert {cell.scene.name for cell in found} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
+    cells, cases = chosen(("speed", "validation", "extremes"), scenes=["*sheet*", "free_fall"])
+    assert {cell.scene.name for cell in cells} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
     known = [case.name for case in cases if case.suite == "validation"]
     assert known == ["free_fall", "hanging_sheet_time_step_order"]
     assert tuple(case for case in cases if case.suite == "extremes") == MAPS["map_sheet"]
@@ -72,32 +72,32 @@ def test_patterns_choose_scenes_methods_and_cases():
 def test_a_pattern_of_another_garment_means_its_motions_of_the_split():
     def names(pattern, split="test", suites=("garments",)):
         of = split_motions([], [], find_preset("quick"), split=split)
-        found = choose_cells(
+        cells = choose_cells(
             Selection(suites=suites, preset=find_preset("quick"), motions=of, scenes=(pattern,))
         )[0]
-        return of, {cell.scene.name for cell in found}
+        return of, {cell.scene.name for cell in cells}
 
     for split in ("test", "validation"):
-        of, found = names("trousers/*", split)
-        assert found == {f"trousers/{motion}" for motion in of.measured} and len(found) >= 4
-    of, found = names("skirt/*")
-    assert found == {f"skirt/{motion}" for motion in of.dynamic_measured}
-    of, found = names("shorts/*@clip", suites=("speed",))
-    assert found == {f"shorts/{motion}@clip" for motion in of.measured}
+        of, scenes = names("trousers/*", split)
+        assert scenes == {f"trousers/{motion}" for motion in of.measured} and len(scenes) >= 4
+    of, scenes = names("skirt/*")
+    assert scenes == {f"skirt/{motion}" for motion in of.dynamic_measured}
+    of, scenes = names("shorts/*@clip", suites=("speed",))
+    assert scenes == {f"shorts/{motion}@clip" for motion in of.measured}
 
 
 def test_a_name_means_itself_whatever_is_in_it():
-    found, _ = chosen(("garments",), scenes=["tshirt/w[1]"], test=("w[1]", "w2"))
-    assert {cell.scene.name for cell in found} == {"tshirt/w[1]"}
+    cells, _ = chosen(("garments",), scenes=["tshirt/w[1]"], test=("w[1]", "w2"))
+    assert {cell.scene.name for cell in cells} == {"tshirt/w[1]"}
 
 
 def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is_named():
     both = ("speed", "extremes")
     slow = {"newton-2", "lbfgs-40", "gradient-descent-10", "simulation-perturbed-1e-9"}
-    for words, there in (({}, False), ({"full": True}, True), ({"methods": ("*",)}, True)):
-        found, cases = chosen(both, **words)
-        assert (slow & {cell.method for cell in found}) == (slow if there else set())
-        assert bool({*MAPS["map_shirt"]} & {*cases}) == ("full" in words)
+    for choice, expected in (({}, False), ({"full": True}, True), ({"methods": ("*",)}, True)):
+        cells, cases = chosen(both, **choice)
+        assert (slow & {cell.method for cell in cells}) == (slow if expected else set())
+        assert bool({*MAPS["map_shirt"]} & {*cases}) == ("full" in choice)
         assert {*MAPS["map_sheet"]} <= {*cases}
     assert {cell.method for cell in chosen(both, methods=("lbfgs-40",))[0]} == {"lbfgs-40"}
     assert chosen(("extremes",), scenes=("map_shirt/1/1",))[1]
@@ -105,9 +105,9 @@ def test_what_is_left_out_of_a_default_run_is_there_where_its_suite_or_itself_is
 
 def dynamic(suites, **changes):
     motions = Motions(("walk",), ("kick",), {}, ("twist_stop",))
-    words = {name: tuple(value) for name, value in changes.items()}
+    criteria = {name: tuple(value) for name, value in changes.items()}
     return choose_cells(
-        Selection(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **words)
+        Selection(suites=tuple(suites), preset=find_preset("quick"), motions=motions, **criteria)
     )[0]
 
 
@@ -160,8 +160,8 @@ def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
     entries = (*methods.METHODS, MethodEntry(name="my-method", description="", module="my_method"))
     for module in (methods, choosing):
         monkeypatch.setattr(module, "METHODS", entries)
-    found = dynamic(("garments", "speed"), scenes=["my_scene"], methods=["simulation", "my-method"])
-    assert [(c.scene, c.method, c.suites) for c in found] == [
+    cells = dynamic(("garments", "speed"), scenes=["my_scene"], methods=["simulation", "my-method"])
+    assert [(c.scene, c.method, c.suites) for c in cells] == [
         (mine, "simulation", ("speed",)),
         (mine, "my-method", ("speed",)),
     ]
@@ -207,20 +207,20 @@ def test_motions_are_divided_as_help_says():
         "validation", "test", "", "",
     ]  # fmt: skip
     # A user's files of clips whose parts are measured do not train, nor does the library's.
-    own = split_motions(["01_01", "05_02", "05_12", "a"], [], quick, library=True)
-    assert own.train[:2] == ("05_12", "a") and not {"01_01", "05_02"} & set(own.train)
+    motions = split_motions(["01_01", "05_02", "05_12", "a"], [], quick, library=True)
+    assert motions.train[:2] == ("05_12", "a") and not {"01_01", "05_02"} & set(motions.train)
     alone = split_motions(["01_01", "05_02", "05_12"], ["05_12"], quick)
     assert (alone.train, alone.test) == (("01_01", "05_02"), ("05_12",))
     assert "05_12" not in split_motions(["05_12"], [], quick).train
     whole = split_motions([], ["01_01", "05_04"], quick)
     assert set(whole.test) == {"01_01", "05_04"} and "05_04" not in whole.train
-    for words, said in (
+    for choice, message in (
         ({"test_names": ["a"], "validation_names": ["a"]}, "'a' is a test motion"),
         ({"test_names": [], "validation_names": ["d"]}, "--validation-motions: unknown motion 'd'"),
         ({"test_names": ["a"], "split": "validation"}, "name some by --validation-motions"),
     ):
-        with pytest.raises(PlanError, match=said):
-            split_motions(clips, preset=quick, **words)
+        with pytest.raises(PlanError, match=message):
+            split_motions(clips, preset=quick, **choice)
 
 
 def test_own_clips_that_are_cut_are_named_and_frames_measures_more(tmp_path):
@@ -231,8 +231,10 @@ def test_own_clips_that_are_cut_are_named_and_frames_measures_more(tmp_path):
         tmp_path / "long.npz", poses=poses.reshape(200, 72), trans=np.zeros((200, 3)), mocap_framerate=30.0
     )
 
-    def plan_of(*words: str):
-        return planned("--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *words)
+    def plan_of(*options: str):
+        return planned(
+            "--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *options
+        )
 
     assert plan_of().cut_motions == {"long": "the first 150 of 200 frames"}
     assert plan_of("--frames", "200").cut_motions == {} and plan_of("--frames", "180").preset.frames == 180

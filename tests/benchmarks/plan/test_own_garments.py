@@ -39,17 +39,17 @@ def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, t
 
 def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, tube):
     path = saved(tmp_path, tube)
-    words = ["--preset", "smoke", "--suite", "garments", "--methods", "skinning", "--garment", str(path)]
+    options = ["--preset", "smoke", "--suite", "garments", "--methods", "skinning", "--garment", str(path)]
 
     def inputs(*more):
-        plan = planned(*words, *more, "-o", str(tmp_path / "run"))
+        plan = planned(*options, *more, "-o", str(tmp_path / "run"))
         return Schedule(plan).cell(plan.cells[0]).inputs
 
     first = inputs()
     assert inputs() == first != inputs("--garment-shift", "0,0.001,0")
     (tmp_path / "elsewhere").mkdir()
     moved = path.rename(tmp_path / "elsewhere" / path.name)
-    words[-1] = str(moved)
+    options[-1] = str(moved)
     assert inputs() == first
     material = tmp_path / "silk.json"
     material.write_text('{"density": 300.0}')
@@ -72,9 +72,9 @@ def test_a_garment_of_ones_own_goes_through_a_run(tmp_path):
     shirt = tailor_tshirt(Body.load(), vertices=300)
     path = saved(tmp_path, shirt, uv=own_chart(shirt.rest_positions, shirt.faces))
     out = tmp_path / "run"
-    words = ["--preset", "smoke", "--suite", "garments", "--methods", "simulation,skinning,snug"]
-    words += ["--garment", str(path), "--garment-rest", "uv", "-o", str(out), "--workers", "1"]
-    assert run_command.main(words) == 0
+    options = ["--preset", "smoke", "--suite", "garments", "--methods", "simulation,skinning,snug"]
+    options += ["--garment", str(path), "--garment-rest", "uv", "-o", str(out), "--workers", "1"]
+    assert run_command.main(options) == 0
     folder = RunFolder(out)
     rows = [row for row in folder.read_rows() if row.metric == "energy/strain"]
     assert {row.scene for row in rows} == {"mine/push_recovery"} and all(row.status == "ok" for row in rows)

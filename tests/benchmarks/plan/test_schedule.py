@@ -91,20 +91,20 @@ def test_only_what_trains_depends_on_the_accelerator(tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "hardware", lambda device: hardware[device])
     cell = Cell(dressed_scene("kick"), find_method("snug"), 0, ("garments",))
     plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
-    there = dataclasses.replace(plan, device="cuda")
-    own, other = ({task.id: task.inputs for task in tasks_of(p)} for p in (plan, there))
-    assert own.keys() == other.keys()
-    assert {id[0] for id in own if own[id] != other[id]} == {"network"}
+    cuda_plan = dataclasses.replace(plan, device="cuda")
+    inputs, other = ({task.id: task.inputs for task in tasks_of(p)} for p in (plan, cuda_plan))
+    assert inputs.keys() == other.keys()
+    assert {id[0] for id in inputs if inputs[id] != other[id]} == {"network"}
 
 
 def test_nothing_depends_on_how_many_cores_there_are(tmp_path, monkeypatch):
     cell = Cell(dressed_scene("kick"), find_method("snug"), 0, ("garments",))
     plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
-    found = []
+    inputs = []
     for cores in (1, 2):
         monkeypatch.setattr(provenance, "usable_cores", lambda cores=cores: cores)
-        found.append({task.id: task.inputs for task in tasks_of(plan)})
-    assert found[0] == found[1]
+        inputs.append({task.id: task.inputs for task in tasks_of(plan)})
+    assert inputs[0] == inputs[1]
 
 
 def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(tmp_path):
@@ -112,7 +112,7 @@ def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(tmp_path):
     plan = dataclasses.replace(plan_of(tmp_path), cells=(cell,), motions=MOTIONS)
     some = dataclasses.replace(cell.scene, metrics=("energy", "cost", "dynamics"))
     fewer = dataclasses.replace(cell, scene=some)
-    own, other = (
+    inputs, other = (
         {t.kind: t.inputs for t in tasks_of(dataclasses.replace(plan, cells=(c,)))} for c in (cell, fewer)
     )
-    assert {kind for kind in own if own[kind] != other[kind]} == {"metrics"}
+    assert {kind for kind in inputs if inputs[kind] != other[kind]} == {"metrics"}

@@ -149,7 +149,7 @@ PLAIN = 'name="a", description="b"'
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("x = 1\ny = )\n", "bad.py: line 2: unmatched ')'"),
         ("x = 1\n", "bad.py: declares no METHODS, a tuple of MethodEntry"),
@@ -177,14 +177,14 @@ PLAIN = 'name="a", description="b"'
         ("\udcff", "bad.py: cannot be read"),
     ],
 )  # fmt: skip
-def test_a_file_that_cannot_be_meant_is_one_line(text, words, tmp_path, monkeypatch, refused):
+def test_a_file_that_cannot_be_meant_is_one_line(text, message, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.py").write_text(text, errors="surrogateescape")
-    refused(words, run.main, ["--scenes", "free_fall", "--methods", "bad.py", "-o", "out"])
+    refused(message, run.main, ["--scenes", "free_fall", "--methods", "bad.py", "-o", "out"])
 
 
 @pytest.mark.parametrize(
-    ("option", "word", "words"),
+    ("option", "word", "message"),
     [
         ("--methods", "gone.py", "gone.py: no such file"),
         ("--metrics", "energy", "energy: is no file"),
@@ -195,7 +195,7 @@ def test_a_file_that_cannot_be_meant_is_one_line(text, words, tmp_path, monkeypa
         ("--methods", "random.py", "Python knows random as"),
     ],
 )
-def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, monkeypatch, refused):
+def test_a_word_that_cannot_be_meant_is_one_line(option, word, message, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     text = METRIC_FILE.replace("height/highest", "energy/total")
     (tmp_path / "twice.py").write_text(text)
@@ -207,11 +207,11 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
     with monkeypatch.context() as patch:
         case = dataclasses.replace(choosing.MEASURED[0], name="membrane/uniaxial")
         patch.setattr("benchmarks.plan.choose_cells.MEASURED", (case,))
-        refused(words, run.main, ["--scenes", "free_fall", option, word, "-o", "out"])
+        refused(message, run.main, ["--scenes", "free_fall", option, word, "-o", "out"])
 
 
 @pytest.mark.parametrize(
-    ("said", "words"),
+    ("fields", "message"),
     [
         ('metrics=("energies",)', "scene 'lift': metrics=('energies',): choose from energy, "),
         ('metrics="energy"', "scene 'lift': metrics='energy': give a tuple of strings"),
@@ -220,15 +220,15 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, words, tmp_path, 
         ('garment="tshirt", motion="wlak"', "no motion is called 'wlak'; did you mean walk?"),
     ],
 )
-def test_what_a_scene_names_and_nobody_knows_is_one_line(said, words, tmp_path, monkeypatch, refused):
+def test_what_a_scene_names_and_nobody_knows_is_one_line(fields, message, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "named.py").write_text(SCENE_FILE.replace('sizes=("sheet_frames",)', said))
-    refused(words, run.main, ["--scenes", "named.py", "-o", "out"])
+    (tmp_path / "named.py").write_text(SCENE_FILE.replace('sizes=("sheet_frames",)', fields))
+    refused(message, run.main, ["--scenes", "named.py", "-o", "out"])
 
 
 def test_a_scene_whose_file_has_changed_is_done_again(files):
-    said = SCENE_FILE.replace('sizes=("sheet_frames",)', 'sizes=("sheet_frames",), files=("a.txt",)')
-    (files / "lifted_sheet.py").write_text(said)
+    text = SCENE_FILE.replace('sizes=("sheet_frames",)', 'sizes=("sheet_frames",), files=("a.txt",)')
+    (files / "lifted_sheet.py").write_text(text)
     (scene,) = user_files.entries_of(user_files.SCENES, str(files / "lifted_sheet.py"))
     before = digest(declared(scene))
     (files / "a.txt").write_text("another cloth")
@@ -297,21 +297,21 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("number", "words"),
+    ("number", "message"),
     [
         ("1 / 0", r"split\.py: ZeroDivisionError: division by zero"),
         ("None", r"split\.py: TypeError: height/highest is None: give a number or an Estimate"),
         ("[1.0, 2.0]", r"split\.py: TypeError: height/highest is \[1.0, 2.0\]: give a number"),
     ],
 )
-def test_a_metric_that_gives_no_number_is_named_with_its_file(number, words, tmp_path):
+def test_a_metric_that_gives_no_number_is_named_with_its_file(number, message, tmp_path):
     home = tmp_path / "split.py"
     home.write_text(METRIC_FILE.replace("float(", f"{number} if True else float("))
     scene = SCENE["free_fall"].at(TINY).build()
     trajectory = Trajectory(scene.exact, scene.cloth.faces, np.arange(scene.frames) * scene.dt)
     group = metric.SceneRollOuts(scene)
     group.roll_outs.append(metric.RollOut(group, METHODS[0], trajectory, suites=("speed",)))
-    with pytest.raises(RuntimeError, match=words):
+    with pytest.raises(RuntimeError, match=message):
         measured(group.roll_outs[0], (), (str(home),))
 
 
@@ -319,7 +319,7 @@ def test_a_metric_that_gives_no_number_is_named_with_its_file(number, words, tmp
 
 
 @pytest.mark.parametrize(
-    ("body", "seconds", "words"),
+    ("body", "seconds", "message"),
     [
         ("print('one', file=sys.stderr); sys.exit('no licence')", 9, "ended with status 1: no licence"),
         ("import time; print('loading', flush=True); time.sleep(9)", 0.5, "was ended after 0.5 s: loading"),
@@ -330,7 +330,7 @@ def test_a_metric_that_gives_no_number_is_named_with_its_file(number, words, tmp
          "n.savez(out, positions=n.stack(6 * [x]), seconds_per_frame=-1.0)", 9, "no positive number"),
     ],
 )  # fmt: skip
-def test_a_program_that_goes_wrong_says_so_in_its_last_line(body, seconds, words, tmp_path):
+def test_a_program_that_goes_wrong_says_so_in_its_last_line(body, seconds, message, tmp_path):
     script = tmp_path / "script.py"
     script.write_text(f"import sys\n_, scene, out = sys.argv\n{body}\n")
     entry = program("p", f"{sys.executable} -I {script} {{scene}} {{out}}", seconds=seconds)
@@ -338,7 +338,7 @@ def test_a_program_that_goes_wrong_says_so_in_its_last_line(body, seconds, words
     method.prepare(SCENE["free_fall"].at(TINY).build())
     with pytest.raises(Exception) as raised:
         method.run()
-    assert words in str(raised.value) and "\n" not in str(raised.value)
+    assert message in str(raised.value) and "\n" not in str(raised.value)
 
 
 def test_a_command_without_its_places_is_refused(tmp_path):

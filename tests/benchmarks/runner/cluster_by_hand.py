@@ -57,17 +57,18 @@ class Cluster:
             worker.wait(30)
         self.start_scheduler(int(self.address.rpartition(":")[2]))
 
-    def add(self, *words: str, **environment: str) -> subprocess.Popen:
+    def add(self, *options: str, **environment: str) -> subprocess.Popen:
         """Start a worker of one thread."""
-        words = (self.address, "--nthreads", "1", "--local-directory", str(self.folder), *words)
-        self.workers.append(self._start("worker", *(words if "--nanny" in words else (*words, "--no-nanny")),
-                                        **environment))  # fmt: skip
+        options = (self.address, "--nthreads", "1", "--local-directory", str(self.folder), *options)
+        self.workers.append(self._start(
+            "worker", *(options if "--nanny" in options else (*options, "--no-nanny")), **environment,
+        ))  # fmt: skip
         return self.workers[-1]
 
-    def _start(self, what: str, *words: str, **environment: str) -> subprocess.Popen:
+    def _start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen:
         with (self.folder / f"{what}.log").open("ab") as log:
             return subprocess.Popen(
-                [sys.executable, "-m", f"distributed.cli.dask_{what}", *words, "--no-dashboard"],
+                [sys.executable, "-m", f"distributed.cli.dask_{what}", *arguments, "--no-dashboard"],
                 env=os.environ | {"PYTHONPATH": PATH} | environment, cwd=self.folder,
                 stdout=subprocess.DEVNULL, stderr=log, start_new_session=True,
             )  # fmt: skip

@@ -54,8 +54,8 @@ def together(folder: RunFolder, address: str, *batches, needed=None) -> dict[str
     executor = ClusterExecutor(folder, None, 1, address)
     left = [(batch, needed or {}) for batch in reversed(batches)]
     try:
-        found = executor.together(lambda: left.pop() if left else None, Bar())
-        return {task.name: outcome for task, outcome in found}
+        outcomes = executor.together(lambda: left.pop() if left else None, Bar())
+        return {task.name: outcome for task, outcome in outcomes}
     finally:
         executor.close()
 
@@ -95,9 +95,9 @@ def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path
     here = tmp_path / "here"
     here.mkdir()
     finish(here, LocalExecutor(RunFolder(here), None, 2))
-    there = finish(folder.path, ClusterExecutor(folder, None, 1, two.address))
+    runner = finish(folder.path, ClusterExecutor(folder, None, 1, two.address))
     assert len(files(here)) == 12 and files(folder.path) == files(here)
-    origins = [outcome.origin for outcome in there.outcomes.values()]
+    origins = [outcome.origin for outcome in runner.outcomes.values()]
     assert {o["commit"] for o in origins} == {"c"} and "h" not in {o["hardware"] for o in origins}
     assert len(finish(folder.path, ClusterExecutor(folder, None, 1, two.address)).reused) == 12
 
@@ -106,17 +106,17 @@ def test_failures_are_values_and_a_batch_stays_together(two, folder):
     large = 2_000_005  # numbers
     batch = [write("one"), write("bad", how="raise"), write("large", count=large)]
     others = [[write(name)] for name in "abc"]  # two of these in one process
-    found = together(folder, two.address, batch, *others)
+    outcomes = together(folder, two.address, batch, *others)
     # Not beside the batch: where one worker has both, its end moves the rest of the batch to the other.
-    found |= together(folder, two.address, [write("dies", how="die")])
-    assert found["large"].result["memo"] == ["one", "large"]
-    assert all(found[name].result["memo"] == [name] for name in "abc")
-    assert found["bad"].reason == "ValueError: broken on purpose"
-    assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
+    outcomes |= together(folder, two.address, [write("dies", how="die")])
+    assert outcomes["large"].result["memo"] == ["one", "large"]
+    assert all(outcomes[name].result["memo"] == [name] for name in "abc")
+    assert outcomes["bad"].reason == "ValueError: broken on purpose"
+    assert outcomes["dies"].status == "out-of-memory" and "SIGKILL" in outcomes["dies"].reason
     expected = np.random.default_rng(0).random(large)
     np.testing.assert_array_equal(np.load(folder.path / "numbers" / "large.npy"), expected)
     task = write("from large", needs=(("numbers", "large"),), count=large)
-    together(folder, two.address, [task], needed={("numbers", "large"): found["large"]})
+    together(folder, two.address, [task], needed={("numbers", "large"): outcomes["large"]})
     np.testing.assert_array_equal(np.load(folder.path / "numbers" / "from large.npy"), 2.0 * expected)
 
 
@@ -124,10 +124,10 @@ def test_a_worker_has_its_next_task_before_results_of_others_are_taken(two, fold
     monkeypatch.setattr(runner_side, "POLL", 1.0)  # both have ended then
     calls = []
     for name in ("_take", "_submit"):
-        own = getattr(ClusterExecutor, name)
+        method = getattr(ClusterExecutor, name)
         monkeypatch.setattr(
             ClusterExecutor, name,
-            lambda self, *words, own=own, name=name: (calls.append(name), own(self, *words))[1],
+            lambda self, *args, method=method, name=name: (calls.append(name), method(self, *args))[1],
         )  # fmt: skip
     together(folder, two.address, *([write(name)] for name in "abcd"))
     assert calls == ["_submit", "_submit", *["_take", "_submit"] * 2, *["_take"] * 2]
@@ -135,23 +135,23 @@ def test_a_worker_has_its_next_task_before_results_of_others_are_taken(two, fold
 
 def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
     monkeypatch.setattr(runner_side, "LOOK", 0.1)
-    told = []
-    monkeypatch.setattr(Bar, "update", lambda self, units=1: told.append(units))
+    updates = []
+    monkeypatch.setattr(Bar, "update", lambda self, units=1: updates.append(units))
     together(folder, two.address, [write("one", units=7), write("two", units=5, seconds=1.0)])
-    assert 7 in told
+    assert 7 in updates
 
 
 @pytest.mark.slow
 def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
     """Bit for bit, but for times: a network that learned from ground truth, and metrics of all frames."""
     monkeypatch.setattr(execution, "make_report", lambda log: "")
-    words = ["--preset", "smoke", "--suite", "garments", "--split", "validation"]
-    words += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
-    here, there = RunFolder(tmp_path / "here"), RunFolder(tmp_path / "there")
-    assert run.main([*words, "-o", str(here.path)]) == 0
+    options = ["--preset", "smoke", "--suite", "garments", "--split", "validation"]
+    options += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
+    here, cluster_folder = RunFolder(tmp_path / "here"), RunFolder(tmp_path / "there")
+    assert run.main([*options, "-o", str(here.path)]) == 0
     with cluster(tmp_path, 2) as started:
-        assert run.main([*words, "-o", str(there.path), "--scheduler", started.address]) == 0
-    assert kept(here) == kept(there)
+        assert run.main([*options, "-o", str(cluster_folder.path), "--scheduler", started.address]) == 0
+    assert kept(here) == kept(cluster_folder)
 
 
 def kept(folder: RunFolder) -> tuple[dict, dict]:
@@ -168,31 +168,35 @@ def kept(folder: RunFolder) -> tuple[dict, dict]:
 
 
 def test_a_worker_with_other_software_is_left_out_in_one_line(two, folder, monkeypatch, capsys):
-    own = cluster_worker.software_of
+    software_of = cluster_worker.software_of
     other = {"package numpy": "numpy 1.0", "benchmarks/runner/local_executor.py": "0"}
-    monkeypatch.setattr(cluster_worker, "software_of", lambda task: own(task) | other)
+    monkeypatch.setattr(cluster_worker, "software_of", lambda task: software_of(task) | other)
     with pytest.raises(RunStopped, match="can be used") as stopped:
         together(folder, two.address, [write("one")])
     assert "package numpy: numpy 2" in str(stopped.value) and "numpy 1.0 here" in str(stopped.value)
     assert "benchmarks/runner/local_executor.py" in str(stopped.value) and list(folder.path.iterdir()) == []
-    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("left out: worker tcp:")]
-    assert len(said) == 2
+    notices = [
+        line for line in capsys.readouterr().err.splitlines() if line.startswith("left out: worker tcp:")
+    ]
+    assert len(notices) == 2
 
 
 def test_a_worker_that_does_not_see_the_folder_is_left_out_in_one_line(
     two, folder, tmp_path, monkeypatch, capsys
 ):
-    own = ClusterExecutor._open
+    opener = ClusterExecutor._open
 
     def elsewhere(self):
-        own(self)
+        opener(self)
         self._path = str(tmp_path / "elsewhere")
 
     monkeypatch.setattr(ClusterExecutor, "_open", elsewhere)
     with pytest.raises(RunStopped, match=r"does not see the folder .*elsewhere.*--out"):
         together(folder, two.address, [write("one")])
-    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("left out: worker tcp:")]
-    assert len(said) == 2 and list(folder.path.iterdir()) == []
+    notices = [
+        line for line in capsys.readouterr().err.splitlines() if line.startswith("left out: worker tcp:")
+    ]
+    assert len(notices) == 2 and list(folder.path.iterdir()) == []
 
 
 def test_what_comes_damaged_is_not_kept(two, folder, monkeypatch):
@@ -216,12 +220,12 @@ def test_what_was_damaged_here_is_not_built_upon(two, folder):
 
 def test_a_scheduler_that_does_not_answer_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(scheduler, "FIRST", 0.3)
-    words = ["--scenes", "free_fall", "-o", str(tmp_path / "run"), "--scheduler"]
-    assert run.main([*words, "tcp://127.0.0.1:1"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "--scheduler tcp://127.0.0.1:1" in said and "dask scheduler" in said
+    options = ["--scenes", "free_fall", "-o", str(tmp_path / "run"), "--scheduler"]
+    assert run.main([*options, "tcp://127.0.0.1:1"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "--scheduler tcp://127.0.0.1:1" in error and "dask scheduler" in error
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert run.main([*words, "tcp://127.0.0.1:1"]) == 2
+    assert run.main([*options, "tcp://127.0.0.1:1"]) == 2
     assert "pip install" in capsys.readouterr().err and not (tmp_path / "run").exists()
 
 
@@ -276,9 +280,11 @@ def start_runner(folder: Path, address: str, *, seconds: float, mark: Path) -> s
 def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path):
     with cluster(tmp_path, 4) as four:
         batch = [write("deadly", how="die with the worker"), write("after")]
-        found = together(folder, four.address, batch, [write("beside")])
-    assert found["deadly"].failed and found["deadly"].reason.startswith("3 workers died while they did it: ")
-    assert found["after"].status == found["beside"].status == "ok"
+        outcomes = together(folder, four.address, batch, [write("beside")])
+    assert outcomes["deadly"].failed and outcomes["deadly"].reason.startswith(
+        "3 workers died while they did it: "
+    )
+    assert outcomes["after"].status == outcomes["beside"].status == "ok"
 
 
 @pytest.mark.slow
@@ -310,8 +316,10 @@ def test_workers_behind_a_nanny_need_a_setting_and_then_come_back(folder, tmp_pa
         none.workers[0].terminate()
         none.workers[0].wait(30)
         none.add("--nanny", DASK_DISTRIBUTED__WORKER__DAEMON="False")
-        found = together(folder, none.address, [write("deadly", how="die with the worker"), write("after")])
-    assert found["deadly"].failed and found["after"].status == "ok"
+        outcomes = together(
+            folder, none.address, [write("deadly", how="die with the worker"), write("after")]
+        )
+    assert outcomes["deadly"].failed and outcomes["after"].status == "ok"
 
 
 @pytest.fixture(scope="module")
@@ -342,8 +350,8 @@ def test_with_a_worker_killed_and_the_scheduler_restarted_the_files_are_the_same
 def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
     """The runner, or a worker; here a task's process. What was finished is done no second time."""
     chance, kills, mark = random.Random(7), 0, tmp_path / "mark"
-    with cluster(tmp_path, workers) if workers else nullcontext() as there:
-        address = there.address if there else ""
+    with cluster(tmp_path, workers) if workers else nullcontext() as dask_cluster:
+        address = dask_cluster.address if dask_cluster else ""
         while kills < KILLS:
             runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
             while kills < KILLS and runner.poll() is None:
@@ -353,28 +361,30 @@ def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expec
                 if runner.poll() is not None:
                     break
                 kept = {path: path.read_bytes() for path in folder.path.glob("cache/**/*.json")}
-                kill_one(chance, there, runner, lines(mark)[-1][1])
+                kill_one(chance, dask_cluster, runner, lines(mark)[-1][1])
                 kills += 1
                 assert {path: path.read_bytes() for path in kept} == kept
             runner.wait(120)
             if files(folder.path) == expected:  # begin again: there are kills left
                 for path in folder.path.rglob("*.json"):
                     path.unlink()
-        last = ClusterExecutor(folder, None, 1, address) if there else LocalExecutor(folder, None, 2)
+        last = ClusterExecutor(folder, None, 1, address) if dask_cluster else LocalExecutor(folder, None, 2)
         finish(folder.path, last)
     assert files(folder.path) == expected
     until(lambda: not any(alive(task) for _, task in lines(mark)), 15.0)
 
 
-def kill_one(chance: random.Random, there: Cluster | None, runner: subprocess.Popen, task: int) -> None:
+def kill_one(
+    chance: random.Random, dask_cluster: Cluster | None, runner: subprocess.Popen, task: int
+) -> None:
     if chance.random() < 0.5:
         runner.kill()
         runner.wait()
-    elif there is None:
+    elif dask_cluster is None:
         with suppress(ProcessLookupError):  # it has just ended with the chain
             os.kill(task, signal.SIGKILL)
     else:
-        victim = there.workers.pop(chance.randrange(len(there.workers)))
+        victim = dask_cluster.workers.pop(chance.randrange(len(dask_cluster.workers)))
         victim.kill()
         victim.wait()
-        there.add()
+        dask_cluster.add()

@@ -126,11 +126,11 @@ def test_a_task_whose_process_is_killed_is_kept_as_failed_and_done_again_when_as
     assert [outcome.failed for outcome in first] == [False, True, False]
     assert first[1].status == "out-of-memory" and "SIGKILL" in first[1].reason
     assert "the system was out of memory" in first[1].reason
-    found = runner.cache.find(task("two"), {})
-    assert found.state == "failed" and found.why.startswith("out-of-memory") and "SIGKILL" in found.why
-    assert dict(runner.broken()) == {"network two": found.why}
+    entry = runner.cache.find(task("two"), {})
+    assert entry.state == "failed" and entry.why.startswith("out-of-memory") and "SIGKILL" in entry.why
+    assert dict(runner.broken()) == {"network two": entry.why}
     again, runner = ended(True, False, True)
-    assert again[1].reason == first[1].reason and dict(runner.broken()) == {"network two": found.why}
+    assert again[1].reason == first[1].reason and dict(runner.broken()) == {"network two": entry.why}
     again, runner = ended(True, False, True, only=("failed",))
     assert not again[1].failed and dict(runner.broken()) == {}
 
@@ -212,7 +212,7 @@ def test_a_dry_run_decides_as_the_run_does(tmp_path):
         planned = {task.name for task, _, outcome in preview if outcome is None}
         runner = run_tasks(tmp_path, *tasks, only=only)
         blocked = "failed: cannot be run"
-        ran = {name for (_, name), found in runner.cached.items() if not found.why.startswith(blocked)}
+        ran = {name for (_, name), entry in runner.cached.items() if not entry.why.startswith(blocked)}
         return planned, ran - {title.removeprefix("network ") for title in runner.reused}
 
     planned, done = planned_and_done(True, "stale", "missing")

@@ -146,9 +146,9 @@ def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it
     cache = Cache(folder)
     monkeypatch.setattr(task_process, "_context", Context(folder), raising=False)
     monkeypatch.setattr(task_process, "_verified", set())
-    found = cache.keep(first, task_process.perform(first, {}), {})
-    assert isinstance(found.outcome, Outcome)
-    needed = {first.id: found.outcome}
+    entry = cache.keep(first, task_process.perform(first, {}), {})
+    assert isinstance(entry.outcome, Outcome)
+    needed = {first.id: entry.outcome}
     assert task_process.perform(second, needed).status == "ok"
     (tmp_path / "first.txt").write_text("worst")
     assert task_process.perform(second, needed).status == "ok"  # compared once in each process

@@ -74,49 +74,49 @@ def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Ba
 
 
 def test_a_failure_is_a_value_and_the_others_go_on(tmp_path):
-    found, _ = together(tmp_path, [add("one")], [add("two", terms=(1, "x"))], [add("three", terms=(3, 4))])
-    assert found["one"].result["sum"] == 3 and found["three"].result["sum"] == 7
-    assert found["two"].failed and found["two"].reason.startswith("TypeError")
-    assert all(outcome.seconds > 0.0 for outcome in found.values())
+    outcomes, _ = together(tmp_path, [add("one")], [add("two", terms=(1, "x"))], [add("three", terms=(3, 4))])
+    assert outcomes["one"].result["sum"] == 3 and outcomes["three"].result["sum"] == 7
+    assert outcomes["two"].failed and outcomes["two"].reason.startswith("TypeError")
+    assert all(outcome.seconds > 0.0 for outcome in outcomes.values())
 
 
 def test_a_process_that_was_killed_while_it_reported_keeps_no_other_waiting(tmp_path):
-    found, _ = together(tmp_path, [add("dies", how="die telling")], [add("tells", terms=(3, 4))])
-    assert found["dies"].status == "out-of-memory" and "SIGKILL" in found["dies"].reason
-    assert found["tells"].result["sum"] == 7
+    outcomes, _ = together(tmp_path, [add("dies", how="die telling")], [add("tells", terms=(3, 4))])
+    assert outcomes["dies"].status == "out-of-memory" and "SIGKILL" in outcomes["dies"].reason
+    assert outcomes["tells"].result["sum"] == 7
 
 
 def test_a_task_that_hangs_is_ended_at_its_deadline(tmp_path):
-    found, _ = together(tmp_path, [add("hangs", how="hang", deadline=0.5)], [add("after")])
-    assert found["hangs"].status == "timeout" and "0.5 s" in found["hangs"].reason
-    assert found["after"].result["sum"] == 3
+    outcomes, _ = together(tmp_path, [add("hangs", how="hang", deadline=0.5)], [add("after")])
+    assert outcomes["hangs"].status == "timeout" and "0.5 s" in outcomes["hangs"].reason
+    assert outcomes["after"].result["sum"] == 3
 
 
 def test_what_cannot_be_made_ready_is_a_failure(tmp_path):
-    found, _ = together(tmp_path, [add("cold", how="cold")], [add("after")])
-    assert found["cold"].status == "out-of-memory" and "no room to compile" in found["cold"].reason
-    assert found["after"].result["sum"] == 3
+    outcomes, _ = together(tmp_path, [add("cold", how="cold")], [add("after")])
+    assert outcomes["cold"].status == "out-of-memory" and "no room to compile" in outcomes["cold"].reason
+    assert outcomes["after"].result["sum"] == 3
 
 
 def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
     batch = [add("one"), add("two"), add("bad", terms=(1, "x")), add("four")]
-    found, _ = together(tmp_path, batch, [add("three")])
-    assert found["two"].result["memo"] == ["one", "two"] and found["three"].result["memo"] == ["three"]
-    assert found["bad"].failed and found["four"].result["memo"] == ["one", "two", "bad", "four"]
+    outcomes, _ = together(tmp_path, batch, [add("three")])
+    assert outcomes["two"].result["memo"] == ["one", "two"] and outcomes["three"].result["memo"] == ["three"]
+    assert outcomes["bad"].failed and outcomes["four"].result["memo"] == ["one", "two", "bad", "four"]
 
 
 @needs_proc
 def test_free_memory_of_a_batch_is_given_back(tmp_path):
-    found, _ = together(tmp_path, [add("one", how="fill"), add("two")], [add("three")])
-    during, after = (found[name].result["kB"] for name in ("two", "three"))
+    outcomes, _ = together(tmp_path, [add("one", how="fill"), add("two")], [add("three")])
+    during, after = (outcomes[name].result["kB"] for name in ("two", "three"))
     assert during - after > 100_000
 
 
 def test_what_hangs_in_a_batch_costs_the_others_nothing(tmp_path):
     batch = [add("one"), add("hangs", how="hang", deadline=0.5), add("after", deadline=60.0)]
-    found, bar = together(tmp_path, batch)
-    assert found["hangs"].status == "timeout" and found["one"].result["sum"] == 3
-    assert found["after"].result["memo"] == ["after"] and bar.n == 2
+    outcomes, bar = together(tmp_path, batch)
+    assert outcomes["hangs"].status == "timeout" and outcomes["one"].result["sum"] == 3
+    assert outcomes["after"].result["memo"] == ["after"] and bar.n == 2
 
 
 def test_a_named_process_is_kept_until_it_is_released(tmp_path):

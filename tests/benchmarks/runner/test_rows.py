@@ -81,10 +81,10 @@ RAN = Outcome(result={"seconds": 1.0, "frames": 4, "peak": 70.0, "terms": "strai
 
 def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
     cell = Cell(SHEET, find_method("newton-1"), 0, ("garments", "speed"))
-    found = rows(cell, RAN, {"energy/strain": 1.0, "distance/rms": np.nan})
-    assert [row.suite for row in found] == ["garments"] * 4 + ["speed"] * 4
-    assert {row.dtype for row in found} == {"float64"} and {row.terms for row in found} == {"strain+inertia"}
-    by_metric = {row.metric: row for row in found}
+    table = rows(cell, RAN, {"energy/strain": 1.0, "distance/rms": np.nan})
+    assert [row.suite for row in table] == ["garments"] * 4 + ["speed"] * 4
+    assert {row.dtype for row in table} == {"float64"} and {row.terms for row in table} == {"strain+inertia"}
+    by_metric = {row.metric: row for row in table}
     assert by_metric["cost/frame"].value == 250.0 and by_metric["cost/peak"].unit == "MB"
     strain, lost = by_metric["energy/strain"], by_metric["distance/rms"]
     assert strain.value == 1.0 and strain.unit == "J" and strain.status == "ok"
@@ -97,12 +97,12 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
 
 def test_inputs_are_added_to_a_methods_own_work_and_percentiles_are_medians_of_repeats():
     cell = Cell(SHEET, find_method("newton-1"), 0, ("speed",))
-    found: dict = {("cell", cell.name): RAN}
-    assert set(clock_costs(cell, 3, found)[0]) == {"cost/frame", "cost/peak"}  # as an earlier run wrote it
+    outcomes: dict = {("cell", cell.name): RAN}
+    assert set(clock_costs(cell, 3, outcomes)[0]) == {"cost/frame", "cost/peak"}  # as an earlier run wrote it
     late = [{"seconds": s, "frame_p95": p} for s, p in ((1.0, 0.3), (1.2, 0.5), (1.1, 0.4))]
-    found["cell", cell.name] = dataclasses.replace(RAN, result={**RAN.result, **late[0], "inputs": 0.002})
-    found |= {("repeat", f"{cell.name}-{n}"): Outcome(result=late[n]) for n in (1, 2)}
-    costs, remark = clock_costs(cell, 3, found)
+    outcomes["cell", cell.name] = dataclasses.replace(RAN, result={**RAN.result, **late[0], "inputs": 0.002})
+    outcomes |= {("repeat", f"{cell.name}-{n}"): Outcome(result=late[n]) for n in (1, 2)}
+    costs, remark = clock_costs(cell, 3, outcomes)
     assert costs["cost/frame"] == pytest.approx(275.0) and costs["cost/whole"] == pytest.approx(277.0)
     assert costs["cost/frame_p95"] == pytest.approx(400.0) and remark == ""
 
@@ -122,8 +122,8 @@ def test_only_the_reference_is_judged_by_what_nobody_asks_of_a_network():
     for method, statuses in (("simulation", ("ok", "failed")), ("skinning", ("ok", "ok"))):
         cell = Cell(SHEET, find_method(method), 0, ("garments",))
         for value, status in zip((1e-7, 1e-5), statuses):
-            found = rows(cell, RAN, {"conservation/momentum_worst": value})
-            row = next(row for row in found if row.metric.startswith("conservation"))
+            table = rows(cell, RAN, {"conservation/momentum_worst": value})
+            row = next(row for row in table if row.metric.startswith("conservation"))
             assert row.status == status and row.tolerance == (2e-6 if method == "simulation" else None)
 
 
@@ -146,10 +146,10 @@ def test_the_remarks_name_repeats_that_lie_apart_and_what_is_out_of_date():
     base = Row("speed", "flag", "newton-1", 0, "cost/spread", "%", 12.0)
     late = dataclasses.replace(base, method="lbfgs-5", value=31.0, status="stalled", reason="2 of 4 frames")
     tight = dataclasses.replace(base, status="stalled", reason="2 of 4 frames")
-    said = remarks([tight, late], 3, {"cell flag x snug": "kept though scene changed"})
-    assert [line for line in said if "flag x newton-1" in line] == [] and len(said) == 3
-    assert said[0].startswith("3 results") and said[1] == "cell flag x snug: kept though scene changed"
-    assert said[2].endswith("flag x lbfgs-5 (31 %)")
+    lines = remarks([tight, late], 3, {"cell flag x snug": "kept though scene changed"})
+    assert [line for line in lines if "flag x newton-1" in line] == [] and len(lines) == 3
+    assert lines[0].startswith("3 results") and lines[1] == "cell flag x snug: kept though scene changed"
+    assert lines[2].endswith("flag x lbfgs-5 (31 %)")
     assert remarks([base], 0, {}) == []
 
 
@@ -194,8 +194,8 @@ def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch)
     log = RunLog(plan_of(tmp_path, device="cuda"))
     metrics = ("cost/train", "cost/frame")
     log.write_rows([Row("garments", "tshirt/kick", "snug", 0, metric, "s", 1.0) for metric in metrics])
-    found = {row.metric: row.hardware for row in log.folder.read_rows()}
-    assert found == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
+    machines = {row.metric: row.hardware for row in log.folder.read_rows()}
+    assert machines == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
 
 
 def test_a_run_that_has_just_begun_leaves_what_the_rows_there_mean(tmp_path):
@@ -236,14 +236,14 @@ def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_
     motions = Motions(train=("walk", "run"), test=("kick",))
     plan = dataclasses.replace(plan_of(None), cells=(cell,), motions=motions)
     tasks, network = tasks_of(plan), plan.networks[0].task_id
-    there = {"commit": "c", "preset": "p", "hardware": "there"}
+    origin = {"commit": "c", "preset": "p", "hardware": "there"}
     result = {"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0, "steps": 60, "frames": 90}
-    trained = Outcome(result=result, origin=there)
+    trained = Outcome(result=result, origin=origin)
     outcomes = {
         ("cell", cell.name): RAN, ("metrics", cell.name): Outcome(result={"energy/strain": 1.0}),
         network: trained,
-        ("data", "tshirt-walk/simulation"): Outcome(seconds=3.0, origin=there | {"hardware": "elsewhere"}),
-        ("data", "tshirt-run/simulation"): Outcome(seconds=4.0, origin=there),
+        ("data", "tshirt-walk/simulation"): Outcome(seconds=3.0, origin=origin | {"hardware": "elsewhere"}),
+        ("data", "tshirt-run/simulation"): Outcome(seconds=4.0, origin=origin),
         ("data", "tshirt-run/fast-lbfgs-10"): Outcome(seconds=5.0),
     }  # fmt: skip
     rows = rows_of(plan, tasks, outcomes)
@@ -255,6 +255,6 @@ def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_
     assert costs["cost/data"] == data and costs["cost/train"] == 120.0
     assert costs["cost/setup"] == 20.0 and costs["cost/memory"] == 9.0
     assert costs["cost/train_steps"] == 60 and costs["cost/train_frames"] == 90
-    lacking = dataclasses.replace(trained, result={**trained.result, "left_out": ["run"]})
-    rows = rows_of(plan, tasks, outcomes | {network: lacking})
+    partial_outcome = dataclasses.replace(trained, result={**trained.result, "left_out": ["run"]})
+    rows = rows_of(plan, tasks, outcomes | {network: partial_outcome})
     assert all("learned without run" in row.reason for row in rows)

@@ -53,19 +53,19 @@ def words_of(folder: Path, *methods: str) -> list[str]:
 
 
 def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
-    words, answers = words_of(tmp_path / "run", "simulation"), []
+    options, answers = words_of(tmp_path / "run", "simulation"), []
 
     def execute(plan, assets, *, report):
         if len(answers) == 0:
             answers.append(None)
-            answers.append(run.main(words))
+            answers.append(run.main(options))
         return 0
 
     monkeypatch.setattr(execution, "execute", execute)
-    assert run.main(words) == 0 and answers == [None, 2]
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "another run" in said and str(tmp_path / "run") in said
-    assert run.main(words) == 0  # the first has ended
+    assert run.main(options) == 0 and answers == [None, 2]
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "another run" in error and str(tmp_path / "run") in error
+    assert run.main(options) == 0  # the first has ended
     assert not (tmp_path / "run").exists()  # nothing was written there
 
 
@@ -136,8 +136,8 @@ def test_what_is_out_of_date_is_not_measured_as_if_it_were_not(tmp_path):
 
 
 def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path, monkeypatch, capsys):
-    words = words_of(tmp_path, "simulation,newton-4")
-    assert run.main(words) == 0
+    options = words_of(tmp_path, "simulation,newton-4")
+    assert run.main(options) == 0
     before = RunFolder(tmp_path).read_rows()
     (tmp_path / "cache" / "metrics" / "free_fall" / "newton-4.json").unlink()
     with monkeypatch.context() as patch:
@@ -147,19 +147,19 @@ def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path
     assert RunFolder(tmp_path).read_config()["interrupted"] is True
     assert not [path for path in tmp_path.rglob("*") if ".part" in path.name]
     assert RunFolder(tmp_path).read_rows() == [row for row in before if row.method == "simulation"]
-    assert run.main(words) == 0 and RunFolder(tmp_path).read_rows() == before
+    assert run.main(options) == 0 and RunFolder(tmp_path).read_rows() == before
 
 
 def test_an_interrupt_before_anything_is_known_leaves_the_last_table(tmp_path, monkeypatch):
-    words = words_of(tmp_path, "simulation")
-    assert run.main(words) == 0
+    options = words_of(tmp_path, "simulation")
+    assert run.main(options) == 0
     before = RunFolder(tmp_path).read_rows()
 
     def interrupt(self, executor, log):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Runner, "run", interrupt)
-    assert run.main([*words, "--fresh"]) == 130
+    assert run.main([*options, "--fresh"]) == 130
     assert before and RunFolder(tmp_path).read_rows() == before
 
 
@@ -168,7 +168,7 @@ def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
     cell = Cell(scene, find_method("supervised"), 0, ("garments",))
     motions = Motions(train=("walk", "run"), test=("kick",))
     plan = plan_of(tmp_path, motions=motions, cells=(cell,))
-    cache, found = Cache(RunFolder(tmp_path)), {}
+    cache, entries = Cache(RunFolder(tmp_path)), {}
     by_id = {t.id: t for t in tasks_of(plan)}
     lost = Outcome("diverged", "far away", failed=True)
     killed = Outcome("failed", "killed", failed=True)
@@ -177,7 +177,7 @@ def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
         (("start", "tshirt-kick"), Outcome()), (("data", "tshirt-walk/simulation"), Outcome()),
         (("data", "tshirt-run/simulation"), lost), (network, Outcome()), (("cell", cell.name), killed),
     ):  # fmt: skip
-        found[id] = cache.keep(by_id[id], outcome, found)
+        entries[id] = cache.keep(by_id[id], outcome, entries)
     runner = Runner(tasks_of(plan), Cache(RunFolder(tmp_path)))
     (row,) = rows_of(plan, runner.tasks, runner.known())
     assert (row.method, row.status, row.reason) == ("supervised", "failed", "killed")
@@ -186,7 +186,7 @@ def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
 
 
 def test_the_longest_training_begins_first(tmp_path):
-    words = ["--suite", "garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path)]
-    plan = planned(*words)
+    options = ["--suite", "garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path)]
+    plan = planned(*options)
     trainings = [task for task in tasks_of(plan) if isinstance(task, TrainNetwork)]
     assert [batch[0].training for batch in _batches(trainings)] == ["ncs", "snug", "pbns", "handles-20"]

@@ -131,30 +131,30 @@ def positions(assets, models):
 
     @cache
     def run(name):
-        scene, found = built(assets, name), {}
+        scene, vertices = built(assets, name), {}
         for method in ("skinning", "snug"):
             made = find_method(method).make(models=models, seed=0)
             made.prepare(scene)
-            found[method] = made.run().positions
-        return scene, found
+            vertices[method] = made.run().positions
+        return scene, vertices
 
     return run
 
 
 def roll_outs(positions, name):
     """Skinning and an untrained network in the scene, and in the ordinary walk."""
-    (scene, here), (_, there) = positions(name), positions(ORDINARY)
+    (scene, here), (_, walk) = positions(name), positions(ORDINARY)
     group = SceneRollOuts(scene)
     for method, x in here.items():
         entry = find_method(method)
         group.roll_outs.append(RollOut(group, entry, trajectory_of(scene, x), suites=("extremes",)))
-        group.roll_outs[-1].counterpart = there[method]
+        group.roll_outs[-1].counterpart = walk[method]
     return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
 
 
 def test_a_glitch_is_forgotten_or_not(positions):
-    found = roll_outs(positions, "out_of_distribution/root_glitch")
-    free, net = (extrapolation.measure(found[name]) for name in ("skinning", "snug"))
+    pair = roll_outs(positions, "out_of_distribution/root_glitch")
+    free, net = (extrapolation.measure(pair[name]) for name in ("skinning", "snug"))
     assert set(free) == set(net) <= {metric.name for metric in extrapolation.METRICS}
     assert [free[f"motion/recovery_{after}"] for after in (1, 10, 30)] == [0.0] * 3  # it has no memory
     assert net["motion/recovery_1"] > net["motion/recovery_30"] > 0.0
@@ -167,16 +167,16 @@ def test_distance_is_that_from_skinning(positions):
     moved = trajectory_of(free.scene, free.positions + np.array([0.001, 0.0, 0.0]))
     other = RollOut(free.group, find_method("simulation"), moved)
     free.group.roll_outs.append(other)
-    found = extrapolation.measure(other)
-    assert found["motion/offset"] == pytest.approx(1.0, abs=1e-3) and "motion/strain_ratio" not in found
+    metrics = extrapolation.measure(other)
+    assert metrics["motion/offset"] == pytest.approx(1.0, abs=1e-3) and "motion/strain_ratio" not in metrics
 
 
 def test_another_material_judges_the_same_roll_out(positions):
-    found = roll_outs(positions, "out_of_distribution/membrane_x10")
-    free = extrapolation.measure(found["skinning"])
+    pair = roll_outs(positions, "out_of_distribution/membrane_x10")
+    free = extrapolation.measure(pair["skinning"])
     assert free["motion/strain_ratio"] == pytest.approx(10.0)
     assert free["motion/total"] > free["motion/strain"] / 10
-    assert extrapolation.measure(found["snug"])["motion/total"] > 0
+    assert extrapolation.measure(pair["snug"])["motion/total"] > 0
 
 
 def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
@@ -221,36 +221,36 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(positions, tmp_path, m
     free.group.roll_outs.append(roll_out)
     values, _, ended = measured(roll_out, ("extrapolation",))
     # Of what is not finite the cell says so itself, and keeps its own words.
-    own = ("ok", "") if whole else ("diverged", "not finite")
+    verdict = ("ok", "") if whole else ("diverged", "not finite")
     scene = find_scene("out_of_distribution/walk_x4").at(SMOKE)
     cell = Cell(scene, find_method(method), 0, ("extremes",))
     outcomes = {
-        ("cell", cell.name): Outcome(*own, result={"frames": 5}, files=("x",)),
+        ("cell", cell.name): Outcome(*verdict, result={"frames": 5}, files=("x",)),
         ("metrics", cell.name): Outcome(*ended, result=values),
     }
     rows = list(rows_of_cell(cell, plan_of(tmp_path, (cell,)), {}, outcomes))
     assert {row.status for row in rows} == {expected} and len(rows) == len(values) >= 4
     lost = "a vertex came 0.7 m away from the skinned shirt"
-    assert {row.reason for row in rows} == {own[1] or (lost if expected == "diverged" else "")}
+    assert {row.reason for row in rows} == {verdict[1] or (lost if expected == "diverged" else "")}
     assert not any(row.metric.startswith("cost/") for row in rows)  # nobody took its time
 
 
 # --- who takes part, and what is shared --------------------------------------------------------------------
 
 
-def cells(**words):
+def cells(**criteria):
     motions = Motions(("walk",), ("kick",), {})
-    preset = find_preset(words.pop("preset", "quick"))
-    return choose_cells(Selection(suites=("extremes",), preset=preset, motions=motions, **words))[0]
+    preset = find_preset(criteria.pop("preset", "quick"))
+    return choose_cells(Selection(suites=("extremes",), preset=preset, motions=motions, **criteria))[0]
 
 
 def test_suite_extremes_trains_what_it_needs():
     assert {cell.scene.name for cell in cells()} == set(FEW)
-    found = cells(full=True)
-    assert {cell.scene.name for cell in found} == {scene.name for scene in OUT_OF_DISTRIBUTION}
+    selection = cells(full=True)
+    assert {cell.scene.name for cell in selection} == {scene.name for scene in OUT_OF_DISTRIBUTION}
     methods = {"simulation", "skinning", "snug", "supervised", "pbns", *CHEAP}
-    assert {cell.method for cell in found} == methods
-    alone = {cell.method for cell in found if cell.scene.name == "out_of_distribution/long"}
+    assert {cell.method for cell in selection} == methods
+    alone = {cell.method for cell in selection if cell.scene.name == "out_of_distribution/long"}
     assert alone == {"snug", "supervised", "pbns"}
     assert {cell.scene.name for cell in cells(preset="smoke")} == set(FEWEST)
     assert {c.scene.name for c in cells(preset="smoke", scenes=("*splits",))} == {
@@ -259,16 +259,16 @@ def test_suite_extremes_trains_what_it_needs():
 
 
 def test_a_network_does_hard_motions_under_its_own_name_alone():
-    found = {cell.method for cell in cells(methods=("snug*", "pbns*", "tailornet", "untrained"))}
-    found -= set(CHEAP)  # a solver from its frame
+    names = {cell.method for cell in cells(methods=("snug*", "pbns*", "tailornet", "untrained"))}
+    names -= set(CHEAP)  # a solver from its frame
     batched = {entry.name for entry in METHODS if entry.batched}
-    assert found <= batched and {"snug", "pbns", "tailornet"} <= found
-    assert not any("+" in name for name in found)
+    assert names <= batched and {"snug", "pbns", "tailornet"} <= names
+    assert not any("+" in name for name in names)
 
 
 def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_path, monkeypatch):
-    found = cells(scenes=("*splits", "*girth_+5"), methods=("simulation",))
-    plan = plan_of(tmp_path, found)
+    selection = cells(scenes=("*splits", "*girth_+5"), methods=("simulation",))
+    plan = plan_of(tmp_path, selection)
     starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
     ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
     assert list(starts) == [ordinary, splits, "out_of_distribution-girth_+5"]
@@ -287,8 +287,8 @@ def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_pat
 
 
 def test_cells_that_nobody_times_run_beside_others(tmp_path):
-    found = cells(scenes=("*walk_x4",))
-    plan = plan_of(tmp_path, found)
+    selection = cells(scenes=("*walk_x4",))
+    plan = plan_of(tmp_path, selection)
     tasks = [task for task in tasks_of(plan) if task.kind in ("cell", "batch", "repeat", "quasi-static")]
-    assert {task.kind for task in tasks} == {"cell"} and len(tasks) == len(found)
+    assert {task.kind for task in tasks} == {"cell"} and len(tasks) == len(selection)
     assert not any(task.process for task in tasks)

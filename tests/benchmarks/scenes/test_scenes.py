@@ -110,8 +110,8 @@ def test_how_far_a_shape_is_from_the_mean_is_said_once():
 
 
 def test_shapes_are_asked_for_by_name_or_by_the_largest_preset():
-    def scenes(*words):
-        return [cell.scene.name for cell in planned("--methods", "simulation", *words).cells]
+    def scenes(*options):
+        return [cell.scene.name for cell in planned("--methods", "simulation", *options).cells]
 
     every = [scene.name for scene in shapes("kick")]
     assert scenes("--suite", "shapes") == every and scenes("--scenes", "shapes/*") == every
@@ -228,11 +228,11 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     arrays |= {"J_template": body.joint_template, "J_shapedirs": body.joint_directions}
     tall = {key: 1.1 * array if key != "f" else array for key, array in arrays.items()}
     np.savez(path, weights=body.skinning_weights, kintree_table=table, **tall)
-    plain, own = (planned("--suite", "garments", *more) for more in ((), ("--body", str(path))))
-    cell = next(cell for cell in own.cells if cell.method == "snug")
+    plain, tall_plan = (planned("--suite", "garments", *more) for more in ((), ("--body", str(path))))
+    cell = next(cell for cell in tall_plan.cells if cell.method == "snug")
     keys = [
         (key_of(Schedule(plan).network(network_of(cell))), key_of(Schedule(plan).cell(cell)))
-        for plan in (plain, own)
+        for plan in (plain, tall_plan)
     ]
     assert not set(keys[0]) & set(keys[1])
     each = (read_inputs(body=file) for file in (None, path))

@@ -53,8 +53,8 @@ def test_what_did_not_come_back_is_a_failed_row_and_the_next_case_is_run(tmp_pat
     assert "no answer within 0.5 s" in hung.reason
     assert (next_one.status, next_one.value) == ("ok", 1.0)  # a new process is warmed up anew
     assert [(row.status, row.value) for row in others] == [("failed", None)] * 2
-    for row, words in zip(others, ("RuntimeError: lost", "AttributeError"), strict=True):
-        assert words in row.reason
+    for row, message in zip(others, ("RuntimeError: lost", "AttributeError"), strict=True):
+        assert message in row.reason
 
 
 def test_a_case_is_computed_once_and_again_when_it_declares_something_else(tmp_path):
@@ -94,10 +94,10 @@ def test_a_stress_test_depends_on_how_it_is_checked_and_on_the_body_that_it_read
     from benchmarks.runner.cache import dependencies
 
     tasks = {task.name: dependencies(task) for task in tasks_of(plan_of(tmp_path, cases=STRESS_TESTS))}
-    for found in tasks.values():
+    for files in tasks.values():
         assert {"benchmarks/validation/case.py", "benchmarks/validation/solvers/convergence_check.py"} < set(
-            found
+            files
         )
-        assert "benchmarks/validation/stress/cases.py" not in found
-        assert not any(name.startswith("reports/") for name in found)
+        assert "benchmarks/validation/stress/cases.py" not in files
+        assert not any(name.startswith("reports/") for name in files)
     assert "snug/data/body.npz" in tasks["shirt_step"] and "snug/data/body.npz" not in tasks["twisted"]

@@ -43,14 +43,14 @@ def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", 
     preset = changes.get("preset", TINY)
 
     def entry(name):
-        found = find_method(name)
+        method = find_method(name)
         wrong = {
             "module": "tests.benchmarks.runner.misbehaving",
             "options": {"how": how},
             "batched": True,
             "gives_first_frame": True,
         }
-        return dataclasses.replace(found, **wrong) if how and name != "simulation" else found
+        return dataclasses.replace(method, **wrong) if how and name != "simulation" else method
 
     cells = tuple(Cell(SCENES[scene].at(preset), entry(name), 0, ("speed",)) for name in names)
     values = {
@@ -77,7 +77,7 @@ def outcome_of(plan: Plan, number: int = 0) -> Outcome:
 def found_of(plan: Plan, kind: str = "cell", number: int = 0):
     """Return the cache entry of a cell, or of its metrics, in the plan's folder."""
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=plan.only))
-    return {task.id: found for task, found, _ in runner.preview()}[kind, plan.cells[number].name]
+    return {task.id: entry for task, entry, _ in runner.preview()}[kind, plan.cells[number].name]
 
 
 def rows_of_cell(runner: Runner, plan: Plan) -> list[Row]:
@@ -89,16 +89,16 @@ def rows_of_cell(runner: Runner, plan: Plan) -> list[Row]:
 
 @pytest.mark.parametrize("how", ["still", "raise"])
 def test_a_cell_tells_the_bar_that_it_is_done(tmp_path, how):
-    plan, told = plan_of(tmp_path, "newton-1", how=how), []
+    plan, units = plan_of(tmp_path, "newton-1", how=how), []
     task = Schedule(plan).cell(plan.cells[0])
-    task.run(Context(RunFolder(tmp_path), tell=told.append), {})
-    assert sum(told) == task.units
+    task.run(Context(RunFolder(tmp_path), tell=units.append), {})
+    assert sum(units) == task.units
 
 
 def test_only_a_method_of_the_project_is_prepared_before_its_turn(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="still")
-    own = dataclasses.replace(plan.cells[0].entry, declared_in="mine.py")
-    for entry, prepared in ((plan.cells[0].entry, True), (own, False)):
+    user_entry = dataclasses.replace(plan.cells[0].entry, declared_in="mine.py")
+    for entry, prepared in ((plan.cells[0].entry, True), (user_entry, False)):
         context = Context(RunFolder(tmp_path))
         cell = dataclasses.replace(plan.cells[0], entry=entry)
         dataclasses.replace(Schedule(plan).cell(plan.cells[0]), cell=cell).begin(context)
@@ -169,8 +169,8 @@ def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word,
     assert outcome.status == status and word in outcome.reason and outcome.failed and not outcome.files
     (row,) = rows_of_cell(runner, plan)
     assert (row.status, row.value) == (status, None) and not list(tmp_path.rglob("*.vtkhdf"))
-    found = found_of(plan)
-    assert (found.state, found.wanted) == ("failed", False) and word in found.why
+    entry = found_of(plan)
+    assert (entry.state, entry.wanted) == ("failed", False) and word in entry.why
 
 
 def test_a_cell_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
@@ -213,7 +213,7 @@ def test_what_a_program_has_started_ends_with_it_before_the_next_cell(tmp_path):
 
 def of_session(session: int, word: str = "") -> list[int]:
     """Processes of a session that have this word in their command line and are no zombies."""
-    found = []
+    processes = []
     for path in Path("/proc").glob("[0-9]*"):
         try:
             state, _, _, its_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
@@ -221,8 +221,8 @@ def of_session(session: int, word: str = "") -> list[int]:
         except OSError:
             continue  # it has just ended
         if int(its_session) == session and state != "Z" and word in line:
-            found.append(int(path.name))
-    return found
+            processes.append(int(path.name))
+    return processes
 
 
 def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_path):
@@ -239,9 +239,9 @@ def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("how", "words"), [("crammed", ("out-of-memory", "SIGKILL")), ("torn", ("failed", "no two bodies"))]
+    ("how", "fragments"), [("crammed", ("out-of-memory", "SIGKILL")), ("torn", ("failed", "no two bodies"))]
 )
-def test_what_a_cell_has_run_stands_where_many_go_wrong(how, words, tmp_path):
+def test_what_a_cell_has_run_stands_where_many_go_wrong(how, fragments, tmp_path):
     plan = plan_of(tmp_path, "newton-1", how=how)
     runner = finish(plan, "cells", "metrics")
     outcome = runner.outcomes["cell", plan.cells[0].name]
@@ -249,7 +249,7 @@ def test_what_a_cell_has_run_stands_where_many_go_wrong(how, words, tmp_path):
     rows = {row.metric: row for row in rows_of_cell(runner, plan)}
     assert rows["cost/frame"].status == "ok" and "cost/batch" not in rows
     reason = rows["cost/frame"].reason
-    assert f"many at once: {words[0]}" in reason and words[1] in reason
+    assert f"many at once: {fragments[0]}" in reason and fragments[1] in reason
     assert RunFolder(tmp_path).trajectory_path("free_fall", "newton-1").is_file()
     again = finish(plan, "cells", "metrics")
     assert {row.metric: row for row in rows_of_cell(again, plan)}.keys() == rows.keys()
@@ -257,8 +257,8 @@ def test_what_a_cell_has_run_stands_where_many_go_wrong(how, words, tmp_path):
 
 
 def test_torch_says_in_a_plain_error_that_there_is_no_room():
-    said = "[enforce fail at alloc_cpu.cpp:117] err == 0. DefaultCPUAllocator: can't allocate memory"
-    assert failure(RuntimeError(said)).status == "out-of-memory"
+    message = "[enforce fail at alloc_cpu.cpp:117] err == 0. DefaultCPUAllocator: can't allocate memory"
+    assert failure(RuntimeError(message)).status == "out-of-memory"
     assert failure(RuntimeError("no such memory")).status == "failed"
 
 
@@ -296,10 +296,10 @@ def test_a_process_ends_when_its_parent_was_killed(tmp_path):
 
 def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
     out = tmp_path / "run"
-    words = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall", "-o", str(out)]
-    words += ["--methods", "simulation,newton-1,newton-4"]
+    options = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall", "-o", str(out)]
+    options += ["--methods", "simulation,newton-1,newton-4"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.run", *words],
+        [sys.executable, "-m", "benchmarks.run", *options],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         stdout=subprocess.DEVNULL,
@@ -319,11 +319,11 @@ def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
     before = entry.read_bytes()
 
     monkeypatch.setattr(execution, "make_report", lambda log: "")
-    assert run.main(words) == 0
+    assert run.main(options) == 0
     assert entry.read_bytes() == before
     first = RunFolder(out).read_rows()
     assert {row.method for row in first} == {"simulation", "newton-1", "newton-4"}
-    assert run.main(words) == 0
+    assert run.main(options) == 0
     assert RunFolder(out).read_rows() == first
     config = RunFolder(out).read_config()
     assert len(config["earlier"]) == 2 and config["clock"]["threads"] == 1

@@ -59,9 +59,9 @@ def quickly(monkeypatch):
 def test_fewer_shared_clips_are_the_first_of_more_and_those_of_snugs_seed_0():
     three, one = (make_shared_clips([MOTION], share, vertices=150) for share in (3, 1))
     assert [len(three), len(one)] == [round(3 * 90 / CLIP_FRAMES), round(90 / CLIP_FRAMES)]
-    own = augment([MOTION], dataclasses.replace(DEFAULT, mixed=3.0), vertices=150, seed=0)
+    clips = augment([MOTION], dataclasses.replace(DEFAULT, mixed=3.0), vertices=150, seed=0)
     assert all(np.array_equal(a.poses, b.poses) for a, b in zip(one, three))
-    assert all(np.array_equal(a.poses, b.poses) for a, b in zip(own, three, strict=True))
+    assert all(np.array_equal(a.poses, b.poses) for a, b in zip(clips, three, strict=True))
     assert make_shared_clips([MOTION], 0, vertices=150) == []
 
 
@@ -96,12 +96,14 @@ def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
     clip, *_ = make_shared_clips([MOTION], 1, vertices=150)
     outcome = clips_of(0, "lbfgs-5").run(context(tmp_path, assets), {})
     scene = dressed_scene(clip.name).build(assets_of(tube_dress(), clip))
-    own = simulate(
+    trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
         start=scene.start, method="lbfgs", max_iterations=5, finish=False,
     )  # fmt: skip
-    found = read_arrays(tmp_path / outcome.files[0])[clip.name]
-    assert np.array_equal(found, own.positions.astype(np.float32)) and len(found) == CLIP_FRAMES
+    positions = read_arrays(tmp_path / outcome.files[0])[clip.name]
+    assert (
+        np.array_equal(positions, trajectory.positions.astype(np.float32)) and len(positions) == CLIP_FRAMES
+    )
 
 
 def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkeypatch):

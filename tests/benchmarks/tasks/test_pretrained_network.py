@@ -67,8 +67,8 @@ def test_a_file_takes_the_place_of_the_training_that_made_it(made, tmp_path):
     taken = take_network(task, folder)
     assert taken.id == task.id and not taken.skip({}) and taken.differing == ()
     done = taken.run(context(tmp_path), {})
-    own, other = (weights(task.path(RunFolder(place))) for place in (folder, tmp_path))
-    assert all(torch.equal(own[name], other[name]) for name in own | other)
+    tensors, other = (weights(task.path(RunFolder(place))) for place in (folder, tmp_path))
+    assert all(torch.equal(tensors[name], other[name]) for name in tensors | other)
     assert done.result == outcome.result | {
         "pretrained": "pbns-seed0", "trained_at": done.result["trained_at"], "differing": [],
         "data_seconds": 0,
@@ -126,11 +126,11 @@ def test_what_is_no_network_of_ours_is_refused_in_one_line(made, tmp_path):
 
 
 def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp_path):
-    own = dataclasses.replace(
+    entry = dataclasses.replace(
         find_method("pbns"), name="mine", trained="mine", training=Training("pbns", PBNS), declared_in=""
     )
     plan = plan_with(tmp_path, "pbns", "supervised", "untrained", trained=made[0])
-    cell = dataclasses.replace(plan.cells[0], entry=own)
+    cell = dataclasses.replace(plan.cells[0], entry=entry)
     tasks = tasks_of(dataclasses.replace(plan, cells=(*plan.cells, cell)))
     kinds = {task.name: type(task) for task in tasks if task.kind == "network"}
     assert kinds == {
@@ -166,8 +166,8 @@ def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
 
 
 def test_the_option_takes_the_package_or_a_folder(tmp_path):
-    def folder(*words: str) -> Path | None:
-        return request_of_run(make_parser().parse_args(list(words)), words).trained
+    def folder(*options: str) -> Path | None:
+        return request_of_run(make_parser().parse_args(list(options)), options).trained
 
     assert folder() is None and folder("--trained") == trained.FOLDER
     assert folder("--trained", str(tmp_path)) == tmp_path
@@ -189,21 +189,21 @@ def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp
         return plan_with(request.folder, *request.methods)
 
     monkeypatch.setattr(command, "make_plan", planned)
-    words = ["--methods", "pbns", "-o", str(tmp_path / "nets")]
-    assert command.main([*words, "--into-package"]) == 0
+    options = ["--methods", "pbns", "-o", str(tmp_path / "nets")]
+    assert command.main([*options, "--into-package"]) == 0
     assert "the package has none" in capsys.readouterr().out
     assert set(requests[0].only) == {"failed", "stale", "missing"}
     first = (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes()
     assert (packaged / "pbns-tshirt.safetensors").read_bytes() == first
-    assert command.main(words) == 0  # nothing to do
+    assert command.main(options) == 0  # nothing to do
     assert (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes() == first
     assert "the bits of the package's" in capsys.readouterr().out
     model = TrainedModel.load(packaged / "pbns-tshirt.safetensors")
     model.network.offsets.weight.data += 0.5
     model.save(packaged / "pbns-tshirt.safetensors")
-    assert command.main(words) == 0
+    assert command.main(options) == 0
     assert "differs from the package's by up to 0.5" in capsys.readouterr().out
-    assert command.main([*words, "--preset", "smoke", "--into-package"]) == 2
+    assert command.main([*options, "--preset", "smoke", "--into-package"]) == 2
     assert "networks of preset quick" in capsys.readouterr().err
 
 

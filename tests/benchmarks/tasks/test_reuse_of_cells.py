@@ -32,8 +32,8 @@ def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path
     assert again.reused == [f"cell {plan.cells[0].label}"]
 
     finer = plan_of(tmp_path, "simulation", preset=dataclasses.replace(TINY, sheet_cells=4))
-    found = found_of(finer)
-    assert (found.state, found.why, found.wanted) == ("stale", "scene", True)
+    entry = found_of(finer)
+    assert (entry.state, entry.why, entry.wanted) == ("stale", "scene", True)
     kept = finish(dataclasses.replace(finer, only=frozenset({"missing"})))
     outcome = kept.outcomes["cell", plan.cells[0].name]
     assert plain(outcome) == plain(first) and outcome.remark == "kept though scene changed"
@@ -153,11 +153,14 @@ def test_a_dry_run_tells_what_is_there(tmp_path):
     plan = plan_of(tmp_path / "run", "simulation", "newton-1", "skinning")
     assert "4 tasks to run; 0 cached" in describe(plan) and not plan.folder.exists()
     outcome_of(plan)
-    words = describe(plan)
-    assert "cell free_fall x simulation: cached" in words
-    assert "metrics free_fall x simulation: run (missing)" in words
-    assert "cell free_fall x newton-1: run (missing)" in words and "cell free_fall x skinning: skip" in words
-    assert "3 tasks to run; 1 cached" in words
+    description = describe(plan)
+    assert "cell free_fall x simulation: cached" in description
+    assert "metrics free_fall x simulation: run (missing)" in description
+    assert (
+        "cell free_fall x newton-1: run (missing)" in description
+        and "cell free_fall x skinning: skip" in description
+    )
+    assert "3 tasks to run; 1 cached" in description
     longer = dataclasses.replace(TINY, sheet_frames=5)
     stale = describe(plan_of(plan.folder, "simulation", "newton-1", preset=longer))
     assert "cell free_fall x simulation: run (stale: scene), " in stale and "s last time" in stale

@@ -75,8 +75,8 @@ def test_the_pressed_elastica_is_that_of_shooting(strain):
 
         return integrated(slope, [0, unknown[0], 0, 0])[1:] - [0, 0, 1 - strain]
 
-    found = [y[1, 0], normal, aside]
-    assert fsolve(miss, found) == pytest.approx(found, rel=1e-4)
+    unknowns = [y[1, 0], normal, aside]
+    assert fsolve(miss, unknowns) == pytest.approx(unknowns, rel=1e-4)
 
 
 def test_a_strip_hardly_pressed_has_the_load_of_a_column_clamped_and_hinged():

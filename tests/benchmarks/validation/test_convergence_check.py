@@ -188,6 +188,6 @@ def test_a_minimiser_that_lies_is_caught_by_what_the_suite_runs(solved):
 
     lies = [(point, standing, "saddle"), (step, standing, "claims convergence"),
             (step, vanishing, "not finite"), (step, climbing, "rose")]  # fmt: skip
-    for case, solve, words in lies:
+    for case, solve, message in lies:
         checked = solve_and_check(case, solve)
-        assert checked.status == "failed" and words in checked.reason, (solve, checked)
+        assert checked.status == "failed" and message in checked.reason, (solve, checked)

@@ -60,11 +60,11 @@ def test_equilateral_triangles_are_a_plate_of_kirchhoff(shape, terms, nu):
     ],
 )
 def test_other_triangles_are_stiffer_in_some_directions(family, fold, diagonal_fold, twist):
-    found = [
+    energies = [
         patch_energy(family, curvature, hinges("length_area"))
         for curvature in (cylinder(0), cylinder(45), SHAPES["twist"])
     ]
-    assert found == pytest.approx([fold, diagonal_fold, twist], rel=CORNERS)
+    assert energies == pytest.approx([fold, diagonal_fold, twist], rel=CORNERS)
 
 
 def test_gaussian_curvature_of_a_pyramid_is_its_angle_defect():

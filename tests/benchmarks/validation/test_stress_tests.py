@@ -87,7 +87,7 @@ def test_predicted_stress_is_linear_in_the_step_and_forgotten():
     assert np.array_equal(blocks_of(energy, x), true)
     # From the definition: the part of the Hessian without stress, at x + step, plus the stress's own part
     # of the difference between S(x) + dS/dx step and S(x + step).
-    there = Energy.hessian_blocks(energy, x + step)
+    blocks = Energy.hessian_blocks(energy, x + step)
 
     def strain(positions):
         corner = positions[cloth.faces]
@@ -101,9 +101,9 @@ def test_predicted_stress_is_linear_in_the_step_and_forgotten():
     stress = m.lame_lambda * trace * np.eye(2) + 2 * m.lame_mu * missing
     b = np.concatenate([-cloth.Dm_inverse.sum(axis=1, keepdims=True), cloth.Dm_inverse], axis=1)
     part = cloth.areas[:, None, None] * np.einsum("fai,fij,fcj->fac", b, stress, b)
-    expected = there + np.einsum("fac,ij->faicj", part, np.eye(3)).reshape(there.shape)
+    expected = blocks + np.einsum("fac,ij->faicj", part, np.eye(3)).reshape(blocks.shape)
     assert predicted == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
-    assert np.abs(predicted - there).max() > 0.01 * np.abs(there).max()
+    assert np.abs(predicted - blocks).max() > 0.01 * np.abs(blocks).max()
 
 
 def test_every_kept_point_is_observed_and_lower_than_the_one_before():

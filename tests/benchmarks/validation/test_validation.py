@@ -58,7 +58,7 @@ def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
 
 
 @pytest.mark.parametrize(
-    ("found", "expected", "tolerance", "status"),
+    ("number", "expected", "tolerance", "status"),
     [
         (1.0, 1.0, 0.0, "ok"),
         (1.2, 1.0, 0.1, "failed"),
@@ -71,10 +71,10 @@ def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
         (math.nan, 1.0, 0.1, "failed"),
     ],
 )
-def test_how_a_number_is_judged(monkeypatch, found, expected, tolerance, status):
+def test_how_a_number_is_judged(monkeypatch, number, expected, tolerance, status):
     from benchmarks.validation.curvature import known_surfaces
 
-    monkeypatch.setattr(known_surfaces, "torus_order", lambda: found)
+    monkeypatch.setattr(known_surfaces, "torus_order", lambda: number)
     case = Case(
         name="planted", description="", reason="planted", module=known_surfaces.__name__,
         function="torus_order",
@@ -83,8 +83,8 @@ def test_how_a_number_is_judged(monkeypatch, found, expected, tolerance, status)
     row = case.run()
     assert row.status == status and (status == "ok" or row.reason)
     assert row.tolerance == tolerance
-    if isinstance(found, tuple):
-        assert (row.value, row.expected) == found
+    if isinstance(number, tuple):
+        assert (row.value, row.expected) == number
     broken = dataclasses.replace(case, function="nothing").run()
     assert broken.status == "failed" and "nothing" in broken.reason
 
@@ -99,8 +99,8 @@ def test_order_is_the_slope():
 @pytest.mark.parametrize("order", [0.5, 1, 2])
 def test_order_by_halving_needs_no_exact_answer(order):
     limit, error = np.random.default_rng(0).normal(size=(2, 5, 3))
-    found = halving_order(lambda n: limit + error / n**order, (10, 20, 40, 80))
-    assert found == pytest.approx(order)
+    estimate = halving_order(lambda n: limit + error / n**order, (10, 20, 40, 80))
+    assert estimate == pytest.approx(order)
 
 
 def test_viscous_edges_resist_what_stretches_and_not_what_moves_alike():

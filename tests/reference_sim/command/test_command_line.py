@@ -82,14 +82,14 @@ NOWHERE = "/proc/nowhere/out"  # nobody makes a folder there, not even who may d
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="a place where nothing can be written")
 @pytest.mark.parametrize(
-    ("name", "words"),
+    ("name", "arguments"),
     [
         ("benchmarks.run", ["--preset", "smoke", "--scenes", "free_fall", "--methods", "simulation"]),
         ("benchmarks.export", ["hanging_sheet"]),
     ],
 )
-def test_a_place_that_cannot_be_written_is_one_line(name, words, capsys):
-    assert importlib.import_module(name).main([*words, "-o", NOWHERE]) == 2
+def test_a_place_that_cannot_be_written_is_one_line(name, arguments, capsys):
+    assert importlib.import_module(name).main([*arguments, "-o", NOWHERE]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and f"{NOWHERE}: cannot be made" in error
 

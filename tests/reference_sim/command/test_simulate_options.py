@@ -11,9 +11,9 @@ from reference_sim.command.simulate_options import EXAMPLES, make_parser
 
 
 def test_help_gives_units():
-    said = make_parser().format_help()
+    help_text = make_parser().format_help()
     for flag, unit in (("young-modulus", "[Pa]"), ("thickness", "[m]"), ("density", "[kg/m^3]")):
-        assert re.search(rf"--{flag} \S+\s[^-]*{re.escape(unit)}", said)
+        assert re.search(rf"--{flag} \S+\s[^-]*{re.escape(unit)}", help_text)
 
 
 def test_every_example_of_the_help_is_understood():

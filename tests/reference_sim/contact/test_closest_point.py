@@ -241,14 +241,14 @@ def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search(frames, ever
         x += generator.normal(0, 0.01, (1, 3)) + generator.normal(0, 0.001, x.shape)
         points, body = contact.sample_matrix @ x, obstacle.at(frame)
         search.refit(body)
-        found = search.nearest(points, hints=hints, samples=samples)
-        hints = found.faces
+        answers = search.nearest(points, hints=hints, samples=samples)
+        hints = answers.faces
         corners = body[np.sort(obstacle.faces, axis=1)]
         faces, distances = one_by_one(
             corners, points[chosen], obstacle.rest_centroids, home[chosen], obstacle.region
         )
-        assert (found.faces[chosen] == faces).all()
-        distance = np.linalg.norm(points - found.points, axis=1)[chosen]
+        assert (answers.faces[chosen] == faces).all()
+        distance = np.linalg.norm(points - answers.points, axis=1)[chosen]
         assert np.abs(distance - np.sqrt(distances)).max() < 1e-12
         count += len(chosen)
     assert frames < 180 or count > 1_000_000

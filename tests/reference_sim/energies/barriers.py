@@ -21,10 +21,10 @@ def cuts(x: np.ndarray, edges: np.ndarray, y: np.ndarray, faces: np.ndarray) -> 
 
     sides = volume(a, p, q, r) * volume(b, p, q, r) < 0
     turns = np.sign([volume(a, p, q, b), volume(a, q, r, b), volume(a, r, p, b)])
-    found = sides & (np.abs(turns.sum(axis=0)) == 3)
+    crossings = sides & (np.abs(turns.sum(axis=0)) == 3)
     if x is y:
-        found &= ~(edges[:, None, :, None] == faces[None, :, None, :]).any(axis=(2, 3))
-    return found
+        crossings &= ~(edges[:, None, :, None] == faces[None, :, None, :]).any(axis=(2, 3))
+    return crossings
 
 
 def mesh_edges(faces: np.ndarray) -> np.ndarray:

@@ -62,9 +62,9 @@ def main(arguments: list[str]) -> int:
     new: Energies = {}
     for name in SCENES:
         new |= computed(name)
-    found = changes(old, new)
-    print("\n".join(found) if found else "nothing changed, to the last bit")
-    if options.write and found:
+    differences = changes(old, new)
+    print("\n".join(differences) if differences else "nothing changed, to the last bit")
+    if options.write and differences:
         write(new)
         print(f"{len(new)} energies kept in {STORE.name}")
     return 0

@@ -121,12 +121,12 @@ def computed(name: str) -> Energies:
     trajectory = SCENES[name]()
     if trajectory.status != "converged":
         raise AssertionError(f"{name}: {trajectory.status}: {trajectory.reason}")
-    found = {}
+    energies = {}
     for field, values in trajectory.frame_fields.items():
         kind, _, term = field.partition("/")
         if kind == "energy":
-            found |= {(name, frame, term): float(v) for frame, v in enumerate(values) if frame}
-    return found
+            energies |= {(name, frame, term): float(v) for frame, v in enumerate(values) if frame}
+    return energies
 
 
 def stored() -> Energies:
@@ -138,7 +138,7 @@ def stored() -> Energies:
 
 def scales(energies: Energies) -> dict[tuple[str, str], float]:
     """The largest size [J] of each term of each scene: what a difference is held against."""
-    found: dict[tuple[str, str], float] = {}
+    sizes: dict[tuple[str, str], float] = {}
     for (scene, _, term), value in energies.items():
-        found[scene, term] = max(found.get((scene, term), 0.0), abs(value))
-    return found
+        sizes[scene, term] = max(sizes.get((scene, term), 0.0), abs(value))
+    return sizes

@@ -76,8 +76,8 @@ def test_convexity_takes_out_the_negative_curvature_and_nothing_else():
     assert np.linalg.eigvalsh(convex)[0] > -1e-12 * scale
     assert np.linalg.eigvalsh(convex - true)[0] > -1e-12 * scale
     assert np.abs(half - (true + convex) / 2).max() <= 1e-12 * scale
-    own = friction.sparse_hessian(x).toarray()
-    assert np.linalg.eigvalsh(own)[0] > -1e-12 * np.abs(own).max()
+    hessian = friction.sparse_hessian(x).toarray()
+    assert np.linalg.eigvalsh(hessian)[0] > -1e-12 * np.abs(hessian).max()
 
 
 def test_there_is_no_definition_in_torch_and_it_says_so():
@@ -124,8 +124,8 @@ def test_a_start_that_intersects_is_refused_by_name():
     cloth = sheet(2, 0.1, (-0.05, 0.0, -0.05))
     ball, faces = sphere(1, radius=0.02)
     terms = [StretchStVK(cloth), Gravity(cloth), ContactBarrier(cloth)]
-    words = r"edge \(\d+, \d+\) of the (cloth|body) cuts face \d+ of the (cloth|body)"
-    with pytest.raises(ValueError, match=words):
+    message = r"edge \(\d+, \d+\) of the (cloth|body) cuts face \d+ of the (cloth|body)"
+    with pytest.raises(ValueError, match=message):
         simulate(cloth, terms, obstacle=Obstacle(ball, faces), frames=2)
     strip, start = folded(5)
     start[strip.rest_positions[:, 0] > 0.11, 1] -= 0.0175  # the upper half, through the lower
@@ -141,9 +141,9 @@ def test_the_elements_named_are_those_that_cut():
     barrier = ContactBarrier(cloth)
     x = cloth.rest_positions
     barrier.prepare(still(x, Obstacle(needle, faces)))
-    words = barrier.infeasibility(x)
-    names = re.fullmatch(r"edge \((\d+), (\d+)\) of the body cuts face (\d+) of the cloth", words)
-    assert names, words
+    message = barrier.infeasibility(x)
+    names = re.fullmatch(r"edge \((\d+), (\d+)\) of the body cuts face (\d+) of the cloth", message)
+    assert names, message
     a, b, face = map(int, names.groups())
     assert cuts(needle, np.array([[a, b]]), x, cloth.faces[face : face + 1]).all()
 
@@ -221,9 +221,9 @@ def test_areas_that_weigh_pairs_are_the_rest_state_of_the_cloth():
     count = cloth.vertex_count
     assert mesh.vertex_areas[:count] == pytest.approx(cloth.vertex_areas, rel=1e-12)
     assert mesh.vertex_areas[count:].max() <= cloth.vertex_areas.mean() * (1 + 1e-12)
-    own = (mesh.edges < count).all(axis=1)
-    assert mesh.edge_areas[own].sum() == pytest.approx(cloth.areas.sum(), rel=1e-12)
-    assert mesh.edge_areas[~own].max() <= mesh.edge_areas[own].mean() * (1 + 1e-12)
+    cloth_edges = (mesh.edges < count).all(axis=1)
+    assert mesh.edge_areas[cloth_edges].sum() == pytest.approx(cloth.areas.sum(), rel=1e-12)
+    assert mesh.edge_areas[~cloth_edges].max() <= mesh.edge_areas[cloth_edges].mean() * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("seeds", [range(2), pytest.param(range(100, 150), marks=pytest.mark.slow)], ids=len)

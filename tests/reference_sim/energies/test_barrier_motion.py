@@ -65,7 +65,7 @@ def test_friction_on_a_slope_is_the_law(ratio):
         guess="extrapolated",
     )
     assert slide.status == "converged"
-    found = np.diff(-(slide.positions @ turn[:, 0]).mean(axis=1)) / DT
+    velocities = np.diff(-(slide.positions @ turn[:, 0]).mean(axis=1)) / DT
 
     def grip(v: float) -> float:
         y = min(v / speed, 1.0)
@@ -77,9 +77,9 @@ def test_friction_on_a_slope_is_the_law(ratio):
         v = brentq(lambda w: w - before - pull * (np.sin(angle) - mu * np.cos(angle) * grip(w)), 0, 10)  # noqa: B023
         expected.append(v)
     # The minimiser stops at 1e-6 weights: a velocity of 1e-6 g dt.
-    assert found == pytest.approx(expected, abs=1e-6)
+    assert velocities == pytest.approx(expected, abs=1e-6)
     held = speed * (1 - np.sqrt(max(1 - ratio, 0)))
-    assert found[-1] == pytest.approx(held, rel=1e-2) if ratio < 1 else found[-1] > 5 * speed
+    assert velocities[-1] == pytest.approx(held, rel=1e-2) if ratio < 1 else velocities[-1] > 5 * speed
 
 
 def test_a_sheet_dropped_on_a_sphere_never_meets_it():

@@ -86,6 +86,6 @@ def test_the_arctangent_of_the_kernels_is_that_of_numpy():
     size = 10 ** generator.uniform(-100, 100, len(angles))
     y, x = size * np.sin(angles), size * np.cos(angles)
     y[-5:], x[-5:] = [0.0, -0.0, 0.0, 1.0, -1.0], [1.0, 1.0, -1.0, 0.0, 0.0]
-    found = vectorize(lambda y, x: arctan2(y, x))(y, x)
+    arctangents = vectorize(lambda y, x: arctan2(y, x))(y, x)
     expected = np.arctan2(y, x)
-    assert (np.abs(found - expected) <= 2 * np.spacing(np.abs(expected))).all()
+    assert (np.abs(arctangents - expected) <= 2 * np.spacing(np.abs(expected))).all()

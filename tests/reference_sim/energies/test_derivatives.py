@@ -129,8 +129,8 @@ CASES = [
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
-def close(found: np.ndarray, expected: np.ndarray, tolerance: float) -> bool:
-    return bool(np.abs(found - expected).max() <= tolerance * np.abs(expected).max())
+def close(derivative: np.ndarray, expected: np.ndarray, tolerance: float) -> bool:
+    return bool(np.abs(derivative - expected).max() <= tolerance * np.abs(expected).max())
 
 
 @every_case
@@ -190,11 +190,11 @@ def test_convexity_takes_negative_curvature_out_in_proportion(case):
 def test_definition_takes_leading_axes_and_is_the_kernels_energy(case):
     energy, x = case()
     batch = torch.as_tensor(np.stack([x, 1.01 * x, x + 0.002, 0.99 * x, x, x])).reshape(2, 3, *x.shape)
-    found = energy.energy(batch)
-    assert found.shape == (2, 3, len(energy.stencils))
+    energies = energy.energy(batch)
+    assert energies.shape == (2, 3, len(energy.stencils))
     for i, frame in enumerate(batch.reshape(-1, *x.shape)):
         total = energy.value_and_gradient(frame.numpy())[0]
-        assert float(found.reshape(6, -1)[i].sum()) == pytest.approx(total, rel=1e-12)
+        assert float(energies.reshape(6, -1)[i].sum()) == pytest.approx(total, rel=1e-12)
     assert energy.energy(batch.float()).dtype == torch.float32  # training decides the precision
 
 
@@ -202,9 +202,9 @@ def test_inertia_takes_a_target_per_frame():
     cloth = curved_cloth()
     energy = Inertia(cloth, 0.02)
     x, x_hat = (torch.as_tensor(np.stack([deformed(cloth, s + k) for k in range(3)])) for s in (10, 20))
-    found = energy.energy(x, x_hat)
+    energies = energy.energy(x, x_hat)
     exact = 0.5 * cloth.masses / 0.02**2 * ((x - x_hat) ** 2).sum(-1).numpy()
-    assert found.numpy() == pytest.approx(exact, rel=1e-13)
+    assert energies.numpy() == pytest.approx(exact, rel=1e-13)
     value, gradient = energy.value_and_gradient(x[1].numpy(), x_hat[1].numpy())
     assert value == pytest.approx(exact[1].sum(), rel=1e-13)
     assert gradient == pytest.approx(cloth.masses[:, None] / 0.02**2 * (x[1] - x_hat[1]).numpy(), rel=1e-13)
@@ -215,12 +215,12 @@ def test_contact_takes_planes_per_frame():
     energy = contact(cloth)
     x = np.stack([deformed(cloth, 1), deformed(cloth, 1) + 0.001])
     points, normals = np.stack([energy.points, energy.points + 0.002]), np.stack(2 * [energy.normals])
-    found = energy.energy(*(torch.as_tensor(a) for a in (x, points, normals)))
+    energies = energy.energy(*(torch.as_tensor(a) for a in (x, points, normals)))
     for k in range(2):
         energy.points, energy.normals = points[k], normals[k]
         value, gradient = energy.value_and_gradient(x[k])
         assert value > 1e-6 and np.abs(gradient).max() > 1e-3
-        assert float(found[k].sum()) == pytest.approx(value, rel=1e-12)
+        assert float(energies[k].sum()) == pytest.approx(value, rel=1e-12)
 
 
 def test_contact_without_planes_is_no_contact_in_both_forms():

@@ -98,17 +98,17 @@ def another(x: np.ndarray) -> np.ndarray:
 def test_the_simulation_ends_each_step_in_its_minimum_also_where_frames_are_jumped(judged):
     """Frames are taken from all over the trajectory in turn, and again with planes at the frame itself."""
     scene, trajectory = judged
-    found = optimality(scene, trajectory.positions, samples=FRAMES)
-    gradients = found.values["gradient/norm"]
-    assert len(gradients) == len(found.values["gap/refrozen"]) == FRAMES - 2 and max(gradients) <= 1e-6
-    assert max(found.values["gap/local"]) <= 1e-12
+    optimum = optimality(scene, trajectory.positions, samples=FRAMES)
+    gradients = optimum.values["gradient/norm"]
+    assert len(gradients) == len(optimum.values["gap/refrozen"]) == FRAMES - 2 and max(gradients) <= 1e-6
+    assert max(optimum.values["gap/local"]) <= 1e-12
 
 
 def test_laws_hold_for_the_simulation_beside_another(judged):
     scene, trajectory = judged
     x = trajectory.positions
-    _, found, _ = law_series(scene, [another(x), x, another(x)])
-    assert found.residual.max() <= 1e-6 and found.force.max() <= 2e-6 * found.weight
+    _, series, _ = law_series(scene, [another(x), x, another(x)])
+    assert series.residual.max() <= 1e-6 and series.force.max() <= 2e-6 * series.weight
 
 
 def test_energies_beside_others_are_those_of_the_trajectory_alone(judged):
@@ -136,15 +136,15 @@ def test_energies_on_a_plane_are_those_that_were_minimised(kind):
 def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
     scene, trajectory = judged
     x, frame = trajectory.positions, FRAMES - 3
-    own, row = Potential(copied_terms(scene)), Potential(copied_terms(scene))
-    freeze_step(scene, own, x, 4)  # a frame of before, far from this one
-    guess = freeze_step(scene, own, x, frame)
+    jump, row = Potential(copied_terms(scene)), Potential(copied_terms(scene))
+    freeze_step(scene, jump, x, 4)  # a frame of before, far from this one
+    guess = freeze_step(scene, jump, x, frame)
     for t in range(1, frame + 1):
         last = freeze_step(scene, row, x, t)
     assert np.array_equal(guess, last)
     at = np.ascontiguousarray(x[frame])
-    assert own.terms(at) == row.terms(at) and own.terms(at)["friction"] > 0
-    assert not np.shares_memory(own.gradient(at), row.gradient(at))
+    assert jump.terms(at) == row.terms(at) and jump.terms(at)["friction"] > 0
+    assert not np.shares_memory(jump.gradient(at), row.gradient(at))
 
 
 def test_own_terms_know_each_other_and_nothing_of_the_scenes():

@@ -24,9 +24,9 @@ def test_a_body_winds_as_its_solid_angles_say():
     x = body.template
     near = x[random.integers(len(x), size=300)] + random.normal(0.0, 0.01, (300, 3))
     points = np.concatenate([near, random.uniform(x.min(axis=0) - 0.1, x.max(axis=0) + 0.1, (200, 3))])
-    found = winding_numbers(x, body.faces, points)
-    assert 0 < (found > 0).sum() < len(found)
-    assert found.tolist() == by_solid_angles(x, body.faces, points).tolist()
+    windings = winding_numbers(x, body.faces, points)
+    assert 0 < (windings > 0).sum() < len(windings)
+    assert windings.tolist() == by_solid_angles(x, body.faces, points).tolist()
 
 
 @pytest.mark.parametrize("longest", [0, 1, 2])

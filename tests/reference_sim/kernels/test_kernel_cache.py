@@ -106,9 +106,9 @@ def run(forking):
 
     def lines(code: str, path: Path, **environment: str) -> list[str]:
         print(json.dumps([code, str(path), environment]), file=forking.stdin, flush=True)
-        status, said = json.loads(forking.stdout.readline())
-        assert status == 0, said
-        return said.split("\n")[:-1]
+        status, output = json.loads(forking.stdout.readline())
+        assert status == 0, output
+        return output.split("\n")[:-1]
 
     return lines
 
@@ -216,7 +216,7 @@ def test_the_setting_of_numba_is_left_as_it_was(project, run):
 
 
 def test_no_file_takes_a_decorator_from_numba_itself():
-    own = "reference_sim/kernels/kernel_cache.py"
+    wrapper = "reference_sim/kernels/kernel_cache.py"
     wrong = []
     for layer in ("reference_sim", "snug", "benchmarks", "reports"):
         for path in (ROOT / layer).rglob("*.py"):
@@ -233,4 +233,4 @@ def test_no_file_takes_a_decorator_from_numba_itself():
                 named -= {"numba.core.dispatcher.Dispatcher", "numba.typeof"}  # for types alone
             if any(name.split(".")[0] == "numba" for name in named):
                 wrong.append(path.relative_to(ROOT).as_posix())
-    assert wrong == [own]
+    assert wrong == [wrapper]

@@ -69,8 +69,8 @@ def test_each_energy_and_its_gradient_is_that_of_its_definition(seed, size):
     value["gravity"] = float(weight @ u[:, 1])  # from x0 on
     assert value["collision"] > 0
     order = ("inertia", "gravity", "strain", "bending", "collision")
-    for name, found in zip(order, energies):
-        assert found == pytest.approx(value[name], rel=2e-5, abs=1e-9), name
+    for name, term in zip(order, energies):
+        assert term == pytest.approx(value[name], rel=2e-5, abs=1e-9), name
     whole = sum(gradients)
     whole[potential.cloth.pins] = 0.0
     assert np.abs(gradient - whole).max() < 3e-6 * np.abs(whole).max()
@@ -133,38 +133,38 @@ def test_the_factor_solves(cells, pinned):
 def test_iterations_are_those_of_the_exact_solver(seed, iterations):
     potential, guess = pressed(seed)
     exact = LBFGS(potential, max_iterations=iterations, finish=False).minimise(guess)
-    found = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
-    assert found.iterations == iterations == exact.iterations and found.status == "max_iterations"
-    start, reached = potential.value(guess), potential.value(found.positions)
+    descent = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
+    assert descent.iterations == iterations == exact.iterations and descent.status == "max_iterations"
+    start, reached = potential.value(guess), potential.value(descent.positions)
     assert start - reached == pytest.approx(start - exact.energy, rel=2e-3)
-    assert np.abs(found.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
-    assert np.array_equal(found.positions[potential.cloth.pins], guess[potential.cloth.pins])
-    assert found.terms == pytest.approx(potential.terms(found.positions), rel=1e-4, abs=1e-8)
+    assert np.abs(descent.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
+    assert np.array_equal(descent.positions[potential.cloth.pins], guess[potential.cloth.pins])
+    assert descent.terms == pytest.approx(potential.terms(descent.positions), rel=1e-4, abs=1e-8)
 
 
 def test_many_iterations_end_at_the_minimum():
     potential, guess = pressed(5)
-    found = CompiledLBFGS(potential, max_iterations=400).minimise(guess)
+    descent = CompiledLBFGS(potential, max_iterations=400).minimise(guess)
     least = Newton(potential).minimise(guess)
     assert least.status == "converged"
-    assert potential.value(found.positions) - least.energy < 1e-6 * (potential.value(guess) - least.energy)
+    assert potential.value(descent.positions) - least.energy < 1e-6 * (potential.value(guess) - least.energy)
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_what_begins_in_float32_ends_in_a_minimum_of_float64(seed, monkeypatch):
     potential, guess = pressed(seed)
     kept: list[np.ndarray] = []
-    found = LBFGS(potential, observe=kept.append).minimise(guess)
-    assert np.array_equal(kept[0], guess) and np.array_equal(kept[-1], found.positions)
-    assert np.array_equal(found.positions, LBFGS(potential).minimise(guess).positions)  # whoever watches
+    descent = LBFGS(potential, observe=kept.append).minimise(guess)
+    assert np.array_equal(kept[0], guess) and np.array_equal(kept[-1], descent.positions)
+    assert np.array_equal(descent.positions, LBFGS(potential).minimise(guess).positions)  # whoever watches
     monkeypatch.setattr(lbfgs, "LARGEST_COMPILED", 0)
     in_float64 = LBFGS(potential).minimise(guess)
-    assert found.status == in_float64.status == "converged"
-    assert found.iterations > in_float64.iterations  # more of them, and cheap ones
-    gradient = potential.value_and_gradient(found.positions)[1][potential.cloth.free]
+    assert descent.status == in_float64.status == "converged"
+    assert descent.iterations > in_float64.iterations  # more of them, and cheap ones
+    gradient = potential.value_and_gradient(descent.positions)[1][potential.cloth.free]
     assert np.abs(gradient).max() < 1e-6 * 9.81 * potential.cloth.masses.mean()
-    there = Newton(potential).minimise(found.positions)
-    assert there.status == "converged" and np.array_equal(there.positions, found.positions)
+    restart = Newton(potential).minimise(descent.positions)
+    assert restart.status == "converged" and np.array_equal(restart.positions, descent.positions)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -175,10 +175,10 @@ def test_a_loose_tolerance_is_reached_in_float32_alone(seed, monkeypatch):
         raise AssertionError("the same descent begins a second time, in float64")
 
     monkeypatch.setattr(lbfgs, "LBFGSRun", again)
-    found = LBFGS(potential, tolerance=0.1).minimise(guess)
+    descent = LBFGS(potential, tolerance=0.1).minimise(guess)
     weight = 9.81 * potential.cloth.masses.mean()
-    gradient = potential.value_and_gradient(found.positions)[1][potential.cloth.free]
-    assert found.status == "converged" and np.abs(gradient).max() < 0.1 * weight
+    gradient = potential.value_and_gradient(descent.positions)[1][potential.cloth.free]
+    assert descent.status == "converged" and np.abs(gradient).max() < 0.1 * weight
 
 
 def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
@@ -215,12 +215,12 @@ def test_whole_roll_outs_stay_beside_the_exact_ones(name):
     exact = simulate(
         scene.cloth, scene.energies, obstacle=scene.obstacle, method="lbfgs", finish=False, **common
     )
-    found = simulate(
+    trajectory = simulate(
         scene.cloth, scene.energies, obstacle=scene.obstacle, method=CompiledLBFGS, **common
     )  # fmt: skip
-    assert found.frames == exact.frames == 10
+    assert trajectory.frames == exact.frames == 10
     span = np.abs(exact.positions - exact.positions[0]).max()
-    assert np.abs(found.positions - exact.positions).max() < 0.01 * span
+    assert np.abs(trajectory.positions - exact.positions).max() < 0.01 * span
 
 
 def dressed_in_motion(motion: Motion) -> BuiltScene:
@@ -232,12 +232,12 @@ def dressed_in_motion(motion: Motion) -> BuiltScene:
 
 def roll_out(scene: BuiltScene, obstacle: Obstacle, **options) -> np.ndarray:
     """Positions (T, V, 3) [m] of ten iterations a step."""
-    found = simulate(
+    trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.settle(),
         obstacle=obstacle, max_iterations=10, **options,
     )  # fmt: skip
-    assert found.frames == scene.frames, found.reason
-    return found.positions
+    assert trajectory.frames == scene.frames, trajectory.reason
+    return trajectory.positions
 
 
 @pytest.mark.parametrize(
@@ -255,9 +255,9 @@ def test_no_limb_is_lost_in_hard_and_long_motions(name, times):
     scene = dressed_in_motion(motion)
     assert scene.obstacle is not None
     exact = roll_out(scene, scene.obstacle, method="lbfgs", finish=False)
-    found = roll_out(scene, scene.obstacle, method=CompiledLBFGS)
+    positions = roll_out(scene, scene.obstacle, method=CompiledLBFGS)
     frames = range(1, scene.frames, max(scene.frames // 100, 1))
-    far = [np.array([scene.obstacle.signed_distance(x[f], f) for f in frames]) for x in (exact, found)]
+    far = [np.array([scene.obstacle.signed_distance(x[f], f) for f in frames]) for x in (exact, positions)]
     deep = [(d < -5e-3).mean() for d in far]
     assert deep[1] < deep[0] + 0.01, deep
     assert far[1].min() > 2 * far[0].min() - 5e-3 and far[1].max() < far[0].max() + 0.05

@@ -33,16 +33,16 @@ BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.
 def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_network_has():
     rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE  # 5 and 20 %
     typical = np.sinh(np.arcsinh([5.0, 20.0]).mean())
-    said = near(rows)
-    assert said.startswith(
+    sentences = near(rows)
+    assert sentences.startswith(
         f"On 2 unseen motions SNUG has a relative excess of {number_texts.number(typical, 2)} % ("
     )
     assert (
         "where the energy of the reference simulation is 0 % and that of skinning alone 100 %. Whether SNUG"
-        in said
+        in sentences
     )
-    assert "geometric means over motions. The arithmetic mean of SNUG over motions is 12 %" in said
-    assert said.endswith("and its worst motion, jump, has 20 %.")
+    assert "geometric means over motions. The arithmetic mean of SNUG over motions is 12 %" in sentences
+    assert sentences.endswith("and its worst motion, jump, has 20 %.")
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
     assert " and PBNS of 15 %, where" in near(rows)
     assert "; whether SNUG or PBNS has less is inconclusive. Whether" in near(rows)
@@ -66,9 +66,9 @@ def test_of_a_family_of_networks_page_one_has_the_last():
         for r in on_two_scenes(f"handles-{level:.0f}", 0.5 + above, 7.0 + above)
     ]
     rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE + handles
-    said = near(rows)
-    assert "handles-80 of 20 %" in said and "handles-40" not in said
-    assert "; whether SNUG or handles-80 has less is inconclusive." in said
+    sentences = near(rows)
+    assert "handles-80 of 20 %" in sentences and "handles-40" not in sentences
+    assert "; whether SNUG or handles-80 has less is inconclusive." in sentences
     methods = [line[0] for line in make_tables(run_of(rows))["overview"].rows]
     assert "handles-80" in methods and "handles-40" not in methods
 
@@ -78,17 +78,20 @@ def test_scenes_that_nothing_simulates_do_not_count_for_the_reference():
     for metric, unit in (("distance/rms", "mm"), ("curvature/error", "1/m")):
         rows += [row(scene, "simulation-perturbed-1e-4", metric, 3.0, unit=unit) for scene in SCENES]
     rows.append(row("tshirt/there_and_back", "snug", "drift/hem", 3.0, unit="mm"))
-    said = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
-    assert "curvature from the reference, in 2 scenes:" in said
+    certainty = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
+    assert "curvature from the reference, in 2 scenes:" in certainty
 
 
 def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
     rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
     assert "What does not hold" not in dict(headline(run_of(rows))).get("How certain", "")
     monkeypatch.setattr(paper_claims, "verdict", lambda claim, far, p: paper_claims.FAILS)
-    said = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
-    assert "Of 1 primary claim taken from the paper 1 does not hold. What does not hold: Figure 7: cl" in said
-    assert said.endswith("(relative excess: SNUG ≤ Simulation).")
+    certainty = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
+    assert (
+        "Of 1 primary claim taken from the paper 1 does not hold. What does not hold: Figure 7: cl"
+        in certainty
+    )
+    assert certainty.endswith("(relative excess: SNUG ≤ Simulation).")
     assert first_sentences(run_of(rows))[-1] == "Of 1 primary claim taken from the paper 1 does not hold."
 
 
@@ -122,10 +125,10 @@ def test_page_one_counts_every_kind_of_ending():
     rows.append(
         row("tshirt/jump", "pbns", "energy/strain", None, status="timeout", reason="over 600 s", seed=1)
     )
-    said = endings(run_of(rows))
+    sentence = endings(run_of(rows))
     assert (
         "cells 2 failed, 1 timeout, 1 stalled, 1 skipped; of 3 checks 1 failed; of 2 stress tests 1 timeout"
-        in said
+        in sentence
     )
     assert endings(run_of(rows[:3])) == "Of 1 cells all ended well."
     table = make_tables(run_of(rows))["endings"]
@@ -140,11 +143,11 @@ def test_page_one_counts_every_kind_of_ending():
 
 
 @pytest.mark.parametrize(
-    ("workers", "said"),
+    ("workers", "remark"),
     [(None, ""), (1, "one after another, "), (4, "up to 4 side by side, ")],
 )
-def test_times_say_what_ran_beside(workers, said):
-    assert content(report_of(all_rows()[-5:], workers=workers))["workers"] == f"{said}one thread each."
+def test_times_say_what_ran_beside(workers, remark):
+    assert content(report_of(all_rows()[-5:], workers=workers))["workers"] == f"{remark}one thread each."
 
 
 def test_sections_exist_only_for_what_ran():
@@ -183,11 +186,11 @@ def test_the_report_lists_the_stress_tests_that_did_not_converge_and_the_table_a
 
 def test_page_one_names_the_worst_of_each_kind():
     stretched = [row("tshirt/kick", m, "energy/strain", v) for m, v in (("simulation", 0.1), ("snug", 0.9))]
-    found = failures(run_of([*all_rows(), *stretched]))
-    assert ("Supervised, tshirt/walk", "failed: diverged at step 7") in found
-    assert any(name == "Simulation, teleport" for name, _ in found)
-    assert ("SNUG, tshirt/kick", "mean strain 0.900 J, 9.00 times the simulation's") in found
-    assert not any("Skinning" in name for name, _ in found)  # no network: nobody expects better of it
+    cases = failures(run_of([*all_rows(), *stretched]))
+    assert ("Supervised, tshirt/walk", "failed: diverged at step 7") in cases
+    assert any(name == "Simulation, teleport" for name, _ in cases)
+    assert ("SNUG, tshirt/kick", "mean strain 0.900 J, 9.00 times the simulation's") in cases
+    assert not any("Skinning" in name for name, _ in cases)  # no network: nobody expects better of it
     assert failures(run_of([row(method="simulation"), row()])) == []  # as much strain is no failure
 
 
@@ -216,9 +219,9 @@ def test_roll_outs_of_the_user_are_on_page_one_beside_snug_or_alone():
     alone, beside = run_of([*reference, *mine()]), run_of([*all_rows(), *mine()])
     assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
     assert leads(beside, beside.garment_rows)[:3] == ["simulation", "snug", "mine"]
-    said = {topic: text.replace("\u00a0", " ") for topic, text in headline(alone)}
-    assert "mine has a relative excess of" in said["How near"]
-    assert said["How it moves"].startswith(
+    paragraphs = {topic: text.replace("\u00a0", " ") for topic, text in headline(alone)}
+    assert "mine has a relative excess of" in paragraphs["How near"]
+    assert paragraphs["How it moves"].startswith(
         "Mine has less secondary motion: its hem amplitude is 50 % of the simulation's. 2.5 % "
     )
     assert "mine" in {line[0] for line in make_tables(alone)["overview"].rows}
@@ -232,8 +235,8 @@ def test_a_roll_out_in_scenes_without_skinning_has_its_distance_on_page_one():
         for m, v, u in numbers
     ]
     run = run_of([*(row(s, "simulation", "energy/total", 0.5) for s in ("free_fall", "flag")), *mine])
-    said = dict(headline(run))["How near"].replace("\u00a0", " ")
-    assert said == "mine lies 12.0 mm from the reference, with an energy gap of 0.250 J."
+    sentence = dict(headline(run))["How near"].replace("\u00a0", " ")
+    assert sentence == "mine lies 12.0 mm from the reference, with an energy gap of 0.250 J."
 
 
 def test_changed_networks_are_networks_where_a_run_has_no_others():

@@ -66,8 +66,8 @@ def hostile():
 @pytest.fixture(scope="module", params=[few, many, hostile])
 def report(request, tmp_path_factory):
     """The pages of a report; that of many methods has roll-outs."""
-    rows, said = request.param(), {"commit": "abc", "started": "2030-01-02T03:04:05+00:00"}
-    run = run_folder(tmp_path_factory.mktemp("run"), rows, preset="smoke", **said)
+    rows, provenance = request.param(), {"commit": "abc", "started": "2030-01-02T03:04:05+00:00"}
+    run = run_folder(tmp_path_factory.mktemp("run"), rows, preset="smoke", **provenance)
     for scene in {r.scene for r in rows if r.garment} if request.param is many else ():
         write_mesh(run.trajectory_path(scene, "body"), *sheet(0.0), {})
         for method in {r.method for r in rows} & {*METHODS, *HOSTILE}:
@@ -77,9 +77,9 @@ def report(request, tmp_path_factory):
     pictures = draw_figures(read, run.figures, FIGURES)
     write_pdf(run, Report(read, make_tables(read), pictures))
     assert not read.problems
-    found = pdfium.PdfDocument(run.report_path)
-    yield found
-    found.close()
+    document = pdfium.PdfDocument(run.report_path)
+    yield document
+    document.close()
 
 
 @pytest.fixture(scope="module")
@@ -91,30 +91,30 @@ def texts(report):
 def words(page) -> list[tuple[str, np.ndarray]]:
     """Each word and its box (left, bottom, right, top) [pt]."""
     text = page.get_textpage()
-    found, letters, boxes = [], "", []
+    word_boxes, letters, boxes = [], "", []
     for k in range(text.count_chars() + 1):
         letter = text.get_text_range(k, 1) if k < text.count_chars() else " "
         box = text.get_charbox(k) if letter.strip() else None
         apart = boxes and box is not None and (box[0] - boxes[-1][2] > 1.5 or box[0] < boxes[-1][0] - 1.0)
         if (box is None or apart) and boxes:
-            own = np.array(boxes)
-            found.append((letters, np.concatenate([own[:, :2].min(axis=0), own[:, 2:].max(axis=0)])))
+            edges = np.array(boxes)
+            word_boxes.append((letters, np.concatenate([edges[:, :2].min(axis=0), edges[:, 2:].max(axis=0)])))
             letters, boxes = "", []
         if box is not None:
             letters, boxes = letters + letter, [*boxes, box]
-    return found
+    return word_boxes
 
 
 def test_no_word_lies_over_a_margin_or_over_another(report, texts):
-    for page, found in zip(report, texts, strict=True):
-        boxes = np.array([box for _, box in found])
+    for page, word_boxes in zip(report, texts, strict=True):
+        boxes = np.array([box for _, box in word_boxes])
         width, height = page.get_size()
-        out = [word for word, box in found if box[0] < MARGIN - SLACK or box[2] > width - MARGIN + SLACK]
+        out = [word for word, box in word_boxes if box[0] < MARGIN - SLACK or box[2] > width - MARGIN + SLACK]
         assert not out and boxes[:, 1].min() > 0.0 and boxes[:, 3].max() < height
         low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
         high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
         over = np.triu(((high - low) > SLACK).all(axis=-1), 1)
-        assert not over.any(), [(found[a][0], found[b][0]) for a, b in np.argwhere(over)]
+        assert not over.any(), [(word_boxes[a][0], word_boxes[b][0]) for a, b in np.argwhere(over)]
 
 
 def test_no_letter_is_smaller_than_7_points(report):

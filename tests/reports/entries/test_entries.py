@@ -50,8 +50,8 @@ def published(tmp_path):
 def write_entry(root, name, total, *, scenes=FULL, protocol="1.0"):
     (root / name).mkdir(parents=True)
     (root / name / "entry.toml").write_text("")
-    said = {"title": f"{name} {NASTY}", "authors": "they", "training_data": "none"}
-    return write_run(root / name / "scores", {name: total}, scenes, protocol, metadata=said)
+    metadata = {"title": f"{name} {NASTY}", "authors": "they", "training_data": "none"}
+    return write_run(root / name / "scores", {name: total}, scenes, protocol, metadata=metadata)
 
 
 def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, published):

@@ -31,11 +31,11 @@ def test_methods_keep_their_order_and_their_look():
 
 def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
     run = run_of([row(method=m) for m in ("snug", "snug+lbfgs-4", "snug-no-inertia", "snug+cleanup")])
-    own, less, warm, cleaned = (
+    base, less, warm, cleaned = (
         method_styles.style(run, m) for m in ("snug", "snug-no-inertia", "snug+lbfgs-4", "snug+cleanup")
     )
-    assert warm.colour == cleaned.colour == own.colour != less.colour
-    assert less.marker == own.marker and warm.marker != own.marker
+    assert warm.colour == cleaned.colour == base.colour != less.colour
+    assert less.marker == base.marker and warm.marker != base.marker
     family = method_styles.family_style(run, run.methods["snug+lbfgs-4"])
     assert (family.label, warm.label) == ("SNUG + L-BFGS", "SNUG + L-BFGS, 4 iterations")
     alone = run_of([row(method="snug+cleanup")])  # what it starts from did not run
@@ -178,7 +178,7 @@ def test_histograms_hold_every_vertex_once():
     areas = np.full(len(faces), 0.5 * (0.4 / 3) * (0.5 / 3))
     figure = histograms.draw_histograms(run, {"simulation": mesh(cloth, faces, {})}, areas)
     shares = [line.get_ydata() for axes in figure.axes for line in axes.get_lines()]
-    assert len(shares) == 2 and all(np.isclose(own[own > histograms.RARE].sum(), 100.0) for own in shares)
+    assert len(shares) == 2 and all(np.isclose(bins[bins > histograms.RARE].sum(), 100.0) for bins in shares)
 
 
 def test_checks_are_drawn_by_their_tolerances_in_order():

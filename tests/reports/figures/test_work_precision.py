@@ -34,8 +34,8 @@ def test_a_legend_has_no_more_columns_than_fit():
 
 def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_path):
     rows = all_rows()
-    own = [r for r in rows if r.metric == "cost/frame"]
-    whole = [dataclasses.replace(r, metric="cost/whole", value=r.value + 2.0) for r in own]
+    frame_times = [r for r in rows if r.metric == "cost/frame"]
+    whole = [dataclasses.replace(r, metric="cost/whole", value=r.value + 2.0) for r in frame_times]
     rows.append(row(SCENES[0], "skinning", "cost/spread", 50.0, "%"))
     for added, shift in ((whole, 2.0), (whole[1:], 0.0), ([], 0.0)):
         run = run_of([*rows, *added])

@@ -34,11 +34,11 @@ def test_values_are_off_by_less_than_a_hundredth_and_finer_where_small(signed):
     values[3, 4] = np.nan
     pack = Pack()
     pack.values("v", values, signed=signed)
-    found, values[3, 4] = unpacked(pack.entries, pack.text())["v"], 0.0
+    approximation, values[3, 4] = unpacked(pack.entries, pack.text())["v"], 0.0
     full = np.abs(values).max()
-    assert np.abs(found - values).max() <= full / 100
+    assert np.abs(approximation - values).max() <= full / 100
     small = np.abs(values) < 0.01 * full
-    assert np.abs(found - values)[small].max() <= full / 1000
+    assert np.abs(approximation - values)[small].max() <= full / 1000
 
 
 def test_curvature_is_that_of_a_sphere_and_of_the_metric():
@@ -48,10 +48,10 @@ def test_curvature_is_that_of_a_sphere_and_of_the_metric():
     line, column = np.meshgrid(np.arange(39), np.arange(40), indexing="ij")
     a, b = (40 * line + column).ravel(), (40 * line + (column + 1) % 40).ravel()
     faces = np.concatenate([np.stack([a, b, a + 40], axis=1), np.stack([b, b + 40, a + 40], axis=1)])
-    found = mean_curvature(globe, faces)[0]
-    inner = found > 0.0
+    curvatures = mean_curvature(globe, faces)[0]
+    inner = curvatures > 0.0
     assert inner.sum() == 38 * 40
-    assert np.abs(found[inner] - 2.0).max() < 0.05
+    assert np.abs(curvatures[inner] - 2.0).max() < 0.05
     crumpled = globe + np.random.default_rng(3).normal(scale=0.02, size=(2, *globe.shape[1:]))
     declared = np.stack([curvature.mean_curvature(x, faces)[0] for x in crumpled])
     np.testing.assert_allclose(mean_curvature(crumpled, faces)[:, inner], declared[:, inner], rtol=1e-9)

@@ -113,7 +113,7 @@ def arrays_of(run: RunFolder, scene: str, method: str) -> dict[str, np.ndarray]:
 
 def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
     """The arrays of a pack, frame by frame as data.js has them."""
-    data, found = zlib.decompress(base64.b64decode(text)), {}
+    data, arrays = zlib.decompress(base64.b64decode(text)), {}
     for name, entry in entries.items():
         shape = tuple(entry["shape"])
         size = int(np.prod(shape))
@@ -125,34 +125,34 @@ def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
             for k in range(shape[0]):
                 moved = steps[k + 1] - steps[k] if k > 1 else 0
                 steps[k + 2] = (steps[k + 1] + moved + left[k]) % 65536
-            found[name] = np.array(entry["low"]) + entry["step"] * steps[2:]
+            arrays[name] = np.array(entry["low"]) + entry["step"] * steps[2:]
         elif entry["kind"] == "values":
             levels = np.frombuffer(data, np.uint8, size, entry["at"]).reshape(shape).cumsum(0) % 256
             part = (levels - 128.0) / 127.0 if entry["signed"] else levels / 255.0
-            found[name] = entry["full"] * part * np.abs(part)
+            arrays[name] = entry["full"] * part * np.abs(part)
         else:
             kind = "<f4" if entry["kind"] == "numbers" else "<u4"
-            found[name] = np.frombuffer(data, kind, size, entry["at"]).reshape(shape)
-    return found
+            arrays[name] = np.frombuffer(data, kind, size, entry["at"]).reshape(shape)
+    return arrays
 
 
 def test_the_page_holds_the_roll_outs_of_the_run(folder):
-    found = arrays_of(folder, WHOLE, "snug")
+    arrays = arrays_of(folder, WHOLE, "snug")
     cloth, faces = moving(METHODS["snug"])
-    assert np.array_equal(found["faces"], faces)
-    assert np.abs(found["positions"] - cloth).max() <= 5e-5
-    np.testing.assert_allclose(found["times"], np.arange(len(cloth)) / 30.0, rtol=1e-6)
-    np.testing.assert_allclose(found["energy/total"], np.linspace(1.0, 2.0, len(cloth)), rtol=1e-6)
-    np.testing.assert_allclose(found["distance"], 10.0, rtol=1e-2)
-    assert {"curvature", "area", "depth"} <= found.keys()
+    assert np.array_equal(arrays["faces"], faces)
+    assert np.abs(arrays["positions"] - cloth).max() <= 5e-5
+    np.testing.assert_allclose(arrays["times"], np.arange(len(cloth)) / 30.0, rtol=1e-6)
+    np.testing.assert_allclose(arrays["energy/total"], np.linspace(1.0, 2.0, len(cloth)), rtol=1e-6)
+    np.testing.assert_allclose(arrays["distance"], 10.0, rtol=1e-2)
+    assert {"curvature", "area", "depth"} <= arrays.keys()
 
 
 def test_one_step_errors_are_kept_and_frames_that_nobody_judged_are_named(folder):
     scenes = content_of(folder)["scenes"]
     entry = scenes[CLIPS[0]]["methods"]["snug"]["arrays"]["step"]
     assert entry["unknown"] == [0, 1]
-    found = arrays_of(folder, CLIPS[0], "snug")["step"]
-    np.testing.assert_allclose(found[2:], np.nan_to_num(steps(found))[2:], atol=0.03)
+    errors = arrays_of(folder, CLIPS[0], "snug")["step"]
+    np.testing.assert_allclose(errors[2:], np.nan_to_num(steps(errors))[2:], atol=0.03)
     assert "step" not in scenes[WHOLE]["methods"]["snug"]["arrays"]
     assert scenes[CLIPS[0]]["methods"]["snug"]["arrays"]["curvature"]["unknown"] == []
 
@@ -262,8 +262,8 @@ def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(t
     run.rest_areas_path(WHOLE).write_bytes(b"no areas")
     (problem,) = write(run, tables=False)
     assert "pbns.vtkhdf" in problem
-    found = arrays_of(run, WHOLE, "snug")
-    assert len(found["positions"]) == 3 and "area" not in found
+    arrays = arrays_of(run, WHOLE, "snug")
+    assert len(arrays["positions"]) == 3 and "area" not in arrays
     assert "pbns" not in content_of(run)["scenes"][WHOLE]["methods"]
     first = run.page_path.read_bytes()
     assert "pbns.vtkhdf" in first.decode()
@@ -295,38 +295,38 @@ def in_browser(path: Path, script: str, folder: Path, address: str = "") -> dict
     not (shutil.which("chromium") or shutil.which("chromium-browser")), reason="no chromium on this machine"
 )
 def test_a_person_can_use_it(folder, tmp_path):
-    found = in_browser(folder.page_path, ACTIONS.read_text(encoding="utf-8"), tmp_path)
-    assert found["wrong"] == [] and not found["hacked"]
-    assert found["opens"] == ["Pause", "distance", ""]
-    assert found["panes"] == ["Simulation", "Skinning alone", "SNUG", "PBNS"]
-    assert found["shades"] > 8
-    assert (found["first"], found["right"], found["home"]) == (2, 3, 0)
-    assert (found["playing"], found["paused"]) == ("Pause", "Play") and found["played"]
-    assert found["clock"] == "0.07 s · 3 of 5"
-    assert found["added"] == "newton-4" and found["withAdded"][-1] == "Newton, 4 iterations"
-    assert found["pointed"] == "pbns" and "pbns" in found["withPointed"] and len(found["withPointed"]) == 4
-    assert found["focused"] == "pbns"
-    assert found["turned"] and found["scale"] == "Mean curvature [1/m]"
-    assert found["colours"] == ["plain", "curvature", "area", "step", "distance", "depth"]
-    assert found["unjudged"] == ["step not judged"] * 4 and found["judged"] == [""] * 4
-    directions, columns = zip(found["up"], found["down"])
+    state = in_browser(folder.page_path, ACTIONS.read_text(encoding="utf-8"), tmp_path)
+    assert state["wrong"] == [] and not state["hacked"]
+    assert state["opens"] == ["Pause", "distance", ""]
+    assert state["panes"] == ["Simulation", "Skinning alone", "SNUG", "PBNS"]
+    assert state["shades"] > 8
+    assert (state["first"], state["right"], state["home"]) == (2, 3, 0)
+    assert (state["playing"], state["paused"]) == ("Pause", "Play") and state["played"]
+    assert state["clock"] == "0.07 s · 3 of 5"
+    assert state["added"] == "newton-4" and state["withAdded"][-1] == "Newton, 4 iterations"
+    assert state["pointed"] == "pbns" and "pbns" in state["withPointed"] and len(state["withPointed"]) == 4
+    assert state["focused"] == "pbns"
+    assert state["turned"] and state["scale"] == "Mean curvature [1/m]"
+    assert state["colours"] == ["plain", "curvature", "area", "step", "distance", "depth"]
+    assert state["unjudged"] == ["step not judged"] * 4 and state["judged"] == [""] * 4
+    directions, columns = zip(state["up"], state["down"])
     assert directions == ("ascending", "descending")
     numbers = [[float(text.strip("×#")) for text in column] for column in columns]
     assert numbers[0] == numbers[1][::-1] == sorted(numbers[0]) and len(set(numbers[0])) == len(METHODS)
-    assert found["definition"] == "Frame: definition of cost/frame."
-    lines = {kind: text.split("\n") for kind, text in found["copied"].items()}
+    assert state["definition"] == "Frame: definition of cost/frame."
+    lines = {kind: text.split("\n") for kind, text in state["copied"].items()}
     count = len(METHODS) + 1
     assert lines["csv"][0].startswith("Method,Relative excess [%],") and len(lines["csv"]) == count
     assert lines["markdown"][1].startswith("| --- | --- |") and len(lines["markdown"]) == count + 1
     assert lines["latex"][0] == "\\begin{tabular}{lrrrr}" and len(lines["latex"]) == count + 5
     assert lines["latex"][2].startswith("Method & Relative excess [\\%] & ")
-    assert found["picture"] == ["tshirt-walk@clip-4.png", "data:image/png;base64,", True]
-    assert found["groups"] == ["Means", "Each scene or motion"]
+    assert state["picture"] == ["tshirt-walk@clip-4.png", "data:image/png;base64,", True]
+    assert state["groups"] == ["Means", "Each scene or motion"]
     assert (
-        found["address"].startswith(f"#scene={CLIPS[0]}&methods=simulation,")
-        and "colour=curvature" in found["address"]
+        state["address"].startswith(f"#scene={CLIPS[0]}&methods=simulation,")
+        and "colour=curvature" in state["address"]
     )
-    assert found["scene"] == WHOLE and len(found["panesThere"]) == 4 and found["curves"] == 4
+    assert state["scene"] == WHOLE and len(state["panesThere"]) == 4 and state["curves"] == 4
 
 
 OPENED = """addEventListener('DOMContentLoaded', () => setTimeout(() => {
@@ -346,7 +346,7 @@ OPENED = """addEventListener('DOMContentLoaded', () => setTimeout(() => {
 )
 def test_an_address_opens_what_it_names(folder, tmp_path):
     address = f"#scene={WHOLE}&methods=snug,moon,pbns&colour=area&frame=3"
-    found = in_browser(folder.page_path, OPENED, tmp_path, address)
-    assert found == {
+    state = in_browser(folder.page_path, OPENED, tmp_path, address)
+    assert state == {
         "scene": WHOLE, "chosen": ["snug", "pbns"], "frame": "3", "colour": "area", "playing": False,
     }  # fmt: skip

@@ -110,6 +110,6 @@ def test_only_what_was_drawn_is_read(tmp_path):
 def test_words_beside_a_row_have_room_for_all_their_lines():
     tile = np.zeros((10, 10, 3))
     figure = sheets.sheet([[tile]], (1.0, 1.0), ["0 s"], beside=["SNUG, paper's\ntext"])
-    (words,) = (text for text in figure.texts if text.get_rotation() == 90)
-    box = words.get_window_extent(FigureCanvasAgg(figure).get_renderer())
+    (caption,) = (text for text in figure.texts if text.get_rotation() == 90)
+    box = caption.get_window_extent(FigureCanvasAgg(figure).get_renderer())
     assert box.x0 >= 0.0 and box.x1 <= figure.axes[0].get_window_extent().x0

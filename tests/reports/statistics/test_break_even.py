@@ -29,8 +29,8 @@ def test_what_comes_before_the_first_frame_is_data_making_ready_and_training():
 
 def test_rivals_are_the_fastest_solvers_as_accurate():
     run = run_of(all_rows())
-    found = rivals(run, run.cells("speed"), list(SCENES))
-    assert found == {"simulation": "converged", "lbfgs-20": "energy gap", "lbfgs-5": "curvature error"}
+    reasons = rivals(run, run.cells("speed"), list(SCENES))
+    assert reasons == {"simulation": "converged", "lbfgs-20": "energy gap", "lbfgs-5": "curvature error"}
 
 
 def test_a_training_whose_data_nobody_can_price_has_no_break_even():

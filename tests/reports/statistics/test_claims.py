@@ -21,8 +21,8 @@ from tests.reports.report_folder import row, run_of
 
 def told(rows):
     """(metric, lower, higher) -> the judged claim."""
-    found = judged(run_of(rows))
-    return {(line.claim.metric, line.claim.lower, line.claim.higher): line for line in found}
+    lines = judged(run_of(rows))
+    return {(line.claim.metric, line.claim.lower, line.claim.higher): line for line in lines}
 
 
 STRAIN = ("energy/strain", "snug", "pbns")
@@ -59,12 +59,12 @@ def test_every_method_of_a_claim_is_one_that_can_be_run():
     ],
 )
 def test_a_claim_holds_beyond_a_tie_and_beyond_motions_and_seeds(snug, pbns, verdict):
-    found = told(seeds("snug", snug) + seeds("pbns", pbns))
-    line = found[STRAIN]
+    lines = told(seeds("snug", snug) + seeds("pbns", pbns))
+    line = lines[STRAIN]
     one, other = line.compared.one, line.compared.other
     assert one.value == pytest.approx(sum(snug) / len(snug)) and line.verdict == verdict
     assert (one.spread is None) == (len(snug) == 1) and (other.spread is None) == (len(pbns) == 1)
-    assert list(found) == [STRAIN]  # what was not run is not judged
+    assert list(lines) == [STRAIN]  # what was not run is not judged
     assert (line.remark == ": one seed") == (len(snug) == len(pbns) == 1)
 
 
@@ -84,16 +84,16 @@ def test_where_no_seed_matters_motions_alone_decide_and_three_are_too_few(spring
 def test_no_verdict_hangs_on_where_gravity_is_zero():
     asked = "energy/gravity", "snug", "pbns"
 
-    def verdicts(zero: float, own: float):
+    def verdicts(zero: float, energy: float):
         scatter = (-0.001, 0.0, 0.001)
-        rows = seeds("snug", [zero + own + x for x in scatter], asked[0])
+        rows = seeds("snug", [zero + energy + x for x in scatter], asked[0])
         rows += seeds("pbns", [zero + 1.0 + x for x in scatter[::-1]], asked[0])
         for metric in (asked[0], "energy/total"):
             rows += seeds("simulation", (zero + 0.9,), metric) + seeds("skinning", (zero + 1.9,), metric)
         return told(rows)[asked]
 
-    for own, verdict in ((0.8, "holds"), (1.2, "does not hold"), (1.0002, "tie")):
-        near, far = verdicts(0.0, own), verdicts(100.0, own)
+    for energy, verdict in ((0.8, "holds"), (1.2, "does not hold"), (1.0002, "tie")):
+        near, far = verdicts(0.0, energy), verdicts(100.0, energy)
         assert near.verdict == far.verdict == verdict and near.compared.effect.scale == EXCESS
         assert near.compared.effect.value == pytest.approx(far.compared.effect.value)
 
@@ -155,9 +155,11 @@ def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdic
     ("rival", "verdict"), [((0.7, 0.71, 0.72), "does not hold"), ((0.1, 0.1001, 0.1002), "holds")]
 )
 def test_a_tie_upholds_what_is_claimed_to_be_on_par(rival, verdict):
-    own = (0.1, 0.1002, 0.1001)
+    amplitudes = (0.1, 0.1002, 0.1001)
     rows = [
-        r for m, v in (("snug", own), ("santesteban2019", rival)) for r in seeds(m, v, "dynamics/amplitude")
+        r
+        for m, v in (("snug", amplitudes), ("santesteban2019", rival))
+        for r in seeds(m, v, "dynamics/amplitude")
     ]
     assert told(rows)["dynamics/amplitude", "santesteban2019", "snug"].verdict == verdict
 
@@ -216,8 +218,8 @@ def test_what_diverged_is_the_worse_one_and_not_a_dash():
 
 
 def test_noise_is_judged_beside_zeros_and_not_as_an_ablation():
-    found = {(claim.lower, claim.higher) for claim in CLAIMS if "noise" in claim.lower + claim.higher}
-    assert found == {("snug-noise-alone", "snug-no-noise")}
+    pairs = {(claim.lower, claim.higher) for claim in CLAIMS if "noise" in claim.lower + claim.higher}
+    assert pairs == {("snug-noise-alone", "snug-no-noise")}
 
 
 def test_the_table_says_effect_and_interval_and_what_the_interval_leaves_out(tmp_path):
@@ -268,11 +270,13 @@ def test_the_share_of_frames_with_more_energy_is_counted_scene_by_scene_and_seed
         snug=[[1, 1, 9, 3], [1, 1, 1]], pbns=[[2, 2, 2, 3, 5], [2, 2, np.nan]], other=[[0.0]]
     )
     made = with_shares(run.frame, frames, "strain", "snug", "pbns")
-    own = made[made["metric"] == share_of_frames("strain").name]
-    found = {(line.method, line.seed): line.value for line in own.itertuples()}
-    assert found == {("snug", 0): 25.0, ("snug", 1): 0.0, ("pbns", 0): 50.0, ("pbns", 1): 100.0}
+    shares = made[made["metric"] == share_of_frames("strain").name]
+    percentages = {(line.method, line.seed): line.value for line in shares.itertuples()}
+    assert percentages == {("snug", 0): 25.0, ("snug", 1): 0.0, ("pbns", 0): 50.0, ("pbns", 1): 100.0}
     assert (
-        set(own["unit"]) == {"%"} and own["usable"].all() and len(made) == len(run.frame) + 4 * len(MOTIONS)
+        set(shares["unit"]) == {"%"}
+        and shares["usable"].all()
+        and len(made) == len(run.frame) + 4 * len(MOTIONS)
     )
     assert len(with_shares(run.frame, frames, "inertia", "snug", "pbns")) == len(run.frame)
 

@@ -50,21 +50,25 @@ def test_of_one_motion_the_interval_is_welchs_over_seeds():
     one, other = ONE - 1.2, np.array((0.9, 1.5, 1.0, 1.1)) - 0.7
     parts = [values.var(ddof=1) / len(values) for values in (one, other)]
     freedom = sum(parts) ** 2 / sum(part**2 / (len(v) - 1) for part, v in zip(parts, (one, other)))
-    found = effect(mean_over(one), mean_over(other, "pbns"))
-    assert found.scale == DIFFERENCE and found.covers == "seeds" and found.shown == one.mean() - other.mean()
-    assert found.freedom == pytest.approx(freedom, rel=3 * NOISE)
-    low, high = t_interval(found.shown, math.sqrt(sum(parts)), found.freedom)
-    assert found.interval == pytest.approx((low, high), abs=NOISE * (high - low))
+    comparison = effect(mean_over(one), mean_over(other, "pbns"))
+    assert (
+        comparison.scale == DIFFERENCE
+        and comparison.covers == "seeds"
+        and comparison.shown == one.mean() - other.mean()
+    )
+    assert comparison.freedom == pytest.approx(freedom, rel=3 * NOISE)
+    low, high = t_interval(comparison.shown, math.sqrt(sum(parts)), comparison.freedom)
+    assert comparison.interval == pytest.approx((low, high), abs=NOISE * (high - low))
 
 
 def test_of_one_seed_the_interval_is_of_pairs_of_motions():
     """Motions are drawn for both at once, so what one of them asks of both is no scatter."""
     one, other = np.array([[0.1], [5.0], [-3.0], [9.0]]), np.array([[0.0], [4.8], [-3.2], [8.9]])
     apart = (one - other).ravel()
-    found = effect(mean_over(one), mean_over(other, "pbns"))
+    comparison = effect(mean_over(one), mean_over(other, "pbns"))
     low, high = t_interval(apart.mean(), apart.std(ddof=1) / 2.0, 3)
-    assert found.covers == "motions" and found.freedom == pytest.approx(3.0)
-    assert found.interval == pytest.approx((low, high), abs=NOISE * (high - low))
+    assert comparison.covers == "motions" and comparison.freedom == pytest.approx(3.0)
+    assert comparison.interval == pytest.approx((low, high), abs=NOISE * (high - low))
 
 
 def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
@@ -84,10 +88,10 @@ def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
 @pytest.mark.parametrize(("method", "freed"), [("simulation", 1 / 3), ("pbns", 1 + 1 / 3)])
 def test_one_number_beside_several_seeds(method, freed):
     """A method without seeds has no scatter; one run of a seeded method is one more draw of the scatter."""
-    found = effect(mean_over([[-0.4]], method), mean_over(ONE - 1.2))
+    comparison = effect(mean_over([[-0.4]], method), mean_over(ONE - 1.2))
     half = stats.t.ppf(0.975, 2) * ONE.std(ddof=1) * math.sqrt(freed)
-    assert found.interval[1] - found.interval[0] == pytest.approx(2.0 * half, rel=NOISE)
-    assert found.freedom == pytest.approx(2.0)
+    assert comparison.interval[1] - comparison.interval[0] == pytest.approx(2.0 * half, rel=NOISE)
+    assert comparison.freedom == pytest.approx(2.0)
 
 
 def random_means(random, motions, seeds, spread, paired):
@@ -165,34 +169,34 @@ def test_the_same_numbers_give_the_same_interval_and_the_interval_agrees_with_th
     signs = set()
     for _ in range(40):
         one, other = random_means(random, 4, 3, spread, True)
-        found = effect(one, other)
-        low, high = found.interval
-        signs.add(found.p_value() < 0.05)
-        assert (found.p_value() < 0.05) == (not low <= float(found.scale == RATIO) <= high)
+        comparison = effect(one, other)
+        low, high = comparison.interval
+        signs.add(comparison.p_value() < 0.05)
+        assert (comparison.p_value() < 0.05) == (not low <= float(comparison.scale == RATIO) <= high)
     assert signs == {True, False}
     effects._weights.cache_clear()
-    assert effect(one, other) == found
+    assert effect(one, other) == comparison
 
 
 def test_positive_numbers_are_compared_by_their_factors():
     sound, broken = mean_over((0.36, 0.35, 0.37)), mean_over((1e7, 2e3, 6e6), "pbns")
-    found = effect(sound, broken)
+    ratio = effect(sound, broken)
     logs = [np.log([*mean.cells.values()]) for mean in (sound, broken)]
-    assert found.scale == RATIO and found.shown == pytest.approx(np.exp(logs[0].mean() - logs[1].mean()))
-    assert found.p_value() < 0.05  # though the spread of what broke is larger than the difference
-    low, high = found.interval
-    assert 0.0 < low < found.shown < high < 1.0
+    assert ratio.scale == RATIO and ratio.shown == pytest.approx(np.exp(logs[0].mean() - logs[1].mean()))
+    assert ratio.p_value() < 0.05  # though the spread of what broke is larger than the difference
+    low, high = ratio.interval
+    assert 0.0 < low < ratio.shown < high < 1.0
     back = effect(broken, sound)
     assert np.log(back.interval) == pytest.approx(-np.log((high, low)), rel=3 * NOISE)
     # A claimed factor lies on the interval's end where its p-value is the level.
-    assert found.p_value(factor=1.0 / high) == pytest.approx(0.05)
-    assert found.p_value(factor=1.01 / high) > 0.05 > found.p_value(factor=0.99 / high)
+    assert ratio.p_value(factor=1.0 / high) == pytest.approx(0.05)
+    assert ratio.p_value(factor=1.01 / high) > 0.05 > ratio.p_value(factor=0.99 / high)
     assert effect(mean_over((0.0, 1.0)), mean_over((1.0, 1.0), "pbns")).scale == DIFFERENCE
 
 
 def test_where_nothing_is_repeated_there_is_no_interval_no_p_value_and_no_tie():
-    found = effect(mean_over(1.0), mean_over(1.0, "pbns"))
-    assert (found.interval, found.p_value(), found.covers, found.equal()) == (None, None, "", False)
+    ratio = effect(mean_over(1.0), mean_over(1.0, "pbns"))
+    assert (ratio.interval, ratio.p_value(), ratio.covers, ratio.equal()) == (None, None, "", False)
 
 
 def test_what_is_the_same_with_every_motion_was_not_repeated():
@@ -202,8 +206,8 @@ def test_what_is_the_same_with_every_motion_was_not_repeated():
     alone = effect(mean_over(times[0][:1]), mean_over(times[1][:1], "pbns"))
     assert several.covers == "seeds" and several.interval == pytest.approx(alone.interval, rel=1e-9)
     for cut in (np.s_[:, :1], np.s_[:, [0, 0, 0]]):
-        found = effect(mean_over(times[0][cut]), mean_over(times[1][cut], "pbns"))
-        assert (found.covers, found.interval, found.p_value()) == ("", None, None)
+        comparison = effect(mean_over(times[0][cut]), mean_over(times[1][cut], "pbns"))
+        assert (comparison.covers, comparison.interval, comparison.p_value()) == ("", None, None)
 
 
 def test_what_every_motion_repeats_exactly_is_certain():
@@ -233,8 +237,8 @@ def test_over_scenes_and_seeds_that_are_left_in_both():
         other.asked,
         other.missing,
     ) == (9, 5)
-    found = effect(one, other)
-    assert found.covers == "motions and seeds" and not found.complete
+    comparison = effect(one, other)
+    assert comparison.covers == "motions and seeds" and not comparison.complete
     rows = [r for r in rows if r.scene != "tshirt/2"]
     one, other = pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
     assert one.complete and not effect(one, other).complete and not effect(other, one).complete
@@ -246,32 +250,38 @@ def test_shares_of_excess_are_compared_by_logarithm_above_one_percent_and_by_dif
     assert on_scale(120.0, EXCESS) - on_scale(60.0, EXCESS) == pytest.approx(math.log(2.0), abs=1e-3)
     assert on_scale(0.02, EXCESS) - on_scale(0.01, EXCESS) == pytest.approx(0.01, rel=1e-3)
     motions = np.array([[2.0], [4.0], [8.0], [16.0]])
-    found = effect(mean_over(motions), mean_over(0.0 * motions, "simulation"), EXCESS)
-    assert found.shown == pytest.approx(np.sinh(np.arcsinh(motions).mean())) and found.shown < motions.mean()
-    low, high = found.interval
+    comparison = effect(mean_over(motions), mean_over(0.0 * motions, "simulation"), EXCESS)
+    assert (
+        comparison.shown == pytest.approx(np.sinh(np.arcsinh(motions).mean()))
+        and comparison.shown < motions.mean()
+    )
+    low, high = comparison.interval
     error = np.arcsinh(motions).std(ddof=1) / 2.0
     ends = np.sinh(t_interval(np.arcsinh(motions).mean(), error, 3))
     assert (low, high) == pytest.approx(tuple(ends), rel=3 * NOISE)
     less = effect(mean_over(0.5 * motions), mean_over(motions, "pbns"), EXCESS)
-    assert less.shown == pytest.approx(0.5 * found.shown - found.shown, rel=0.1) and less.interval[1] < 0.0
+    assert (
+        less.shown == pytest.approx(0.5 * comparison.shown - comparison.shown, rel=0.1)
+        and less.interval[1] < 0.0
+    )
 
 
 def test_points_between_two_shares_are_the_same_in_either_order():
     motions = np.array([[2.0], [4.0], [8.0], [16.0]])
     large = motions * np.array([[90.0], [150.0], [70.0], [120.0]])
-    there = effect(mean_over(motions), mean_over(large, "pbns"), EXCESS)
+    difference = effect(mean_over(motions), mean_over(large, "pbns"), EXCESS)
     back = effect(mean_over(large), mean_over(motions, "pbns"), EXCESS)
-    assert there.shown == pytest.approx(-back.shown)
-    low, high = there.interval
+    assert difference.shown == pytest.approx(-back.shown)
+    low, high = difference.interval
     assert (low, high) == pytest.approx((-back.interval[1], -back.interval[0]), rel=3 * NOISE)
-    assert high - low > 0.2 * abs(there.shown)  # the uncertainty of the larger one is seen
+    assert high - low > 0.2 * abs(difference.shown)  # the uncertainty of the larger one is seen
 
 
 def test_a_cost_has_the_range_of_what_was_measured_and_no_interval():
-    own, other = np.array([[2.0, 2.2], [3.0, 3.3]]), np.array([[4.0, 4.0], [9.0, 9.0]])
-    found = cost_effect(mean_over(own), mean_over(other, "pbns"))
-    assert found.covers == RANGE and found.p_value() is None
-    assert found.interval == pytest.approx((3.0 / 9.0, 2.2 / 4.0))
+    costs, other = np.array([[2.0, 2.2], [3.0, 3.3]]), np.array([[4.0, 4.0], [9.0, 9.0]])
+    comparison = cost_effect(mean_over(costs), mean_over(other, "pbns"))
+    assert comparison.covers == RANGE and comparison.p_value() is None
+    assert comparison.interval == pytest.approx((3.0 / 9.0, 2.2 / 4.0))
     alone = cost_effect(mean_over(2.0), mean_over(4.0, "pbns"))
     assert (alone.covers, alone.interval, alone.shown) == (RANGE, None, 0.5)
 
@@ -293,8 +303,8 @@ def test_the_uncertainty_is_the_standard_deviation_of_the_effect_over_the_ensemb
     """Each member takes the reference's place in all motions at once."""
     none = ((0.0, 0.0), (0.0, 0.0))
     snug = ((0.2, -0.1), (0.4, 0.3))
-    found = effect(*moved_means({"snug": snug, "pbns": none}), DIFFERENCE)
-    assert found.uncertainty == pytest.approx(np.std([0.0, 0.3, 0.1], ddof=1))
+    comparison = effect(*moved_means({"snug": snug, "pbns": none}), DIFFERENCE)
+    assert comparison.uncertainty == pytest.approx(np.std([0.0, 0.3, 0.1], ddof=1))
     # What a member does to both methods moves them not apart, on the scale of the test.
     both = effect(*moved_means({"snug": snug, "pbns": snug}), DIFFERENCE)
     assert both.uncertainty == pytest.approx(0.0)

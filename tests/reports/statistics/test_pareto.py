@@ -91,5 +91,5 @@ def test_a_point_is_of_the_seeds_that_did_every_scene():
     ]
     gone = {"seed": 1, "status": "diverged", "reason": "no end"}
     rows.append(row(SCENES[1], "snug", "cost/frame", None, **gone))
-    (found,) = points_of(run_of(rows), run_of(rows).frame, SCENES, "gap/energy")
-    assert (found.time, found.error, found.fewer) == (2.0, 2.0, " (2 of 4 roll-outs)")
+    (point,) = points_of(run_of(rows), run_of(rows).frame, SCENES, "gap/energy")
+    assert (point.time, point.error, point.fewer) == (2.0, 2.0, " (2 of 4 roll-outs)")

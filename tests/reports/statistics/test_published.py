@@ -54,8 +54,8 @@ def test_a_seed_among_those_published_is_reproduced_and_one_far_off_is_not(publi
 def test_segments_of_a_recording_count_as_one_motion(publish):
     scenes = ("tshirt/01_01_a", "tshirt/01_01_b", "tshirt/01_01_c", "tshirt/kick")
     publish(run_of({0: 5.0, 1: 5.0}, scenes, started="before", hard="tshirt/kick"))
-    said = published_beside(run_of({0: 5.0}, scenes, hard="tshirt/kick"), "snug")
-    assert said == "published 16 % on these motions: reproduced"  # between 5 and 50 on a scale of logarithms
+    note = published_beside(run_of({0: 5.0}, scenes, hard="tshirt/kick"), "snug")
+    assert note == "published 16 % on these motions: reproduced"  # between 5 and 50 on a scale of logarithms
 
 
 def test_the_interval_is_that_of_one_more_seed(publish):

@@ -31,21 +31,21 @@ def test_energies_are_listed_by_body_shape():
     (together,) = shapes(run_of(rows))
     names = [column.name for column in together.columns]
     assert names == ["scene", "method", "above", "energy/total", "energy/strain"]
-    found = {(line[0], line[1]): (None, *line[1:]) for line in together.rows}
-    assert list(found) == [(s, m) for s in ("other shapes", "mean shape") for m in ("simulation", "snug")]
-    together = found["other shapes", "snug"]
+    lines = {(line[0], line[1]): (None, *line[1:]) for line in together.rows}
+    assert list(lines) == [(s, m) for s in ("other shapes", "mean shape") for m in ("simulation", "snug")]
+    together = lines["other shapes", "snug"]
     assert together[2] == pytest.approx(0.7 - 0.45) and together[3].value == pytest.approx(0.7)
     assert (
-        found["mean shape", "snug"][2] == pytest.approx(0.05) and found["mean shape", "simulation"][2] is None
+        lines["mean shape", "snug"][2] == pytest.approx(0.05) and lines["mean shape", "simulation"][2] is None
     )
 
-    said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.250."
-    assert on_other_bodies(run_of(rows)) == said
+    sentence = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.250."
+    assert on_other_bodies(run_of(rows)) == sentence
     # A method that failed on a body is compared on the others, and the sentence says so.
     last = [row("shapes/1", "snug", "cost/frame", None, suite="shapes", status="diverged", reason="no end")]
     kept = [r for r in rows if (r.scene, r.method) != ("shapes/1", "snug")]
-    said = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.200 (1 of 2 roll-outs)."
-    assert on_other_bodies(run_of(kept + last)) == said
+    sentence = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.200 (1 of 2 roll-outs)."
+    assert on_other_bodies(run_of(kept + last)) == sentence
     one = [r for r in rows if r.scene == "shapes/0"]
     assert on_other_bodies(run_of(one)) == ""
     assert shapes(run_of(one)) == []

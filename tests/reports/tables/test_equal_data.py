@@ -20,16 +20,16 @@ def block(*names: str, families=("snug-data", "supervised-data")) -> list:
     rows = [row("tshirt/walk", "simulation", "energy/total", 0.25)]
     for family in families:
         for level, frames in ((0, 100.0), (12, 1300.0)):
-            own = {
+            columns = {
                 "role": "ablation", "family": family, "level": float(level), "base": family.split("-")[0],
             }  # fmt: skip
             name = f"{family}-{level}"
             for seed in (0, 1):
                 total = (1.0 if level else 4.0) + seed
-                rows.append(row("tshirt/walk", name, "energy/total", total, seed=seed, **own))
+                rows.append(row("tshirt/walk", name, "energy/total", total, seed=seed, **columns))
                 for metric, value in {**COSTS, "cost/train_frames": frames}.items():
-                    rows.append(row("tshirt/walk", name, metric, value, seed=seed, **own))
-            cleaned = own | {"family": f"{family}+cleanup", "base": name}
+                    rows.append(row("tshirt/walk", name, metric, value, seed=seed, **columns))
+            cleaned = columns | {"family": f"{family}+cleanup", "base": name}
             for metric, value in (("cost/train_frames", frames), ("energy/total", 0.5)):
                 rows.append(row("tshirt/walk", f"{name}+cleanup", metric, value, **cleaned))
     return rows
@@ -44,10 +44,10 @@ def test_each_method_of_the_block_has_its_frames_seconds_and_errors():
     lines = {line[1]: dict(zip([column.name for column in made.columns], line)) for line in made.rows}
     assert next(iter(lines)) == "simulation" and set(lines) == {"simulation", *members(run)}
     assert len(members(run)) == 8 and lines["simulation"]["cost/train"] is None
-    own = lines["snug-data-12"]
-    costs = {name: own[name].value for name in COSTS}
-    assert costs == COSTS and own["cost/train_frames"].value == 1300.0
-    total = own["energy/total"]
+    cells = lines["snug-data-12"]
+    costs = {name: cells[name].value for name in COSTS}
+    assert costs == COSTS and cells["cost/train_frames"].value == 1300.0
+    total = cells["energy/total"]
     assert total.value == 1.5 and total.spread == pytest.approx(np.sqrt(0.5)) and total.seeds == 2
     assert lines["snug-data-0"]["energy/total"].value == 4.5
     assert EQUAL_DATA(run_of([r for r in rows if r.method in ("simulation", "snug", "snug+lbfgs-4")])) == []

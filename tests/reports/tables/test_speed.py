@@ -25,12 +25,12 @@ def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_ro
 
 def test_every_network_has_its_crossings_in_a_table():
     (table,) = crossings(run_of(all_rows()))
-    found = {line[2]: line[4:6] for line in table.rows}
+    crossing_costs = {line[2]: line[4:6] for line in table.rows}
     assert {line[2]: line[3] for line in table.rows}["lbfgs-20"] == "energy gap"
     assert {line[1] for line in table.rows} == {"snug"}
-    assert found["simulation"] == (2000.0, pytest.approx(200.5, rel=1e-3))
+    assert crossing_costs["simulation"] == (2000.0, pytest.approx(200.5, rel=1e-3))
     assert {line[2]: line[6:] for line in table.rows}["simulation"] == (pytest.approx(200.0), 400.0)
-    frames = {method: frame for method, (frame, _) in found.items()}
+    frames = {method: frame for method, (frame, _) in crossing_costs.items()}
     assert frames == {"simulation": 2000.0, "lbfgs-20": 13000.0, "lbfgs-5": 53000.0}
     others = run_of([r for r in all_rows() if "snug" not in r.method])
     assert crossings(others) == error_rivals(others) == []
@@ -48,16 +48,16 @@ def test_garments_have_crossings_by_themselves():
     run = run_of(rows)
     assert list(compared_scenes(run, run.cells("speed"))) == ["tshirt", "tunic"]
     (table,) = crossings(run)
-    found = {line[0]: line[4] for line in table.rows if line[2] == "simulation"}
-    assert found == {"tshirt": 2000.0, "tunic": 2000.0}
+    frames = {line[0]: line[4] for line in table.rows if line[2] == "simulation"}
+    assert frames == {"tshirt": 2000.0, "tunic": 2000.0}
 
 
 def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():
     run = run_of(all_rows())
     assert cost_sentence(run).endswith(
         " times as long, the fastest solver stopped early whose energy gap is no larger 16.0 ms (L-BFGS, 20 "
-        "iterations). SNUG has an energy gap, the energy above the minimum of each time step, of 0.100 J; of "
-        "the methods measured here none is as fast and has a smaller gap."
+        "iterations). SNUG has an energy gap, the energy above the minimum of each time step, of 0.100 J; "
+        "no method timed here is as fast with a smaller gap."
     )
     (table,) = error_rivals(run)
     assert table.rows == (

@@ -36,10 +36,10 @@ def rows_of():
 def made(tmp_path_factory) -> RunFolder:
     folder = RunFolder(tmp_path_factory.mktemp("run"))
     folder.write_rows(rows_of())
-    said = declaration(rows_of())
-    said["methods"][NASTY] = {"label": NASTY}
-    said["metrics"]["energy/collision"]["title"] = "Touch_ing, 5 %"
-    folder.write_config(said)
+    config = declaration(rows_of())
+    config["methods"][NASTY] = {"label": NASTY}
+    config["metrics"]["energy/collision"]["title"] = "Touch_ing, 5 %"
+    folder.write_config(config)
     folder.tables.mkdir()
     (folder.tables / "of_before.tex").touch()
     run = read_run_with_trainings(folder)
@@ -112,25 +112,25 @@ def read_dictionary(folder) -> dict[tuple[str, str], dict[str, str]]:
 
 
 def test_the_dictionary_has_every_column_and_what_every_row_holds(made):
-    found, rows = read_dictionary(made), made.read_rows()
-    columns = [name for kind, name in found if kind == "column"]
+    entries, rows = read_dictionary(made), made.read_rows()
+    columns = [name for kind, name in entries if kind == "column"]
     assert columns == list(results.COLUMNS) == [f.name for f in dataclasses.fields(results.Row)]
     cases = read_run(made).config["cases"]
     for r in rows:
         kind, name = ("case", f"{r.scene} {r.metric}") if r.scene in cases else ("metric", r.metric)
-        assert found[kind, name]["unit"] == r.unit
-    assert found["metric", "energy/strain"]["definition"] == "definition of energy/strain"
-    assert found["metric", "energy/strain"]["better"] == "lower"
-    assert ("metric", "check") not in found and all(line["definition"] for line in found.values())
+        assert entries[kind, name]["unit"] == r.unit
+    assert entries["metric", "energy/strain"]["definition"] == "definition of energy/strain"
+    assert entries["metric", "energy/strain"]["better"] == "lower"
+    assert ("metric", "check") not in entries and all(line["definition"] for line in entries.values())
 
 
 def test_two_columns_of_one_heading_keep_their_own_numbers(tmp_path):
     rows = [
         row("tshirt/walk", "snug", f"energy/{name}", value) for name, value in (("strain", 1.0), ("own", 5.0))
     ]
-    said = declaration(rows)
-    said["metrics"]["energy/own"]["title"] = said["metrics"]["energy/strain"]["title"]
-    run = make_run(said, rows)
+    config = declaration(rows)
+    config["metrics"]["energy/own"]["title"] = config["metrics"]["energy/strain"]["title"]
+    run = make_run(config, rows)
     (line,) = [line for line in latex.latex(run, make_tables(run)["energies"]).splitlines() if "SNUG" in line]
     assert "1.00" in line and "5.00" in line
 

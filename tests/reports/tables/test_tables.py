@@ -94,8 +94,8 @@ def test_garments_have_their_own_means_and_stand_as_they_are_declared():
         "tunic": ["tunic/stop"],
     }
     assert list(run.garments(run.garment_rows[run.garment_rows["garment"] == "tunic"])) == ["tunic"]
-    found = [(line[0], line[2].value) for line in make_tables(run)["energies"].rows]
-    assert found == [("tshirt", 2.0), ("tunic", 9.0)]
+    means = [(line[0], line[2].value) for line in make_tables(run)["energies"].rows]
+    assert means == [("tshirt", 2.0), ("tunic", 9.0)]
 
 
 def test_a_cell_of_two_suites_counts_once_in_its_own_table():
@@ -204,8 +204,8 @@ def test_ablations_are_compared_over_the_scenes_that_both_have():
 
 def test_pairs_share_their_scenes_or_have_their_own():
     rows = [*on_two_scenes("snug", 1.0, 9.0), row(SCENES[1], "pbns", "energy/total", 4.0)]
-    own, other = pair(run_of(rows).frame, "snug", "pbns", "energy/total")
-    assert (own.value, other.value, own.complete) == (9.0, 4.0, False)
+    mean, other = pair(run_of(rows).frame, "snug", "pbns", "energy/total")
+    assert (mean.value, other.value, mean.complete) == (9.0, 4.0, False)
     apart = [row(SCENES[0], metric="energy/total"), row(SCENES[1], "pbns", "energy/total")]
     assert pair(run_of(apart).frame, "snug", "pbns", "energy/total") == (None, None)
     assert pair(run_of(rows[:2]).frame, "snug", "pbns", "energy/total")[0].value == 5.0

@@ -44,7 +44,7 @@ def test_pairs_in_the_wrong_order_are_counted(rows):
 
 def test_errors_are_drawn_against_run_time(rows):
     points = points_of_tests(run_of(rows))
-    assert {test: [(p.method, p.time, p.error) for p in found] for test, found in points.items()} == {
+    assert {test: [(p.method, p.time, p.error) for p in series] for test, series in points.items()} == {
         "cantilever": [("simulation", 4.0, pytest.approx(0.01)), ("vbd-5", 0.5, 3.0)],
         "drape": [("simulation", 50.0, pytest.approx(0.01)), ("vbd-5", 5.0, 9.0)],
     }

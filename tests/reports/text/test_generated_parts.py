@@ -42,29 +42,29 @@ def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys)
     right = f"A\n{BEGIN.format('table overview of quick; method, relative_excess')}\n{part}\n{END}\nB\n"
     readme.write_text(right.replace("| Skinning alone | 100 ", "| Skinning alone | 99 "), encoding="utf-8")
     assert readme.read_text(encoding="utf-8") != right
-    (found,) = documents(tmp_path)
-    assert found == (readme, readme.read_text(encoding="utf-8"), right)
+    (document,) = documents(tmp_path)
+    assert document == (readme, readme.read_text(encoding="utf-8"), right)
 
 
 def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
     with pytest.raises(ValueError, match="needs an"):
-        fill(BEGIN.format("headline of quick"), lambda words: "")
-    for words, said in (
+        fill(BEGIN.format("headline of quick"), lambda request: "")
+    for request, message in (
         ("everything of quick", "known: headline"),
         ("table nothing of quick", "no table nothing; it has"),
         ("table overview of quick; colour", "no column colour; it has"),
     ):
-        with pytest.raises(ValueError, match=said):
-            published_part(words)
+        with pytest.raises(ValueError, match=message):
+            published_part(request)
 
 
 @pytest.mark.parametrize(("kind", "claims"), [("primary", PRIMARY), ("exploratory", EXPLORATORY)])
 def test_every_claim_has_a_row_whether_or_not_a_run_judges_it(kind, claims):
     lines = published_part(f"claims {kind} of {JUDGED}").splitlines()[2:]
     assert len(lines) == len(claims)
-    said = [line.split(" | ") for line in lines]
-    assert all((cells[8] == "not measured") == (cells[9] == "– |") for cells in said)
-    assert any(cells[8] != "not measured" for cells in said)
+    rows = [line.split(" | ") for line in lines]
+    assert all((cells[8] == "not measured") == (cells[9] == "– |") for cells in rows)
+    assert any(cells[8] != "not measured" for cells in rows)
 
 
 def test_each_run_has_a_row_with_its_commit_and_a_metric_its_definition():

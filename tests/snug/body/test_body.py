@@ -44,8 +44,8 @@ def test_t_pose_faces_z_with_the_left_arm_along_x(body):
     heights = [at[name][1] for name in ("left_ankle", "left_knee", "pelvis", "spine2", "neck", "head")]
     assert np.all(np.diff(heights) > 0)
     mirrored = body.joint_template[[joint(n.replace("left", "right")) for n in JOINT_NAMES if "left" in n]]
-    own = body.joint_template[[joint(n) for n in JOINT_NAMES if "left" in n]]
-    np.testing.assert_allclose(mirrored * [-1, 1, 1], own, atol=1e-3)
+    left_joints = body.joint_template[[joint(n) for n in JOINT_NAMES if "left" in n]]
+    np.testing.assert_allclose(mirrored * [-1, 1, 1], left_joints, atol=1e-3)
 
 
 def test_shapes_start_at_the_template_and_the_first_one_is_height(body):

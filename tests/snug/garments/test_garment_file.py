@@ -111,8 +111,8 @@ def test_borrowed_weights_are_smoothed_as_a_recipe_says(tmp_path, body, tube):
 
 def test_a_garment_follows_the_limbs_that_it_encloses_and_no_other(tmp_path, body, shirt):
     names = np.array(body.joint_names)
-    own = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
-    strongest = set(names[np.unique(own.skinning_weights.argmax(axis=1))])
+    garment = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
+    strongest = set(names[np.unique(garment.skinning_weights.argmax(axis=1))])
     assert strongest <= {"pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip", "left_collar",
                          "right_collar", "left_shoulder", "right_shoulder"}  # fmt: skip
     assert {"spine3", "left_shoulder", "right_shoulder"} <= strongest
@@ -163,16 +163,16 @@ def file_scene(file):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "words"),
+    ("spoil", "options"),
     [
         (lambda x: 100 * x, "--garment-units cm"),
         (z_up, "--garment-up z"),
         (lambda x: z_up(x) / 0.0254, "--garment-units in --garment-up z"),
     ],
 )
-def test_another_unit_or_axis_is_found(tmp_path, body, shirt, spoil, words):
+def test_another_unit_or_axis_is_found(tmp_path, body, shirt, spoil, options):
     path = saved(tmp_path, shirt, positions=spoil(shirt.rest_positions))
-    with pytest.raises(GarmentError, match=rf"{path}: does not lie on the body .*: {words}$"):
+    with pytest.raises(GarmentError, match=rf"{path}: does not lie on the body .*: {options}$"):
         read_garment(GarmentFile(path=path), body)
 
 
@@ -194,48 +194,48 @@ def closed(tube):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "words"),
+    ("spoil", "message"),
     [
         (lambda t: np.concatenate([t.faces, t.faces[5:6]]), "triangles 5 and 270 are the same: remove one"),
         (lambda t: np.where(np.arange(len(t.faces))[:, None] == 9, t.faces[:, ::-1], t.faces), "same way"),
         (closed, "none: the surface is closed"),
     ],
 )
-def test_a_mesh_that_cannot_be_simulated_is_named(tmp_path, body, tube, spoil, words):
+def test_a_mesh_that_cannot_be_simulated_is_named(tmp_path, body, tube, spoil, message):
     path = saved(tmp_path, tube, faces=spoil(tube))
-    with pytest.raises(GarmentError, match=words):
+    with pytest.raises(GarmentError, match=message):
         read_garment(GarmentFile(path=path), body)
 
 
 @pytest.mark.parametrize(
-    ("weights", "words"),
+    ("weights", "message"),
     [
         (np.ones((150, 24)), "weights of vertex 0 are negative or sum to 24"),
         (np.full((150, 20), 0.05), r"expected numbers \(150, 24\)"),
         (np.full((150, 24), np.nan), "weights of vertex 0"),
     ],
 )
-def test_wrong_weights_are_refused(tmp_path, body, tube, weights, words):
+def test_wrong_weights_are_refused(tmp_path, body, tube, weights, message):
     path = saved(tmp_path, tube)
     np.savez(tmp_path / "mine.weights.npz", weights=weights)
-    with pytest.raises(GarmentError, match=words):
+    with pytest.raises(GarmentError, match=message):
         read_garment(GarmentFile(path=path), body)
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"),
+    ("arguments", "expected"),
     [
         (["--garment-shift=-1,2"], "give three numbers"),
         (["--garment-uv-scale", "2"], "add --garment-rest uv"),
     ],
 )
-def test_an_option_that_means_nothing_is_refused(words, expected):
+def test_an_option_that_means_nothing_is_refused(arguments, expected):
     parser = argparse.ArgumentParser()
     add_garment_options(parser)
     with pytest.raises(ValueError, match=expected):
-        make_garment_file("a.obj", parser.parse_args(words))
+        make_garment_file("a.obj", parser.parse_args(arguments))
     with pytest.raises(ValueError, match="add --garment FILE"):
-        demand_garment_file(parser.parse_args(words))
+        demand_garment_file(parser.parse_args(arguments))
 
 
 # --- the command that says all of it -----------------------------------------------------------------------
@@ -245,9 +245,9 @@ def test_check_says_what_was_found_and_how_to_mend_it(tmp_path, capsys, tube):
     good = saved(tmp_path, tube, faces=tube.faces[:, ::-1], name="good.obj")
     picture = tmp_path / "good.png"
     assert check.main([str(good), "--picture", str(picture)]) == check.USABLE
-    told = capsys.readouterr().out
-    assert "good.obj: can be used" in told and "inside out; turned as it is read" in told
-    assert "neck (15 vertices), hem (15 vertices)" in told and picture.read_bytes()[:4] == b"\x89PNG"
+    output = capsys.readouterr().out
+    assert "good.obj: can be used" in output and "inside out; turned as it is read" in output
+    assert "neck (15 vertices), hem (15 vertices)" in output and picture.read_bytes()[:4] == b"\x89PNG"
 
     bad = saved(tmp_path, tube, positions=1000 * tube.rest_positions, name="bad.obj")
     assert check.main([str(good), str(bad)]) == check.UNUSABLE
@@ -268,9 +268,9 @@ def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_pa
         raise ValueError("seen enough")
 
     monkeypatch.setattr(train_to_file, "train_network", stop)
-    words = ["--garment", str(path), "--garment-rest", "uv", "--garment-uv-scale", "0.01"]
-    words += ["--garment-material", str(tmp_path / "silk.toml"), "-o", str(tmp_path / "a.safetensors")]
-    assert train_command.main(words) == 2
+    arguments = ["--garment", str(path), "--garment-rest", "uv", "--garment-uv-scale", "0.01"]
+    arguments += ["--garment-material", str(tmp_path / "silk.toml"), "-o", str(tmp_path / "a.safetensors")]
+    assert train_command.main(arguments) == 2
     (dressed,) = seen
     assert dressed.cloth.material == Material(density=300.0) and dressed.vertices == 150
     np.testing.assert_allclose(dressed.cloth.rest_uv, own_chart(tube.rest_positions, tube.faces))

@@ -46,10 +46,10 @@ def face_normals(points, faces):
 
 
 def test_openings_are_named_by_their_place(body, garment):
-    found = name_openings(body, garment.rest_positions, garment.faces)
-    assert found.keys() == garment.loops.keys()
+    openings = name_openings(body, garment.rest_positions, garment.faces)
+    assert openings.keys() == garment.loops.keys()
     for name, loop in garment.loops.items():
-        np.testing.assert_array_equal(found[name], loop)
+        np.testing.assert_array_equal(openings[name], loop)
 
 
 def at(body, name):
@@ -302,13 +302,13 @@ def test_arms_are_bare_or_covered_to_the_wrist(body, wardrobe):
 
 def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
     dress = wardrobe["dress"]
-    own = body.skinning_weights[dress.body_vertices]
+    body_weights = body.skinning_weights[dress.body_vertices]
     y, hip = dress.rest_positions[:, 1], at(body, "left_hip")[1]
-    assert np.array_equal(dress.skinning_weights[y > hip + 0.05], own[y > hip + 0.05])
+    assert np.array_equal(dress.skinning_weights[y > hip + 0.05], body_weights[y > hip + 0.05])
     _, edges, _ = edge_counts(dress.faces)
     low = (y[edges] < hip - 0.06).all(axis=1)
     steps, borrowed = (
-        np.abs(w[edges[low, 0]] - w[edges[low, 1]]).max() for w in (dress.skinning_weights, own)
+        np.abs(w[edges[low, 0]] - w[edges[low, 1]]).max() for w in (dress.skinning_weights, body_weights)
     )
     assert steps < 0.2 and borrowed > 0.5
     assert np.allclose(dress.skinning_weights.sum(axis=1), 1.0, atol=1e-12)

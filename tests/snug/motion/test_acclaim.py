@@ -63,7 +63,7 @@ GOOD = [amc_frame(1), amc_frame(2)]
 
 class TestBrokenFiles:
     @pytest.mark.parametrize(
-        ("change", "words"),
+        ("change", "message"),
         [
             (lambda text: "", "empty"),
             (lambda text: ":DEGREES\n", "no frame"),
@@ -76,15 +76,15 @@ class TestBrokenFiles:
             (lambda text: "head 0.0\n" + text, "line 1.*before the first frame"),
         ],
     )
-    def test_clip(self, tmp_path, change, words):
+    def test_clip(self, tmp_path, change, message):
         clip = write_clip(tmp_path, GOOD)
         clip.write_text(change(clip.read_text()))
-        with pytest.raises(MotionError, match=words) as caught:
+        with pytest.raises(MotionError, match=message) as caught:
             load_motions(clip)
         self.check_line(caught, "07_01.amc")
 
     @pytest.mark.parametrize(
-        ("change", "words"),
+        ("change", "message"),
         [
             (lambda text: "", "empty"),
             (lambda text: "solid cube\n" + text, "line 1.*is it an .asf file"),
@@ -105,9 +105,9 @@ class TestBrokenFiles:
             (lambda text: text.replace("name ltibia", "name lfemur"), "bone: 'lfemur'"),
         ],
     )
-    def test_skeleton(self, tmp_path, change, words):
+    def test_skeleton(self, tmp_path, change, message):
         clip = write_clip(tmp_path, GOOD, skeleton=change(cmu_like()) or " ")
-        with pytest.raises(MotionError, match=words) as caught:
+        with pytest.raises(MotionError, match=message) as caught:
             load_motions(clip)
         self.check_line(caught, "07")
 
@@ -117,13 +117,13 @@ class TestBrokenFiles:
         notes, empty = tmp_path / "notes.txt", tmp_path / "empty"
         notes.write_text("hello")
         empty.mkdir()
-        for path, words in (
+        for path, message in (
             (clip, "skeleton 07.asf is missing"),
             (tmp_path / "none.amc", "no such file"),
             (notes, "unknown kind"),
             (empty, "holds no"),
         ):
-            with pytest.raises(MotionError, match=words) as caught:
+            with pytest.raises(MotionError, match=message) as caught:
                 load_motions(path)
             self.check_line(caught, path.name)
 

@@ -128,9 +128,9 @@ class TestRecordedClips:
             turn = Rotation.identity(len(channels["root"]))
             if order:
                 turn = Rotation.from_euler("".join(c[1] for c in order), channels[bone.name][:, columns])
-            own = Rotation.from_matrix(bone.axes)
+            axes = Rotation.from_matrix(bone.axes)
             turned[bone.name] = (
-                (turned[bone.parent] if bone.parent else Rotation.identity()) * own * turn * own.inv()
+                (turned[bone.parent] if bone.parent else Rotation.identity()) * axes * turn * axes.inv()
             )
         motion = read_motion(CLIPS / f"{name}.amc", MotionFileOptions(repair=True))
         positions = joint_positions(motion.poses, motion.translations, Body.load().joints())

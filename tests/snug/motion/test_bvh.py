@@ -99,26 +99,26 @@ MIXAMORIG = ", ".join(f"mixamorig:{MIXAMO[name]} {PARENTS[k]}" for k, name in en
 
 def known(skeleton):
     names, parents = zip(*(joint.strip().rsplit(" ", 1) for joint in skeleton.split(",")), strict=True)
-    found = match_joints(Path("a.bvh"), names, [int(parent) for parent in parents], None)
-    return {ours: names[index] for ours, index in found.items()}
+    indices = match_joints(Path("a.bvh"), names, [int(parent) for parent in parents], None)
+    return {ours: names[index] for ours, index in indices.items()}
 
 
 def test_common_skeletons_are_known_without_a_map():
     mixamo = known(MIXAMORIG)
     assert len(mixamo) == 22  # all but the fingers
     assert all(theirs == f"mixamorig:{MIXAMO[ours]}" for ours, theirs in mixamo.items())
-    found = known(CMU)
-    assert [found[f"spine{k}"] for k in (1, 2, 3)] == ["LowerBack", "Spine", "Spine1"]
-    assert (found["pelvis"], found["neck"], found["head"]) == ("Hips", "Neck1", "Head")
-    assert (found["left_collar"], found["left_shoulder"]) == ("LeftShoulder", "LeftArm")
-    assert "right_foot" not in found
-    found = known(BIOVISION)
-    assert found["spine1"] == "Chest" and "spine2" not in found and "spine3" not in found
-    assert found["left_shoulder"] == "LeftShoulder" and found["left_collar"] == "LeftCollar"
-    found = known(UPPER)  # arms after bones, legs after joints
-    assert (found["left_collar"], found["left_shoulder"]) == ("LeftShoulder", "LeftUpperArm")
-    assert (found["right_ankle"], found["right_foot"]) == ("RightFoot", "RightToe")
-    assert [found[f"spine{k}"] for k in (1, 2, 3)] == ["Spine", "Chest", "UpperChest"]
+    mapping = known(CMU)
+    assert [mapping[f"spine{k}"] for k in (1, 2, 3)] == ["LowerBack", "Spine", "Spine1"]
+    assert (mapping["pelvis"], mapping["neck"], mapping["head"]) == ("Hips", "Neck1", "Head")
+    assert (mapping["left_collar"], mapping["left_shoulder"]) == ("LeftShoulder", "LeftArm")
+    assert "right_foot" not in mapping
+    mapping = known(BIOVISION)
+    assert mapping["spine1"] == "Chest" and "spine2" not in mapping and "spine3" not in mapping
+    assert mapping["left_shoulder"] == "LeftShoulder" and mapping["left_collar"] == "LeftCollar"
+    mapping = known(UPPER)  # arms after bones, legs after joints
+    assert (mapping["left_collar"], mapping["left_shoulder"]) == ("LeftShoulder", "LeftUpperArm")
+    assert (mapping["right_ankle"], mapping["right_foot"]) == ("RightFoot", "RightToe")
+    assert [mapping[f"spine{k}"] for k in (1, 2, 3)] == ["Spine", "Chest", "UpperChest"]
 
 
 @pytest.mark.parametrize(
@@ -136,10 +136,10 @@ def test_skeletons_of_other_programs_are_known(names, sides):
     left, right = ([limb.format(side) for limb in limbs] for side in sides)
     parents = [0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11]
     joints = [*left, *right]
-    found = known(", ".join([f"{root} -1", *(f"{j} {p}" for j, p in zip(joints, parents)), f"{head} 0"]))
+    mapping = known(", ".join([f"{root} -1", *(f"{j} {p}" for j, p in zip(joints, parents)), f"{head} 0"]))
     for side, theirs in (("left", left), ("right", right)):
-        assert [found[f"{side}_{joint}"] for joint in NEEDED] == theirs
-    assert (found["pelvis"], found["head"]) == (root, head)
+        assert [mapping[f"{side}_{joint}"] for joint in NEEDED] == theirs
+    assert (mapping["pelvis"], mapping["head"]) == (root, head)
 
 
 def test_a_map_names_joints_that_no_guess_finds(tmp_path):
@@ -155,14 +155,14 @@ def test_a_map_names_joints_that_no_guess_finds(tmp_path):
     np.testing.assert_array_equal(
         mapped.poses, read_motion(written(tmp_path / "b.bvh"), MotionFileOptions()).poses
     )
-    for text, words in (
+    for text, message in (
         ('left_hip = "bone99"', "no joint 'bone99' for left_hip; did you mean bone9"),
         ('left_tail = "bone1"', "'left_tail' is none of our joints"),
         ("left_hip = ", "not a TOML file"),
         (table.read_text().replace('bone4"', 'bone5"', 1), "'bone5' taken for left_knee does not hang below"),
     ):
         table.write_text(text)
-        with pytest.raises(MotionError, match=words):
+        with pytest.raises(MotionError, match=message):
             read_motion(path, MotionFileOptions(joint_map=table))
     with pytest.raises(MotionError, match=r"none\.toml: cannot be read"):
         read_motion(path, MotionFileOptions(joint_map=tmp_path / "none.toml"))
@@ -202,7 +202,7 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         (lambda text: "", "ends before it is whole"),
         (lambda text: "solid\n" + text, "line 1: 'solid' where 'HIERARCHY' should be"),
@@ -224,10 +224,10 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
         (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
     ],
 )
-def test_a_broken_file_is_refused_by_name(tmp_path, change, words):
+def test_a_broken_file_is_refused_by_name(tmp_path, change, message):
     path = written(tmp_path / "clip.bvh")
     path.write_text(change(path.read_text()))
-    with pytest.raises(MotionError, match=words) as caught:
+    with pytest.raises(MotionError, match=message) as caught:
         read_motion(path, MotionFileOptions())
     assert "clip.bvh" in str(caught.value) and "\n" not in str(caught.value)
 

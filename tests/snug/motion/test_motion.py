@@ -200,7 +200,7 @@ def test_names_list_equals_the_tables():
 
 
 @pytest.mark.parametrize(
-    ("poses", "translations", "fps", "words"),
+    ("poses", "translations", "fps", "message"),
     [
         (np.zeros((3, 23, 3)), np.zeros((3, 3)), 30.0, "24, 3"),
         (np.zeros((0, 24, 3)), np.zeros((0, 3)), 30.0, "24, 3"),
@@ -209,8 +209,8 @@ def test_names_list_equals_the_tables():
         (np.zeros((3, 24, 3)), np.zeros((3, 3)), 0.0, "frames per second"),
     ],
 )
-def test_a_motion_that_is_none_is_refused(poses, translations, fps, words):
-    with pytest.raises(MotionError, match=words):
+def test_a_motion_that_is_none_is_refused(poses, translations, fps, message):
+    with pytest.raises(MotionError, match=message):
         Motion("bad", poses, translations, fps)
 
 

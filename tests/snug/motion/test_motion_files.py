@@ -25,13 +25,13 @@ def write(path, motion, turn=Y_UP, **changes):
     return path
 
 
-def refused(path, words, **reading):
-    """Return whether reading is refused in one line that names the file; assert that it matches `words`."""
+def refused(path, pattern, **reading):
+    """Return whether reading is refused in one line that names the file; assert that it matches `pattern`."""
     with pytest.raises(MotionError) as caught:
         load_motions(path, options=MotionFileOptions(**reading))
-    said = str(caught.value)
-    assert re.search(words, said), said
-    return path.name in said and "\n" not in said and len(said) < 500
+    message = str(caught.value)
+    assert re.search(pattern, message), message
+    return path.name in message and "\n" not in message and len(message) < 500
 
 
 def angles(poses, others):
@@ -69,7 +69,7 @@ class TestForms:
         assert (motion.translations == 0).all() and "the root stays" in motion.source
 
     @pytest.mark.parametrize(
-        ("changes", "words"),
+        ("changes", "pattern"),
         [
             ({"poses": KICK.poses[:, :23, None]}, r"'poses' has shape \(40, 23, 1, 3\)"),
             ({"poses": KICK.poses[:, :21]}, "no array 'root_orient'"),
@@ -87,8 +87,8 @@ class TestForms:
             ({"fps": np.array([30.0, 30.0])}, "one number"),
         ],
     )
-    def test_what_is_no_motion_is_refused(self, tmp_path, changes, words):
-        assert refused(write(tmp_path / "clip.npz", KICK, **changes), words)
+    def test_what_is_no_motion_is_refused(self, tmp_path, changes, pattern):
+        assert refused(write(tmp_path / "clip.npz", KICK, **changes), pattern)
 
     def test_rotations_that_are_none_are_refused(self, tmp_path):
         path, rest = tmp_path / "clip.npz", {"trans": KICK.translations, "fps": 30.0}

@@ -44,9 +44,9 @@ def taught(kind, steps, **changes):
 def test_a_taught_baseline_learns_its_targets(kind, narrow):
     model, motion = taught(kind, 30, learning_rate=4e-3, window=4 if kind != "tailornet" else 1)
     assert model.history[-1]["loss"] < 0.5 * model.history[0]["loss"]
-    target, found = puffed(motion), roll_out(model, tube_dress(), motion).positions
+    target, positions = puffed(motion), roll_out(model, tube_dress(), motion).positions
     skinned = tube_dress().skinned(motion, smoothing=20)
-    error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (found, skinned))
+    error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (positions, skinned))
     assert error < 0.5 * start
 
 

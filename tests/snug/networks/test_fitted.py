@@ -82,8 +82,8 @@ def test_the_regression_is_ridge_by_another_road():
     target = np.concatenate([y_centred @ directions.T, np.zeros((12, COMPONENTS))])
     weights = np.linalg.lstsq(stacked, target, rcond=None)[0]
     expected = y.mean(0) + x_centred @ weights @ directions
-    found = network(poses[:, None])[0][:, 0].flatten(1).detach().numpy()
-    assert np.abs(found - expected).max() < 1e-3 * np.abs(expected - y.mean(0)).max()
+    prediction = network(poses[:, None])[0][:, 0].flatten(1).detach().numpy()
+    assert np.abs(prediction - expected).max() < 1e-3 * np.abs(expected - y.mean(0)).max()
 
 
 def test_damped_offsets_are_those_of_skin_but_where_a_blend_is_nearly_singular():
@@ -91,8 +91,8 @@ def test_damped_offsets_are_those_of_skin_but_where_a_blend_is_nearly_singular()
     weights, transforms = dressed.weights(20), dressed.transforms(motion.poses)
     offsets = 0.05 * torch.sin(40 * dressed.rest())
     posed = skin(dressed.rest() + offsets, weights, transforms)
-    found = unskin_damped(posed, dressed.rest(), weights, transforms, 1e-6)
-    assert torch.allclose(found, offsets.expand_as(found), atol=1e-5)
+    estimate = unskin_damped(posed, dressed.rest(), weights, transforms, 1e-6)
+    assert torch.allclose(estimate, offsets.expand_as(estimate), atol=1e-5)
     turned = torch.zeros(1, 2, 3, 4)  # two joints half a turn apart: the mean of their maps flattens
     turned[0, 0, :, :3], turned[0, 1, :, :3] = torch.eye(3), torch.diag(torch.tensor([-1.0, -1.0, 1.0]))
     half = torch.full((1, 2), 0.5)
@@ -103,21 +103,21 @@ def test_damped_offsets_are_those_of_skin_but_where_a_blend_is_nearly_singular()
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fitted_model_follows_its_training_motion_and_loads_as_it_was(kind, tmp_path):
     model, target = fitted(kind)
-    found = roll_out(model, tube_dress(), swaying(40)).positions
+    positions = roll_out(model, tube_dress(), swaying(40)).positions
     start = tube_dress().skinned(swaying(40), smoothing=20)
     assert (
-        np.abs(found - target).max()
+        np.abs(positions - target).max()
         < (0.02 if kind == "nearest-poses" else 0.5) * np.abs(start - target).max()
     )
     # The loss is the mean squared distance [cm^2] of the roll-out from the frames.
-    squared = 1e4 * ((found - target) ** 2).sum(-1).mean()
+    squared = 1e4 * ((positions - target) ** 2).sum(-1).mean()
     assert model.unit == "cm²" and model.history[0]["loss"] == pytest.approx(squared, rel=1e-2)
     assert model.summary["training_frames"] == 40
     loaded = TrainedModel.load(model.save(tmp_path / "model.safetensors"))
     again = roll_out(loaded, tube_dress(), swaying(40)).positions
-    assert np.array_equal(again, found)
+    assert np.array_equal(again, positions)
     still = roll_out(loaded, tube_dress(), swaying(40), quasi_static=True).positions
-    assert np.abs(still - found).max() < 2e-5  # it has no dynamics
+    assert np.abs(still - positions).max() < 2e-5  # it has no dynamics
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -45,13 +45,13 @@ def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
 def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path, narrow):
     model, motion = random_model(kind), swaying(8)
     expected, offsets = by_torch(model, motion)
-    found = roll_out(model, tube_dress(), motion).positions
+    positions = roll_out(model, tube_dress(), motion).positions
     loaded = TrainedModel.load(model.save(tmp_path / "model.safetensors"))
-    assert np.array_equal(roll_out(loaded, tube_dress(), motion).positions, found)
+    assert np.array_equal(roll_out(loaded, tube_dress(), motion).positions, positions)
     assert loaded.megabytes == model.megabytes
     size = np.abs(offsets).max()
     assert size > 0.03 and (offsets[:, PINS] == 0.0).all()
-    assert np.abs(found - expected).max() < 3e-6 * max(size, 1.0)
+    assert np.abs(positions - expected).max() < 3e-6 * max(size, 1.0)
 
 
 @pytest.mark.parametrize(("vertices", "joints"), [(1, 2), (63, 5), (64, 24), (200, 24)])

@@ -70,10 +70,10 @@ def test_a_static_network_does_not_drift_and_a_spoilt_one_is_named(tmp_path):
         moving.network.offsets.bias[0] = torch.nan
     moving.save(model_path(tmp_path, "snug", 0))
     trajectory, static = rolled(scene, tmp_path, "pbns")
-    found = metric.measure(static)
-    assert trajectory.frames == scene.frames == 2 * ENDS and found["roll_out/drift"] < 1e-3
-    assert found["roll_out/first"] == pytest.approx(found["roll_out/last"], rel=1e-4)
-    assert found["roll_out/first"] > 0.0
+    measures = metric.measure(static)
+    assert trajectory.frames == scene.frames == 2 * ENDS and measures["roll_out/drift"] < 1e-3
+    assert measures["roll_out/first"] == pytest.approx(measures["roll_out/last"], rel=1e-4)
+    assert measures["roll_out/first"] > 0.0
     trajectory, spoilt = rolled(scene, tmp_path, "snug")
     assert judge(trajectory, Reading(0.0), scene, truncated=False)[0] == "diverged"
     assert metric.measure(spoilt) == {}
@@ -113,16 +113,16 @@ def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_
     scene = find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, walk))
     model = untrained_model("snug", dressed, [walk], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
-    trajectory, found = rolled(scene, tmp_path, "snug")
+    trajectory, record = rolled(scene, tmp_path, "snug")
     motion, early, late = long_motion.looped(walk, SMOKE.loop_frames)
     assert set(scene.kept) == {*range(0, SMOKE.loop_frames, EVERY), *early, *late}
     whole = roll_out(model, dressed, motion).positions
     assert np.array_equal(trajectory.positions, whole[scene.kept])
     assert [scene.kept[places].tolist() for places in scene.repeated] == [early.tolist(), late.tolist()]
     bare = dressed.skinned(motion, smoothing=20)
-    assert skinned(found.group) == pytest.approx(bare[scene.kept], abs=1e-12)
+    assert skinned(record.group) == pytest.approx(bare[scene.kept], abs=1e-12)
     # The state of an untrained network is soon forgotten.
-    assert 0.0 < metric.measure(found)["roll_out/drift"] < 1.0
+    assert 0.0 < metric.measure(record)["roll_out/drift"] < 1.0
 
 
 def test_a_garment_that_wanders_is_found_out_wherever_the_body_went():
@@ -149,7 +149,7 @@ def test_energy_of_a_rigid_flight_is_none_and_a_stop_costs_inertia():
     x = still + 0.1 * np.arange(10)[:, None, None]
     assert found_of(scene, x)["roll_out/last"] == pytest.approx(bending, rel=1e-9) and bending > 0.0
     x[8:] = x[7]
-    found = found_of(scene, x)
+    measures = found_of(scene, x)
     expected = 0.5 * dressed.cloth.masses.sum() * 3 * (0.1 * 30) ** 2 / 3
-    assert found["roll_out/first"] == pytest.approx(bending, rel=1e-9)
-    assert found["roll_out/last"] - bending == pytest.approx(expected, rel=1e-9)
+    assert measures["roll_out/first"] == pytest.approx(bending, rel=1e-9)
+    assert measures["roll_out/last"] - bending == pytest.approx(expected, rel=1e-9)

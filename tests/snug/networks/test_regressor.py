@@ -97,11 +97,11 @@ def test_default_inputs_know_no_heading_and_no_place():
 
 def test_default_inputs_begin_with_up_and_the_first_two_columns_of_each_rotation():
     dressed, motion = tube_dress(), leaning(swaying(4))
-    found = dressed.features(motion, DEFAULT).numpy()
+    features = dressed.features(motion, DEFAULT).numpy()
     turns = Rotation.from_rotvec(motion.poses.reshape(-1, 3)).as_matrix().reshape(4, 24, 3, 3)
-    assert np.allclose(found[:, :3], turns[:, 0].transpose(0, 2, 1) @ [0.0, 1.0, 0.0], atol=1e-6)
+    assert np.allclose(features[:, :3], turns[:, 0].transpose(0, 2, 1) @ [0.0, 1.0, 0.0], atol=1e-6)
     for joint in range(1, 24):
-        six = found[:, 6 * joint - 3 : 6 * joint + 3]
+        six = features[:, 6 * joint - 3 : 6 * joint + 3]
         assert np.allclose(six, np.concatenate([turns[:, joint, :, 0], turns[:, joint, :, 1]], 1), atol=1e-6)
 
 
@@ -153,7 +153,7 @@ def test_recipes_survive_a_file(recipe):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "message"),
     [
         ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
         ({"terms": ("strain", "wind")}, "'wind'"),
@@ -166,8 +166,8 @@ def test_recipes_survive_a_file(recipe):
         ({"mixed_lift": -0.1}, "mixed_lift"),
     ],
 )
-def test_recipe_refuses_nonsense(options, words):
-    with pytest.raises(RecipeError, match=words):
+def test_recipe_refuses_nonsense(options, message):
+    with pytest.raises(RecipeError, match=message):
         Recipe(**options)
 
 
@@ -228,9 +228,9 @@ def test_without_gradients_a_network_gives_what_it_trains_with():
     features, start = torch.randn(4, 3, 12), 0.3 * torch.randn(3, 4, 32)
     expected, state = network(features, start)
     with torch.no_grad():
-        found, last = network(features, start)
+        offsets, last = network(features, start)
         assert network.double()(features.double(), start.double())[0].dtype == torch.float64
-    assert expected.abs().max() > 0.1 and torch.allclose(found, expected, atol=1e-6)
+    assert expected.abs().max() > 0.1 and torch.allclose(offsets, expected, atol=1e-6)
     assert torch.allclose(last, state, atol=1e-6)
 
 

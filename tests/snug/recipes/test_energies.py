@@ -108,16 +108,16 @@ def test_an_energy_of_the_simulator_that_no_recipe_here_has_can_be_trained():
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
+    ("name", "message"),
     [
         ("wind", "unknown energy 'wind': use one of area_barrier, bending, gravity, .*spring, .*strain"),
         ("friction", "is made of (contact|barrier)"),
         ("barrier", "prepared for each step"),
     ],
 )
-def test_what_cannot_be_trained_is_refused_in_one_line(name, words):
-    with pytest.raises(RecipeError, match=words) as caught:
+def test_what_cannot_be_trained_is_refused_in_one_line(name, message):
+    with pytest.raises(RecipeError, match=message) as caught:
         Recipe(terms=("strain", name))
     assert "\n" not in str(caught.value)
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ValueError, match=message):
         find_energy(name)

@@ -80,10 +80,10 @@ def test_a_captured_step_is_the_step(kind, recipe, monkeypatch):
     plain, captured = capturing(monkeypatch, recipe, kind=kind)
     places = captured.contact.cache.barycentric.clone()
     for number in range(UNCAPTURED + 4):
-        expected, found = plain.step(number), captured.step(number)
-        assert found.keys() == expected.keys()
+        expected, losses = plain.step(number), captured.step(number)
+        assert losses.keys() == expected.keys()
         for name, value in expected.items():
-            assert found[name] == pytest.approx(value, rel=1e-5), (number, name)
+            assert losses[name] == pytest.approx(value, rel=1e-5), (number, name)
     assert captured.clock.taken()["captured"] > 0
     assert (captured.contact.cache.barycentric != places).any()
     equal_states(plain, captured)
@@ -127,5 +127,5 @@ def test_what_a_gpu_compiles_is_traced_whole(monkeypatch):
         monkeypatch.setattr(f"snug.training.{module}.compiled", traced)
     compiled = made(PAPER)
     for number in range(2):
-        expected, found = plain.step(number), compiled.step(number)
-        assert found == pytest.approx(expected, rel=1e-6)
+        expected, losses = plain.step(number), compiled.step(number)
+        assert losses == pytest.approx(expected, rel=1e-6)

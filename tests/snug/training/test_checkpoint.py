@@ -217,26 +217,26 @@ def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatc
     from snug import train as module
 
     out = tmp_path / "small.safetensors"
-    words = ["--vertices", "200", "--steps", "8", "-o", str(out), "--resume"]
+    arguments = ["--vertices", "200", "--steps", "8", "-o", str(out), "--resume"]
     library = [swaying(20), swaying(16, name="held")]
     monkeypatch.setattr(choices, "choose_motions", lambda options, data: (library[:1], library[1:]))
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
-    assert module.main(words) == 130
+    assert module.main(arguments) == 130
     assert "step 1 of 8" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["small.checkpoint.safetensors"]
-    assert module.main(words[:-1]) == 130  # without --resume: from the beginning, but not without a word
+    assert module.main(arguments[:-1]) == 130  # without --resume: from the beginning, but not without a word
     assert "small.checkpoint.safetensors of a stopped run will be replaced" in capsys.readouterr().out
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: False)
     with monkeypatch.context() as full:
         full.setattr(TrainedModel, "save", no_space)
-        assert module.main(words) == 2
+        assert module.main(arguments) == 2
     assert capsys.readouterr().err.endswith("snug.train: no space left\n")
     assert [path.name for path in tmp_path.iterdir()] == ["small.checkpoint.safetensors"]
-    assert module.main(words) == 0
+    assert module.main(arguments) == 0
     shown = capsys.readouterr().out
     assert "8 steps" in shown and "validation" in shown and "ms a step" in shown
     assert [path.name for path in tmp_path.iterdir()] == ["small.safetensors"]
-    assert module.main(words) == 0 and "nothing to resume" in capsys.readouterr().out
+    assert module.main(arguments) == 0 and "nothing to resume" in capsys.readouterr().out
     dressed = tube_dress()
     heavier = replace(dressed.garment, skinning_weights=np.roll(dressed.garment.skinning_weights, 1, axis=1))
     rounder = replace(dressed.body, shape_directions=2 * dressed.body.shape_directions)
@@ -245,15 +245,15 @@ def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatc
     before = out.read_bytes()
     others = {"seed": "1", "recipe": "paper", "steps": "9", "vertices": "300", "model": "pbns"}
     for name, value in others.items():
-        said = refused("small.safetensors: of another ", module.main, [*words, f"--{name}", value])
-        assert f"of another {name}" in said.replace("number of ", "")
+        error = refused("small.safetensors: of another ", module.main, [*arguments, f"--{name}", value])
+        assert f"of another {name}" in error.replace("number of ", "")
     for other in ([swaying(21)], [swaying(16, name="held")]), ([swaying(20)], []):
         monkeypatch.setattr(choices, "choose_motions", lambda options, data, other=other: other)
-        refused("of another body, garment or motions", module.main, words)
+        refused("of another body, garment or motions", module.main, arguments)
     monkeypatch.setattr(choices, "choose_motions", lambda options, data: (library[:1], library[1:]))
     assert out.read_bytes() == before
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
-    assert module.main([*words[:-1], "--seed", "1"]) == 130
+    assert module.main([*arguments[:-1], "--seed", "1"]) == 130
     assert "small.safetensors will be replaced when this training has ended" in capsys.readouterr().out
     assert out.read_bytes() == before
 
@@ -264,16 +264,16 @@ def test_garments_are_trained_one_after_another_and_those_that_ended_stay(
     from snug import train as module
 
     monkeypatch.setattr(choices, "choose_motions", lambda options, data: ([swaying(20)], []))
-    words = ["--vertices", "200", "--steps", "3", "-o", str(tmp_path / "mine.safetensors"), "--resume"]
-    words += ["--garment", "tshirt", "--garment", "tunic"]
+    arguments = ["--vertices", "200", "--steps", "3", "-o", str(tmp_path / "mine.safetensors"), "--resume"]
+    arguments += ["--garment", "tshirt", "--garment", "tunic"]
     asked = iter([False, False, False, True])  # in the first step of the second
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: next(asked))
-    assert module.main(words) == 130
+    assert module.main(arguments) == 130
     shirt = tmp_path / "mine-tshirt.safetensors"
     before = shirt.read_bytes()
     assert {path.name for path in tmp_path.iterdir()} == {shirt.name, "mine-tunic.checkpoint.safetensors"}
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: False)
-    assert module.main(words) == 0 and "nothing to resume" in capsys.readouterr().out
+    assert module.main(arguments) == 0 and "nothing to resume" in capsys.readouterr().out
     assert shirt.read_bytes() == before
     models = {path.name: TrainedModel.load(path) for path in tmp_path.iterdir()}
     assert set(models) == {shirt.name, "mine-tunic.safetensors"}

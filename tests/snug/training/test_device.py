@@ -82,16 +82,16 @@ def test_torch_search_is_no_worse_than_the_walk():
     walk, brute = ContactCache(patch, 2), TensorContactCache(patch, 2, CPU)
     walk.requery(1, samples, positions[1].numpy())
     brute.requery(1, torch.as_tensor(samples), positions[1])
-    found = []
+    distances = []
     for anchors in (walk, brute):
         faces = patch.faces[np.asarray(anchors.faces[1])]
         last = np.asarray(anchors.barycentric[1]) / PARTS
         corner = positions[1].numpy()[faces]
         point = corner[:, 0] + np.einsum("sc,sci->si", last, corner[:, 1:] - corner[:, :1])
-        found.append(np.linalg.norm(point - samples, axis=1))
+        distances.append(np.linalg.norm(point - samples, axis=1))
         assert last.min() > -1e-5 and last.sum(1).max() < 1 + 1e-5
     # Away from the skin the walk keeps an old anchor unless there is one half as far.
-    assert (found[1] < found[0] + 1e-5).all() and (found[0] < 2 * found[1] + 1e-5).all()
+    assert (distances[1] < distances[0] + 1e-5).all() and (distances[0] < 2 * distances[1] + 1e-5).all()
     assert list(walk.age) == list(brute.age) and (brute.faces[0].numpy() == walk.faces[0]).all()
 
 
@@ -198,7 +198,7 @@ def lane_by_lane(kernel, x):
     lanes = to_lanes(torch.as_tensor(x)[:, None])
     gradients = np.zeros_like(lanes)
     values = kernel(lanes, gradients)
-    return (from_lanes(found, len(x), 1)[:, 0].numpy() for found in (values, gradients))
+    return (from_lanes(quantity, len(x), 1)[:, 0].numpy() for quantity in (values, gradients))
 
 
 @pytest.mark.parametrize("count", [16, 21])  # whole blocks of lanes, and a block that is not whole

@@ -79,8 +79,8 @@ def test_best_weights_are_kept_and_patience_ends_training():
     model = run.run()
     # Best at the second validation; three without a better one end it at the fifth.
     assert model.steps == 20 and [row["validation"] for row in model.history] == [5.0, 3.0, 4.0, 3.0, 3.5]
-    found = model.summary["validation"]
-    assert (found["best"], found["best_step"], found["stopped_at"]) == (3.0, 8, 20)
+    validation = model.summary["validation"]
+    assert (validation["best"], validation["best_step"], validation["stopped_at"]) == (3.0, 8, 20)
     assert torch.equal(model.network.offsets.bias, kept[1]) and not torch.equal(kept[1], kept[4])
 
 
@@ -124,10 +124,10 @@ def test_a_static_network_is_validated_by_what_it_is_taught():
     made = Trainer("pbns", tube_dress(), [swaying(30)], steps=40, seed=0, recipe=PLAIN)
     calm = made.dressed.skinned(HELD, smoothing=20)
     value = Validator(made, Validation(motions=[HELD])).value()
-    own = [BendHinge, StretchStVK, Gravity]
+    energies = [BendHinge, StretchStVK, Gravity]
     cloth = made.dressed.cloth
     pelvis = made.dressed.pelvis(HELD)
-    total = sum(E(cloth).value_and_gradient(x - p)[0] for E in own for x, p in zip(calm, pelvis))
+    total = sum(E(cloth).value_and_gradient(x - p)[0] for E in energies for x, p in zip(calm, pelvis))
     contact = 0.0
     body = Obstacle(made.dressed.body.vertices(HELD.poses, HELD.translations), made.dressed.body.faces)
     for t, x in enumerate(calm):

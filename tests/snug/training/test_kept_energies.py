@@ -29,9 +29,9 @@ def trained(**changes: object) -> dict[str, float]:
     return {name: float(np.mean([mean[name] for mean in means])) for name in KEPT}
 
 
-def off(found: dict[str, float]) -> set[str]:
+def off(energies: dict[str, float]) -> set[str]:
     """Return the terms that are not those kept."""
-    return {name for name, value in KEPT.items() if abs(found[name] - value) > TOLERANCE * value}
+    return {name for name, value in KEPT.items() if abs(energies[name] - value) > TOLERANCE * value}
 
 
 def test_a_small_training_reaches_the_energies_that_are_kept():

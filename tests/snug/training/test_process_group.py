@@ -68,9 +68,9 @@ def test_two_processes_train_what_one_trains(name, tmp_path):
     script = tmp_path / "child.py"
     script.write_text(CHILD)
     launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
-    words = [str(script), str(Path(__file__).resolve().parents[3]), name, str(tmp_path)]
+    command = [str(script), str(Path(__file__).resolve().parents[3]), name, str(tmp_path)]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    subprocess.run([*launch, *words], check=True, env=environment, timeout=300)
+    subprocess.run([*launch, *command], check=True, env=environment, timeout=300)
     trained(RECIPES[name], ALONE, tmp_path / "one.safetensors")
     (zero, first), (one, second), (alone, single) = (
         read_tensors(tmp_path / f"{stem}.safetensors") for stem in ("0", "1", "one")
@@ -90,8 +90,8 @@ def test_two_processes_train_what_one_trains(name, tmp_path):
 def test_command_under_torchrun_writes_once(tmp_path):
     out = tmp_path / "small.safetensors"
     launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
-    words = ["-m", "snug.train", "--vertices", "200", "--steps", "4", "--hold-out", "walk", "-o", str(out)]
+    command = ["-m", "snug.train", "--vertices", "200", "--steps", "4", "--hold-out", "walk", "-o", str(out)]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    shown = subprocess.run([*launch, *words], env=environment, timeout=300, capture_output=True, text=True)
+    shown = subprocess.run([*launch, *command], env=environment, timeout=300, capture_output=True, text=True)
     assert shown.returncode == 0, shown.stderr
     assert shown.stdout.count("4 steps in") == 1 and [path.name for path in tmp_path.iterdir()] == [out.name]

@@ -207,7 +207,7 @@ def test_a_shape_on_another_body_is_strained_as_the_simulator_has_it():
     x = skin(batch.rest, trainer.weights, batch.transforms)
     strain = trainer.loss(x, batch.ahead, None)["strain"][0]
     expected = [
-        StretchStVK(dressed.garment.cloth()).value_and_gradient(own.double().numpy())[0] for own in x[0]
+        StretchStVK(dressed.garment.cloth()).value_and_gradient(points.double().numpy())[0] for points in x[0]
     ]
     assert strain.numpy() == pytest.approx(expected, rel=1e-3)
     unposed = dressed.garment.rest_for(dressed.body, betas)

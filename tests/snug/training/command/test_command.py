@@ -23,8 +23,8 @@ def test_command_line_refuses_a_wrong_path(refused, tmp_path):
     assert [motion.name for motion in training] == list(TRAIN)
     of_tests = ["--validation", "dance_turn", "-o", str(out)]
     refused("--validation dance_turn: no such motion among 07_01", main, of_tests)
-    words = ["--motions", str(tmp_path), "--motion-fps", "30", "--hold-out", "b", "-o", str(out)]
-    refused("--hold-out b: no such motion among a", main, words)  # the motion itself was read
+    arguments = ["--motions", str(tmp_path), "--motion-fps", "30", "--hold-out", "b", "-o", str(out)]
+    refused("--hold-out b: no such motion among a", main, arguments)  # the motion itself was read
     assert Recipe() == DEFAULT and isinstance(swaying(), Motion)
 
 
@@ -32,7 +32,7 @@ def test_command_line_refuses_what_it_could_not_do_before_any_work(refused, tmp_
     from snug.train import main
 
     (tmp_path / "file").touch()
-    for words, said in (
+    for arguments, hint in (
         (["-o", str(tmp_path / "file" / "model.safetensors")], "file"),
         (["--threads", "0"], "--threads 0: at least 1"),
         (["-o", str(tmp_path)], "is a folder; name a file"),
@@ -42,7 +42,7 @@ def test_command_line_refuses_what_it_could_not_do_before_any_work(refused, tmp_
         (["--garment", "a/shirt.obj", "--garment", "b/shirt.obj"], "model-shirt.safetensors: rename a file"),
         (["--motions", "nowhere", "-o", str(tmp_path / "new" / "sub" / "m.safetensors")], "nowhere"),
     ):
-        refused(said, main, ["-o", str(tmp_path / "model.safetensors"), *words])
+        refused(hint, main, ["-o", str(tmp_path / "model.safetensors"), *arguments])
 
 
 def test_each_model_has_a_file_of_its_own():

@@ -117,9 +117,9 @@ def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
     rows, positions, _ = contact.posed(batch)
     assert sorted(rows.tolist()) == list(range(6))
     for place, (row, frame) in enumerate(zip(rows, [4, 5, 6, 17, 18, 19])):
-        own = betas[place // 3]
-        whole = body.vertices(motion.poses[[frame]], motion.translations[[frame]], betas=own)[0]
-        pelvis = body.joints(own)[0] + motion.translations[frame]
+        shape = betas[place // 3]
+        whole = body.vertices(motion.poses[[frame]], motion.translations[[frame]], betas=shape)[0]
+        pelvis = body.joints(shape)[0] + motion.translations[frame]
         expected = whole[contact.patch.body_vertices] - pelvis
         assert np.allclose(np.asarray(positions)[row], expected, atol=1e-4)
 
@@ -132,13 +132,13 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
     assert contact is not None and data.shapes is not None and (contact.bodies.kept is not None) == kernels
     clips = [*MOTIONS, *augment(MOTIONS, recipe, vertices=trainer.dressed.vertices, seed=0)]
     for place in (1, 2, 3):
-        motion, own, first = clips[place], data.shapes[place], data.first[place]
+        motion, shape, first = clips[place], data.shapes[place], data.first[place]
         batch = data.at(first + np.array([[3, 4, 5]]))
         rows, positions, _ = contact.posed(batch)
-        whole = body.vertices(motion.poses[3:6], motion.translations[3:6], betas=own)[
+        whole = body.vertices(motion.poses[3:6], motion.translations[3:6], betas=shape)[
             :, contact.patch.body_vertices
         ]
-        pelvis = body.joints(own)[0] + motion.translations[3:6, None]
+        pelvis = body.joints(shape)[0] + motion.translations[3:6, None]
         assert np.allclose(np.asarray(positions)[rows], whole - pelvis, atol=1e-4)
         assert np.allclose(
             contact.bodies.marks[first + 3 : first + 6], (whole - pelvis)[:, ::MARKED], atol=1e-4

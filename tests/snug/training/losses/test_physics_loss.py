@@ -72,14 +72,14 @@ def test_energies_in_lanes_are_the_definitions_and_their_derivatives(windows):
     x = (frames + torch.as_tensor(random.normal(0, 0.003, (windows, *frames.shape[1:])))).float()
     recipe = replace(DEFAULT, terms=("strain", "bending", "gravity", "inertia"))
     ahead = 0.01 * torch.as_tensor(random.normal(size=(windows, 6, 3))).float()
-    found = []
+    evaluations = []
     for kernels in (True, False):
         loss = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels)
         at = (x if kernels else x.double()).clone().requires_grad_()
         terms = loss(at, ahead, None)
         (0.1 * torch.stack(list(terms.values()))).sum().backward()
-        found.append(([value.detach().double() for value in terms.values()], at.grad.double()))
-    (fast, gradient), (slow, exact) = found
+        evaluations.append(([value.detach().double() for value in terms.values()], at.grad.double()))
+    (fast, gradient), (slow, exact) = evaluations
     assert not fast[3][:, :2].any() and (fast[3][:, 2:] > 0).all()
     for one, other in zip(fast, slow):
         assert one.shape == (windows, 6) and torch.allclose(one, other, rtol=1e-4)

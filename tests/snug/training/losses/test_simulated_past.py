@@ -52,9 +52,9 @@ def test_cloth_that_flies_on_has_no_inertia_and_what_is_off_has_that_of_its_disp
     data, past = past_of([motion], {motion.name: x})
     relative = torch.as_tensor(x - tube_dress().pelvis(motion)[:, None]).float()[:, None]
     batch = data.batch(np.arange(12), None)
-    found = past.terms(relative, batch)
-    assert found["inertia"].shape == (12, 1) and float(found["inertia"].max()) < 1e-6
-    assert not found["distance"].any()
+    terms = past.terms(relative, batch)
+    assert terms["inertia"].shape == (12, 1) and float(terms["inertia"].max()) < 1e-6
+    assert not terms["distance"].any()
     off = past.terms(relative + 0.01 * torch.ones(3), batch)
     expected = torch.full((12, 1), float(0.5 * MASSES.sum() * 30.0**2 * 3e-4))
     torch.testing.assert_close(off["distance"], NEARNESS * expected, rtol=1e-3, atol=0)

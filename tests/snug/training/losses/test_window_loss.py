@@ -52,10 +52,10 @@ def hinges(x: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> float:
 
 
 def masses(rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    found = np.zeros(len(rest))
+    areas = np.zeros(len(rest))
     for face, normal in zip(faces, normals(rest, faces)):
-        found[face] += 0.5 * np.linalg.norm(normal) / 3
-    return found * DENSITY
+        areas[face] += 0.5 * np.linalg.norm(normal) / 3
+    return areas * DENSITY
 
 
 def window(frames: int):
@@ -115,9 +115,9 @@ def loss_of(recipe: Recipe, *, copies: int, kernels: bool, frames: int) -> tuple
 @pytest.mark.parametrize(("copies", "kernels"), [(1, False), (8, True)], ids=["definitions", "kernels"])
 def test_window_loss_is_the_sum_of_the_papers_formulas(form, frames, copies, kernels):
     recipe = replace(PAPER, inertia_form=form)
-    found, _ = loss_of(recipe, copies=copies, kernels=kernels, frames=frames)
+    loss, _ = loss_of(recipe, copies=copies, kernels=kernels, frames=frames)
     expected = independent_loss(form, *window(frames)[1:])
-    assert found == pytest.approx(expected, rel=1e-5)
+    assert loss == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_detached_past_gets_no_gradient_and_the_present_the_same():
