@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 SECONDS_OF_A_LOG = 30.0  # between two lines; on a terminal the line is drawn ten times a second
-BELIEVED = 120.0  # s: after so long the expected rate counts as much as the measured one
+BELIEVED = 120.0  # [s]: after so long the expected rate counts as much as the measured one,
+BELIEVED_SHARE = 1 / 3  # or after this share of the expected duration, if longer: long tasks report at their end
 
 
 def progress_bar(*args: Any, expected_rate: float = 0.0, **options: Any) -> Any:
@@ -25,8 +26,9 @@ def progress_bar(*args: Any, expected_rate: float = 0.0, **options: Any) -> Any:
         def format_dict(self) -> dict[str, Any]:
             shown: dict[str, Any] = super().format_dict
             if expected_rate:
-                done = self.n - self.initial + expected_rate * BELIEVED
-                shown["rate"] = done / (shown["elapsed"] + BELIEVED)
+                believed = max(BELIEVED, BELIEVED_SHARE * (self.total or 0.0) / expected_rate)
+                done = self.n - self.initial + expected_rate * believed
+                shown["rate"] = done / (shown["elapsed"] + believed)
             return shown
 
     seconds = 0.1 if sys.stderr.isatty() else SECONDS_OF_A_LOG

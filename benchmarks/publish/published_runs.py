@@ -101,6 +101,27 @@ RUNS = {
             "pbns,supervised,fast-lbfgs-10"
         },
     ),
+    "garments": PublishedRun(
+        "tank top, long sleeves and trousers on eight validation motions; one seed",
+        {
+            "": f"--suite garments --split validation --methods {REFERENCES},snug,pbns --scenes "
+            "'tank_top/*,long_sleeves/*,trousers/*'"
+        },
+    ),
+    "shapes": PublishedRun(
+        "the networks of the package on bodies of other shapes; one seed",
+        {
+            "": f"--suite shapes --trained --methods {REFERENCES},snug,pbns,fast-lbfgs-10,"
+            "snug+fast-lbfgs-1"
+        },
+    ),
+    "dynamics": PublishedRun(
+        "a network that learns its dynamics from simulations, on eight validation motions; one seed",
+        {
+            "": f"--suite garments --split validation --scenes 'tshirt/*' --methods {REFERENCES},snug,"
+            "snug-dynamic,snug-dynamic+fast-lbfgs-1,snug-dynamic+fast-lbfgs-2,fast-lbfgs-10"
+        },
+    ),
     "equal_data": PublishedRun(
         "SNUG and the supervised network with as many frames and steps, on eight validation motions",
         _validation("snug-data-3,supervised-data-3"),

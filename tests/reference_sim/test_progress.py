@@ -2,7 +2,7 @@
 
 import io
 
-from reference_sim.progress import BELIEVED, announce_compilation, progress_bar
+from reference_sim.progress import BELIEVED_SHARE, announce_compilation, progress_bar
 
 
 def _time_left(*, done, seconds, **options):
@@ -24,7 +24,11 @@ def test_time_left_follows_what_is_measured_in_the_end():
     hour = 3600.0
     measured = (hour - 1800.0) / 0.5  # half of the work in an hour: twice as slow as expected of one worker
     left = _time_left(done=1800.0, seconds=hour, expected_rate=1.0)
-    assert measured * hour / (hour + 2.0 * BELIEVED) < left < measured
+    assert measured / (1.0 + 2.0 * BELIEVED_SHARE) < left < measured
+
+
+def test_time_left_hardly_grows_while_a_long_task_reports_nothing():
+    assert _time_left(done=0.0, seconds=300.0, expected_rate=1.0) < 1.3 * 3600.0
 
 
 def test_compilation_is_announced_where_no_compiled_kernel_lies_on_disk(tmp_path, monkeypatch, capsys):
