@@ -10,7 +10,7 @@ from typing import Any
 
 SECONDS_OF_A_LOG = 30.0  # between two lines; on a terminal the line is drawn ten times a second
 BELIEVED = 120.0  # [s]: after so long the expected rate counts as much as the measured one,
-BELIEVED_SHARE = 1 / 3  # or after this share of the expected duration, if longer: long tasks report at their end
+BELIEVED_SHARE = 1 / 3  # or after this share of the expected duration if longer: long tasks report late
 
 
 def progress_bar(*args: Any, expected_rate: float = 0.0, **options: Any) -> Any:
