@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -86,6 +87,7 @@ def train_network(
     >>> model = train_network("snug", dressed, motions, steps=2000, seed=0)  # doctest: +SKIP
     """
     start = time.perf_counter()
+    gc.collect()  # an earlier training refers to itself, and holds gigabytes
     if find_kind(model_kind).network.fitted:
         return _fitted_model(model_kind, dressed, motions, trajectories, seed=seed, recipe=recipe)
     trainer = Trainer(

@@ -1,5 +1,7 @@
 """Training lowers the physics, repeats bit for bit, survives files, and names what goes wrong."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +43,18 @@ def test_training_lowers_the_potential(trained):
     assert last["loss"] < 0.9 * first["loss"] and last["strain"] < first["strain"]
     parts = sum(last[term] for term in DEFAULT.terms)
     assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 100
+
+
+def test_an_earlier_training_holds_no_memory_while_the_next_runs():
+    gc.disable()
+    try:
+        short(steps=1)
+        earlier = [weakref.ref(each) for each in gc.get_objects() if isinstance(each, Trainer)]
+        alive = []
+        short(steps=2, every=1, log=lambda row: alive.extend(each() for each in earlier if each()))
+    finally:
+        gc.enable()
+    assert alive == []
 
 
 @pytest.mark.parametrize(
