@@ -26,7 +26,9 @@ def progress_bar(*args: Any, expected_rate: float = 0.0, **options: Any) -> Any:
         def format_dict(self) -> dict[str, Any]:
             shown: dict[str, Any] = super().format_dict
             if expected_rate:
-                believed = max(BELIEVED, BELIEVED_SHARE * (self.total or 0.0) / expected_rate)
+                believed = max(
+                    BELIEVED, BELIEVED_SHARE * ((self.total or 0.0) - self.initial) / expected_rate
+                )
                 done = self.n - self.initial + expected_rate * believed
                 shown["rate"] = done / (shown["elapsed"] + believed)
             return shown

@@ -108,8 +108,8 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
             print(f"{PROGRAM}: {name}: {folder}: exit status {status}; not published", file=sys.stderr)
             return False
         if others := sorted({row.commit for row in RunFolder(folder).read_rows()} - {head, ""}):
-            obstacle = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
-            print(f"{PROGRAM}: {folder}: {obstacle}", file=sys.stderr)
+            reason = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
+            print(f"{PROGRAM}: {folder}: {reason}", file=sys.stderr)
             return False
     if len(parts) > 1:
         whole = out / name

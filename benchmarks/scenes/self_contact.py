@@ -35,8 +35,8 @@ def crossing(x: np.ndarray, energies: tuple[Energy, ...]) -> str:
 
 def demand_uncrossed(x: np.ndarray, energies: tuple[Energy, ...], name: str) -> None:
     """Raise ValueError where x (V, 3) [m], the start of the cloth called `name`, crosses itself."""
-    if faces := crossing(x, energies):
+    if place := crossing(x, energies):
         raise ValueError(
-            f"{name}: {faces} where it starts: self-contact cannot untangle it; mend the mesh at this face, "
+            f"{name}: {place} where it starts: self-contact cannot untangle it; mend the mesh at this face, "
             "or simulate without self-contact"
         )

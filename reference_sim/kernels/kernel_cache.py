@@ -22,7 +22,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from filelock import FileLock
 from numba.core.caching import InTreeCacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
@@ -33,7 +32,6 @@ KEPT = 4  # folders of one module, so that going back to another branch compiles
 CONSTANTS = (bool, int, float, complex, str, tuple, np.generic)
 FLAGS = (set, frozenset)  # of fastmath
 USED = ".used"  # file whose date says when a folder was last asked for
-LONGEST = 300.0  # [s] to wait for a kernel that another process compiles
 
 _config: Any = numba.config
 _digests: dict[str, str] = {}  # of modules that hold kernels, by name
@@ -56,8 +54,10 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         folder = _folders[module] if options.get("cache") else None
         with _locator_in_use():
             kernel = numba.njit(**(options | {"cache": folder is not None}))(function)
-        if folder is not None:
-            kernel.compile = _in_turn(kernel.compile, folder / f"{function.__qualname__}.lock")
+        if folder is not None and isinstance(
+            kernel, Dispatcher
+        ):  # no function, as NUMBA_DISABLE_JIT leaves it
+            kernel.compile = _in_turn(kernel.compile, folder / f"{function.__name__}.lock")
         return kernel
 
     return decorate
@@ -74,8 +74,10 @@ def _in_turn(compile_kernel: Callable[[Any], Any], file: Path) -> Callable[[Any]
             if file not in _being_compiled:  # by this process, which would wait for itself
                 _being_compiled.add(file)
                 held.callback(_being_compiled.remove, file)
-                with contextlib.suppress(OSError, NotImplementedError):  # no locks here, or LONGEST is over
-                    held.enter_context(FileLock(file, timeout=LONGEST))
+                with contextlib.suppress(ImportError, OSError):  # this system, or its disk, has no such locks
+                    import fcntl
+
+                    fcntl.flock(held.enter_context(file.open("ab")), fcntl.LOCK_EX)
             return compile_kernel(signature)
 
     return compile_in_turn

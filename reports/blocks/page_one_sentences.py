@@ -73,7 +73,7 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
     motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
     paired = [f"; {says}" for says in _paired(run, worn, first, others)]
     shares = [
-        f"{run.label(first)} has a relative excess of {_share(excess)}{f', {beside}' if beside else ''}",
+        f"{run.label(first)} has a relative excess of {_share(excess)}{f' ({beside})' if beside else ''}",
         *(f"{run.label(name)} of {_share(known[name])}" for name in others),
     ]
     sentences = [
@@ -227,14 +227,14 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     if counted:
         total = counted.total()
         claims = f"{total} primary claim{'' if total == 1 else 's'}"
-        sentences.append(f"of {claims} taken from the paper {paper_claims.in_words(counted)}")
-        sentences += _claims_that_fail(run, lines)
+        failing = _claims_that_fail(run, lines)
+        sentences.append(f"of {claims} taken from the paper {paper_claims.in_words(counted)}{failing}")
     where = _in_scenes(timed[timed["method"] == run.reference]["scene"].nunique())
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean "
-            f"curvature from the reference, {where}: smaller errors mean nothing"
+            f"curvature from the reference, {where}: errors below that show no difference"
         )
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -254,15 +254,15 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
     return _joined(sentences)
 
 
-def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> list[str]:
-    """Return a sentence that names the primary claims that do not hold, none where there are none."""
+def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> str:
+    """Return a clause that names the primary claims that do not hold, empty where there are none."""
     failed = []
     for line in lines:
         if line.claim.primary and line.verdict == paper_claims.FAILS:
             lower, higher = run.label(line.claim.lower), run.label(line.claim.higher)
             measure = measure_of(line.compared).title.lower()
             failed.append(f"{line.claim.says} ({measure}: {lower} {line.claim.relation} {higher})")
-    return [f"what does not hold: {'; '.join(failed)}"] if failed else []
+    return f"; what does not hold: {'; '.join(failed)}" if failed else ""
 
 
 def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
@@ -298,7 +298,7 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> tuple[str, 
     if solver is None:
         return "", gaps
     costs = f"{number(solver.time)} ms ({run.label(solver.method)})"
-    return f", the fastest solver stopped early whose energy gap is no larger {costs}", gaps
+    return f"; the fastest solver stopped early with no larger energy gap takes {costs}", gaps
 
 
 def _on_other_bodies(run: Run) -> str:

@@ -275,8 +275,8 @@ def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str,
         values.setdefault((recording_of(scene), seed), []).append(value)
     # Where all are one number their mean is it, to the bit: what every motion repeats is certain.
     return {
-        cell: of_seeds[0] if len(set(of_seeds)) == 1 else float(np.mean(of_seeds))
-        for cell, of_seeds in values.items()
+        cell: of_segments[0] if len(set(of_segments)) == 1 else float(np.mean(of_segments))
+        for cell, of_segments in values.items()
     }
 
 

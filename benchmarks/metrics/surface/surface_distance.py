@@ -93,9 +93,9 @@ def _one_way(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[flo
     squared, nearest, points = igl.point_mesh_squared_distance(x, y, others)
     corners = others[nearest]
     shares = _barycentric(points, y[corners])
-    opposite = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
+    of_nearest = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
     here = vertex_normals(np.ascontiguousarray(x), faces)
-    angles = np.arctan2(np.linalg.norm(np.cross(here, opposite), axis=1), (here * opposite).sum(axis=1))
+    angles = np.arctan2(np.linalg.norm(np.cross(here, of_nearest), axis=1), (here * of_nearest).sum(axis=1))
     sides = x[faces[:, 1:]] - x[faces[:, :1]]
     doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     weights = np.bincount(faces.ravel(), np.repeat(doubled, 3), len(x))
