@@ -86,7 +86,7 @@ def _volume(x, a, b, c, d):
 
 @njit(cache=True)
 def _crossings(x, edges_of, face, ends, crossings):
-    """Append to ends[:crossings] where edges of a triangle cross the inside of a face; return their number."""
+    """Append to ends[:crossings] where edges of a triangle cross the inside of a face; return how many."""
     a, b, c = face[0], face[1], face[2]
     for i in range(3):
         p, q = edges_of[i], edges_of[(i + 1) % 3]
