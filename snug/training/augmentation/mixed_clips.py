@@ -1,6 +1,6 @@
 """Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
 
-Self-supervision needs no simulation, so a training set is not bound to what was recorded. Fourteen clips show
+Self-supervision needs no simulation, so a training set is not bound to what was recorded. Recorded clips show
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
 clip takes the root, the spine, each leg and each arm from six random places of the training clips (mirrored
 half of the time), scales legs and spine, adds to each joint that carries cloth a slow turn about a random
