@@ -101,13 +101,6 @@ RUNS = {
             "pbns,supervised,fast-lbfgs-10"
         },
     ),
-    "garments": PublishedRun(
-        "tank top, long sleeves and trousers on eight validation motions; one seed",
-        {
-            "": f"--suite garments --split validation --methods {REFERENCES},snug,pbns --scenes "
-            "'tank_top/*,long_sleeves/*,trousers/*'"
-        },
-    ),
     "shapes": PublishedRun(
         "the networks of the package on bodies of other shapes; one seed",
         {
