@@ -1,8 +1,9 @@
 """Training lowers the physics, repeats bit for bit, survives files, and names what goes wrong."""
 
-import gc
-import weakref
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,17 +47,21 @@ def test_training_lowers_the_potential(trained):
 
 
 def test_an_earlier_training_holds_no_memory_while_the_next_runs():
-    others = {id(each) for each in gc.get_objects() if type(each) is Trainer}  # of other tests
-    gc.disable()
-    try:
-        short(steps=1)
-        trainers = (each for each in gc.get_objects() if type(each) is Trainer and id(each) not in others)
-        earlier = [weakref.ref(each) for each in trainers]
-        alive = []
-        short(steps=2, every=1, log=lambda row: alive.extend(each() for each in earlier if each()))
-    finally:
-        gc.enable()
-    assert earlier and alive == []
+    code = (
+        "import gc, weakref\n"
+        "from snug.training.optimisation_step import Trainer\n"
+        "from tests.snug.training.test_train_network import short\n"
+        "gc.disable()\n"
+        "short(steps=1)\n"
+        "(earlier,) = [weakref.ref(each) for each in gc.get_objects() if type(each) is Trainer]\n"
+        "alive = []\n"
+        "short(steps=2, every=1, log=lambda row: alive.append(earlier() is not None))\n"
+        "print(alive)\n"
+    )
+    root = Path(__file__).resolve().parents[3]
+    command = [sys.executable, "-c", code]  # other tests leave trainings behind
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    assert done.stdout == "[False, False]\n"
 
 
 @pytest.mark.parametrize(
