@@ -53,7 +53,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
             _folders[module] = _folder(function, _digests[module])
         folder = _folders[module] if options.get("cache") else None
         with _locator_in_use():
-            kernel = numba.njit(**(options | {"cache": folder is not None}))(function)
+            kernel: Any = numba.njit(**(options | {"cache": folder is not None}))(function)
         if folder is not None and isinstance(
             kernel, Dispatcher
         ):  # no function, as NUMBA_DISABLE_JIT leaves it
