@@ -54,9 +54,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         folder = _folders[module] if options.get("cache") else None
         with _locator_in_use():
             kernel: Any = numba.njit(**(options | {"cache": folder is not None}))(function)
-        if folder is not None and isinstance(
-            kernel, Dispatcher
-        ):  # no function, as NUMBA_DISABLE_JIT leaves it
+        if folder is not None and hasattr(kernel, "compile"):  # NUMBA_DISABLE_JIT leaves a function
             kernel.compile = _in_turn(kernel.compile, folder / f"{function.__name__}.lock")
         return kernel
 
