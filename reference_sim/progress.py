@@ -1,4 +1,4 @@
-"""What long work shows while it goes on: a bar with the time left, and a word before kernels are compiled."""
+"""Progress of long work: a bar with the time left, and a line before kernels are compiled."""
 
 from __future__ import annotations
 

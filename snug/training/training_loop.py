@@ -98,10 +98,8 @@ class TrainingLoop:
                 self.log(row)
         stopping = self.trainer.group.agreed(float(self.stop())) > 0
         if self.checkpoint and self.trainer.group.writes:
-            checkpoint_is_due = not last and self.checkpoint.is_due(
-                self.done, time.perf_counter() - self._saved
-            )
-            if stopping or checkpoint_is_due:
+            seconds = time.perf_counter() - self._saved
+            if stopping or (not last and self.checkpoint.is_due(self.done, seconds)):
                 self._save(self.checkpoint)
         if stopping:
             where = (

@@ -44,7 +44,7 @@ METRICS = (
     *(
         Metric(
             name=f"wrinkles/{band}", unit="1/m", title=f"Waves {interval}", table="wrinkles",
-            definition=f"root mean square of the part of the signed mean curvature with wavelengths "
+            definition="root mean square of the part of the signed mean curvature with wavelengths "
             f"{interval}, mean over frames",
         )
         for band, interval in zip(BANDS, WORDS)

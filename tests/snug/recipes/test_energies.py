@@ -43,7 +43,7 @@ PLAIN = Recipe(name="plain", smoothing=0, mixed=0.0, batch=4)
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch):
+def tethered(tmp_path, monkeypatch):
     """A recipe with the user's term, whose file and whose line in the registry are there."""
     (tmp_path / "tether.py").write_text(SOURCE)
     monkeypatch.setattr(energies, "__path__", [*energies.__path__, str(tmp_path)])
@@ -60,9 +60,9 @@ def trained(recipe, steps=6, **options):
 
 
 @pytest.mark.parametrize("kernels", [True, False])
-def test_its_gradient_is_that_of_finite_differences(own, kernels):
+def test_its_gradient_is_that_of_finite_differences(tethered, kernels):
     cloth = tube_dress().cloth
-    loss = PhysicsLoss(cloth, replace(own, terms=("tether",)), dt=1 / 30, kernels=kernels)
+    loss = PhysicsLoss(cloth, replace(tethered, terms=("tether",)), dt=1 / 30, kernels=kernels)
     random = np.random.default_rng(0)
     shifts = 0.1 * random.normal(size=(2, 3, *cloth.rest_positions.shape))
     x = torch.as_tensor(cloth.rest_positions + shifts).requires_grad_()
@@ -83,21 +83,21 @@ def test_its_gradient_is_that_of_finite_differences(own, kernels):
 
 
 @pytest.mark.parametrize("kernels", [True, False])
-def test_training_with_it_goes_another_way_and_knows_its_recipe(own, kernels, tmp_path):
-    with_it = trained(own, kernels=kernels)
-    without = trained(replace(own, terms=TERMS), kernels=kernels)
+def test_training_with_it_goes_another_way_and_knows_its_recipe(tethered, kernels, tmp_path):
+    with_it = trained(tethered, kernels=kernels)
+    without = trained(replace(tethered, terms=TERMS), kernels=kernels)
     assert list(with_it.history[-1])[2:9] == ["loss", *TERMS[:3], "tether", *TERMS[3:]]
     last = with_it.history[-1]
-    assert last["loss"] == pytest.approx(sum(last[term] for term in own.terms))
+    assert last["loss"] == pytest.approx(sum(last[term] for term in tethered.terms))
     assert last["tether"] > 0.0 and "tether" not in without.history[-1]
     one, two = (model.network.offsets.weight for model in (with_it, without))
     assert not torch.equal(one, two)
-    again = type(with_it).load(with_it.save(tmp_path / "own.safetensors"))
-    assert again.recipe == own and again.recipe != without.recipe
+    again = type(with_it).load(with_it.save(tmp_path / "tethered.safetensors"))
+    assert again.recipe == tethered and again.recipe != without.recipe
 
 
-def test_a_term_with_a_kernel_uses_it_and_one_without_its_definition(own):
-    terms = PhysicsLoss(tube_dress().cloth, own, dt=1 / 30).static
+def test_a_term_with_a_kernel_uses_it_and_one_without_its_definition(tethered):
+    terms = PhysicsLoss(tube_dress().cloth, tethered, dt=1 / 30).static
     assert [name for name, term in terms.items() if has_closed_form(term)] == ["strain", "bending", "gravity"]
     assert list(terms) == ["strain", "bending", "gravity", "tether"]
 
