@@ -118,13 +118,15 @@ def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
     >>> score("mine.npz", "--scene", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
     0.031
     """
+    one_thread()
     bare = make_parser().parse_args([str(roll_out), *options, "--no-report"])
     plan = plan_roll_out(bare, "benchmarks.score.score")
     message = io.StringIO()
     with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(message):
         status = carry_out(plan, program=PROGRAM, report=False)
+    lines = message.getvalue().strip().splitlines()
     if status not in (0, 1):
-        raise ValueError(message.getvalue().strip().splitlines()[-1])
+        raise ValueError(lines[-1] if lines else "the run ended early")
     return numbers(plan)
 
 

@@ -114,7 +114,8 @@ class TimeStepper:
         """Take the sub-steps to `frame`, with pins (P, 3) [m] at its end.
 
         Returns:
-            The state at the frame, None if a sub-step diverged, and the result of each minimisation.
+            The state at the frame, None if a sub-step diverged, and the result of each minimisation, without
+            those that only bring a barrier nearer.
         """
         x, v, results = state.x, state.v, []
         for j in range(1, self.substeps + 1):

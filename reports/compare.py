@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from benchmarks.results.protocol import BEFORE
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reports.comparison.change import BETTER, FAILING, GONE, OTHER, TIME_TOLERANCE, WORSE
@@ -77,8 +76,6 @@ def _summary(comparison: Comparison, runs: Sequence[Run]) -> Iterator[str]:
     if comparison.added:
         yield f"Not compared: {comparison.added} numbers of B alone."
     machines = [", ".join(sorted(set(run.frame["hardware"]))) for run in runs]
-    if BEFORE in (protocols := [run.protocol for run in runs]) and len(set(protocols)) > 1:
-        yield f"A is of protocol '{protocols[0]}', B of '{protocols[1]}': definitions may differ."
     if machines[0] != machines[1]:
         yield f"No times compared: A ran on {machines[0]}, B on {machines[1]}."
 

@@ -107,8 +107,7 @@ def camera_path(selected: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarra
         for corners in ([x.min(axis=1) for x in seen], [x.max(axis=1) for x in seen])
     )
     lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
-    dt = next(iter(cloths)).dt
-    reach = 0 if np.isnan(dt) else int(SMOOTHED / dt / 2.0)
+    reach = 0 if np.isnan(selected.dt) else int(SMOOTHED / selected.dt / 2.0)
     centres = uniform_filter1d((lowest + highest) / 2.0, 2 * reach + 1, axis=0, mode="nearest")
     right, up, _ = np.maximum(highest - centres, centres - lowest).max(axis=0)
     return centres @ axes.T, MARGIN * float(max(up, TALL * right))
@@ -239,7 +238,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from reports.run.selected_roll_outs import select_roll_outs
 
     selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
-    dt = min(cloth.dt for cloth in selected.cloths.values())
+    dt = selected.dt
     rate = options.speed / dt if dt > 0.0 else 1.0
     with replacing(path) as temporary:
         WRITERS[path.suffix](temporary, draw_frames(selected, options.width, options.azimuth), rate)

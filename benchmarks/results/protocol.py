@@ -23,7 +23,6 @@ DIGESTS = {
     "statistics": "bbdacc941ceaa26a",
 }
 DIGEST = digest(DIGESTS)
-BEFORE = "before 1.0"  # of rows that were written before the protocol had a number
 OWN = "own"  # of rows whose scene, metric or settings are a user's
 
 # Rules of verdicts.

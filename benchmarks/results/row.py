@@ -12,7 +12,6 @@ from functools import cache
 from typing import Any
 
 from benchmarks.results.json_file import ResultsError
-from benchmarks.results.protocol import BEFORE
 
 USABLE = ("ok", "stalled")  # statuses of cells that came to their last frame: their numbers count
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
@@ -44,8 +43,7 @@ class Row:
             sample of frames, in the unit of the value.
         moved: change of the value by each member of the reference ensemble in the reference's place, as JSON.
         preset, commit, hardware, dtype, threads: origin.
-        protocol: number of the protocol; `own` where scene, metric or settings are a user's, `before 1.0`
-            in runs without this column.
+        protocol: number of the protocol; `own` where scene, metric or settings are a user's.
         terms: energies of the scene, joined by `+`.
         garment, motion, part: of the scene; the part is `whole`, `clip`, `loop` or `start`.
         family, level: name shared by methods that differ by one number, and that number.
@@ -162,7 +160,7 @@ def row_to_cells(row: Row) -> dict[str, str]:
 
 def cells_to_row(cells: dict[str, str]) -> Row:
     """Return the row written in the cells. Raises ResultsError for a number or name that is none."""
-    values: dict[str, Any] = {"protocol": BEFORE} | cells
+    values: dict[str, Any] = dict(cells)
     try:
         for name in OPTIONAL_NUMBERS:
             values[name] = float(cells[name]) if cells[name] else None
@@ -175,8 +173,8 @@ def cells_to_row(cells: dict[str, str]) -> Row:
                 raise ValueError(f"no name of at most {LONGEST_NAME} printable bytes")
         name = "seeded"
         values[name] = _TRUTHS[cells[name]]
-        name = "moved"  # runs of before have none
-        moved = json.loads(cells[name]) if cells.get(name) else {}
+        name = "moved"
+        moved = json.loads(cells[name]) if cells[name] else {}
         values[name] = tuple((str(k), float(v)) for k, v in moved.items())
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise ResultsError(f"column {name}: {error}") from None

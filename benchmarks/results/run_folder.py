@@ -15,8 +15,6 @@ from benchmarks.results.row import COLUMNS, Row, cells_to_row, row_to_cells
 from benchmarks.results.run_config import FORMAT, OLD, check_types
 from reference_sim.files.atomic_files import replacing
 
-LATER = ("moved", "protocol")  # columns that runs of before have not
-
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
     """Return the path of the model of that kind and seed."""
@@ -173,7 +171,7 @@ class RunFolder:
         rows = []
         reader = csv.reader(stream)
         names = tuple(next(reader, ()))
-        if names != tuple(name for name in COLUMNS if name in names or name not in LATER):
+        if names != tuple(COLUMNS):
             raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
         for cells in filter(None, reader):  # a blank line is no row
             try:

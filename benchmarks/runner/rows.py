@@ -13,7 +13,7 @@ from benchmarks.metrics import find_metric
 from benchmarks.plan.plan import Plan
 from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
 from benchmarks.results.ensemble import is_member, spread
-from benchmarks.results.protocol import BEFORE, OWN
+from benchmarks.results.protocol import OWN
 from benchmarks.results.row import DECLARED, PRETRAINED, Row
 from benchmarks.tasks.pretrained_network import NAME
 from benchmarks.tasks.task import Outcome, Task
@@ -127,8 +127,7 @@ def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
     """Return the provenance of an outcome's rows; it keeps the protocol under which it was made."""
     if not outcome.origin:
         return {"protocol": protocol}
-    made = outcome.origin.get("protocol", BEFORE)
-    return {**outcome.origin, "protocol": OWN if protocol == OWN else made}
+    return outcome.origin | ({"protocol": OWN} if protocol == OWN else {})
 
 
 def _finite(number: float | None) -> float | None:

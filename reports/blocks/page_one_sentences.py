@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 
 import pandas as pd
@@ -31,13 +31,12 @@ from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods,
 from reports.tables.number_texts import duration, number
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
-SENTENCE = re.compile(r"(?<=[^\d]\.) (?=[A-Z0-9])")  # its end
 SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
 
 
 @lru_cache(maxsize=4)
-def headline(run: Run) -> list[tuple[str, str]]:
-    """Return (topic, sentences) for each topic of page one that the run can tell."""
+def topics(run: Run) -> list[tuple[str, list[str]]]:
+    """Return (topic, sentences) for each topic of page one that the run can tell, the chief one first."""
     scenes = next(iter(run.garments(run.garment_rows).values()), [])
     worn = run.garment_rows[run.garment_rows["scene"].isin(scenes)]
     cells = run.cells("speed", "garments")
@@ -47,23 +46,26 @@ def headline(run: Run) -> list[tuple[str, str]]:
         "How near": _near(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
         "At what cost": _cost(run, timed, compared), "How certain": _trust(run, timed),
         "On other bodies": _on_other_bodies(run),
-        "Textile tests": textile_tests(run), "Engines": engines(run),
+        "Textile tests": [textile_tests(run)], "Engines": [engines(run)],
     }  # fmt: skip
-    return [(topic, unbroken(sentence)) for topic, sentence in sentences.items() if sentence]
+    finished = {
+        topic: [unbroken(_ended(text)) for text in texts if text] for topic, texts in sentences.items()
+    }
+    return [(topic, texts) for topic, texts in finished.items() if texts]
 
 
-def first_sentences(run: Run) -> list[str]:
-    """Return the first sentence of each topic of page one that the run can tell."""
-    return [SENTENCE.split(sentences)[0] for _, sentences in headline(run)]
+def headline(run: Run) -> list[tuple[str, str]]:
+    """Return (topic, its sentences as one paragraph) for each topic of page one that the run can tell."""
+    return [(topic, " ".join(sentences)) for topic, sentences in topics(run)]
 
 
-def _near(run: Run, worn: pd.DataFrame) -> str:
+def _near(run: Run, worn: pd.DataFrame) -> list[str]:
     """Say which relative excess each network of page one has, and whether the first has less energy."""
     names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not known:
-        return ""
+        return []
     first, *others = known
     excess = known[first]
     kind = "validation " if run.config.get("split") == "validation" else "unseen "
@@ -77,21 +79,20 @@ def _near(run: Run, worn: pd.DataFrame) -> str:
         *(f"{run.label(name)} of {_share(known[name])}" for name in others),
     ]
     sentences = [
-        f"On {motions} {listed(shares)}, where the energy of the reference simulation is 0 % and that of "
-        f"skinning alone 100 %{''.join(paired)}",
-        _against_reference(run.label(first), excess),
+        f"On {motions} {listed(shares)}, on a scale where the reference simulation is 0 % and skinning alone "
+        f"100 %{''.join(paired)}"
     ]
     if count > 1:
         scene, worst = excess.worst
-        sentences.append(
-            f"These numbers are geometric means over {_repeated(excess)}. The arithmetic mean of "
-            f"{run.label(first)} over motions is {number(excess.mean, 2)} %, and its worst motion, "
-            f"{scene.partition('/')[2] or scene}, has {number(worst, 2)} %"
-        )
-    return _joined(sentences)
+        sentences += [
+            f"The arithmetic mean of {run.label(first)} is {number(excess.mean, 2)} %, and its worst motion, "
+            f"{scene.partition('/')[2] or scene}, has {number(worst, 2)} %; the other numbers are geometric "
+            f"means over {_repeated(excess)}",
+        ]
+    return [*sentences, _against_reference(run.label(first), excess)]
 
 
-def _distances(run: Run, rows: pd.DataFrame) -> str:
+def _distances(run: Run, rows: pd.DataFrame) -> list[str]:
     """Say how far the subjects are from the reference, for a run without skinning."""
     parts = []
     for method in subjects(run, set(rows[rows["usable"]]["method"])):
@@ -99,7 +100,7 @@ def _distances(run: Run, rows: pd.DataFrame) -> str:
         if distance is not None:
             above = "" if gap is None else f", with an energy gap of {number(gap)} J"
             parts.append(f"{run.label(method)} lies {number(distance)} mm from the reference{above}")
-    return f"{'; '.join(parts)}." if parts else ""
+    return ["; ".join(parts)]
 
 
 def _repeated(excess: Excess) -> str:
@@ -115,9 +116,9 @@ def _repeated(excess: Excess) -> str:
     return f"{count} independent sources: {recorded}, whose segments are averaged first{more}"
 
 
-def _joined(sentences: Sequence[str]) -> str:
-    """Return the sentences, each with a full stop, those that are empty left out."""
-    return " ".join(f"{sentence[:1].upper()}{sentence[1:]}." for sentence in sentences if sentence)
+def _ended(sentence: str) -> str:
+    """Return the sentence with a capital and a full stop."""
+    return f"{sentence[:1].upper()}{sentence[1:].removesuffix('.')}."
 
 
 def _share(excess: Excess) -> str:
@@ -142,7 +143,10 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
     standings: dict[str, list[str]] = {}
     for other in others:
         if effect := compare_methods(run, rows, run.metrics[TOTAL], one, other).effect:
-            standings.setdefault(standing(effect, effect.p_value()), []).append(run.label(other))
+            p = effect.p_value()
+            stands = standing(effect, p)
+            shown = f" (p = {number(p, 2)})" if stands in (LESS, MORE) and p is not None else ""
+            standings.setdefault(stands, []).append(f"{run.label(other)}{shown}")
     first = run.label(one)
     says = {
         LESS: f"paired by motion, {first} has less energy than {{}}",
@@ -162,12 +166,13 @@ def listed(items: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))
 
 
-def _in_scenes(count: int) -> str:
-    """Return "in 1 scene" or "in 2 scenes"."""
-    return f"in {count} scene{'' if count == 1 else 's'}"
+def _in_scenes(scenes: Collection[str]) -> str:
+    """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
+    kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
+    return f"in {len(scenes)} {kind}{'' if len(scenes) == 1 else 's'}"
 
 
-def _moves(run: Run, worn: pd.DataFrame) -> str:
+def _moves(run: Run, worn: pd.DataFrame) -> list[str]:
     """Say what each subject lacks of the simulation's motion, and how much of it lies inside the body."""
     sentences: list[str] = []
     reference = value_of(worn, run.reference, INSIDE)
@@ -178,15 +183,15 @@ def _moves(run: Run, worn: pd.DataFrame) -> str:
                 f"{run.label(method)} has {_secondary_motion(swing)} secondary motion: its hem amplitude is "
                 f"{number(100.0 * swing, 2)} % of the simulation's"
             )
-            same = ", where 1 is the same motion" if not sentences else ""
-            correlated = "" if alike is None else f", with a correlation of {number(alike, 2)}{same}"
+            scale = " (1: the same motion up to its size)" if not sentences else ""
+            correlated = "" if alike is None else f", with a correlation of {number(alike, 2)}{scale}"
             sentences.append(f"{sentence}{correlated}")
         if inside is not None:
             beside = "" if reference is None else f", against {number(reference, 2)} % of the simulation's"
             sentences.append(
                 f"{number(inside, 2)} % of the surface of {run.label(method)} lies inside the body{beside}"
             )
-    return _joined(sentences)
+    return sentences
 
 
 def _secondary_motion(amplitude: float) -> str:
@@ -198,28 +203,28 @@ def _secondary_motion(amplitude: float) -> str:
     return "about as much" if amplitude < 1.25 else "more"
 
 
-def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> str:
+def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> list[str]:
+    """Say how long a frame takes, which solver is as accurate, and whether a method is as fast and better."""
     metric = run.metrics.get(run_time(timed))
     network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
     compared = compare_methods(run, timed, metric, run.reference, network) if metric else None
     if compared is None or compared.effect is None or compared.other is None or not compared.other.value:
-        return ""
+        return []
     ends = compared.effect.interval
     times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
     milliseconds = number(compared.other.value)
     training = value_of(run.garment_rows, network, "cost/train")
-    whole = " end to end" if compared.metric.name == "cost/whole" else ""
-    where = f" {_in_scenes(len(scenes))}" if scenes else ""
-    solver, gaps = _rivals(run, run.cells("speed", "garments"), scenes) if scenes else ("", "")
-    return _joined([
+    whole = " end to end (from pose to vertices)" if compared.metric.name == "cost/whole" else ""
+    where = f" {_in_scenes(scenes)}" if scenes else ""
+    return [
         f"{run.label(network)} takes {milliseconds} ms a frame{whole} on one core{where}, the simulation "
-        f"{times} times as long{solver}",
-        gaps,
+        f"{times} times as long",
+        *(_rivals(run, run.cells("speed", "garments"), scenes) if scenes else []),
         f"the training of {run.label(network)} took {duration(training)}" if training else "",
-    ])  # fmt: skip
+    ]
 
 
-def _trust(run: Run, timed: pd.DataFrame) -> str:
+def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
     """Say which claims hold, how uncertain the reference itself is, and what its time step leaves out."""
     sentences = []
     lines = paper_claims.judged(run)
@@ -229,29 +234,37 @@ def _trust(run: Run, timed: pd.DataFrame) -> str:
         claims = f"{total} primary claim{'' if total == 1 else 's'}"
         failing = _claims_that_fail(run, lines)
         sentences.append(f"of {claims} taken from the paper {paper_claims.in_words(counted)}{failing}")
-    where = _in_scenes(timed[timed["method"] == run.reference]["scene"].nunique())
+    where = _in_scenes(set(timed[timed["method"] == run.reference]["scene"]))
+    finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
+    if finest:
+        sentences.append(f"{_left_out_by_the_step(run, timed, finest)}, {where}")
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(
             f"equally valid simulations lie {number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean "
             f"curvature from the reference, {where}: errors below that show no difference"
         )
-    finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
-    if finest:
-        steps = int(run.methods[finest].level or 0)
-        strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
-        ratios = [
-            f"{what} {number(one.value / other.value, 2)} times"
-            for what, (one, other) in (("its strain is", strain), ("its hem amplitude", amplitude))
-            if one and other and other.value
-        ]
-        away = value_of(timed, finest, DISTANCE)
-        distance = "" if away is None else f", and its cloth is {number(away, 2)} mm away"
-        sentences.append(
-            "The reference is converged in each time step of 1/30 s, but not in the step size: with "
-            f"{steps} steps a frame {' and '.join(ratios)} as large{distance}, {where}"
-        )
-    return _joined(sentences)
+    return sentences
+
+
+def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
+    """Say how far the simulation with the smallest time steps lies from the reference, and a network."""
+    steps = int(run.methods[finest].level or 0)
+    strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
+    ratios = [
+        f"{what} {number(one.value / other.value, 2)} times"
+        for what, (one, other) in (("its strain is", strain), ("its hem amplitude", amplitude))
+        if one and other and other.value
+    ]
+    away = value_of(timed, finest, DISTANCE)
+    distance = "" if away is None else f", and its cloth is {number(away, 2)} mm away"
+    network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
+    far = value_of(timed, network, DISTANCE)
+    beside = f" (that of {run.label(network)} {number(far, 2)} mm)" if distance and far is not None else ""
+    return (
+        "the reference is converged in each time step of 1/30 s, but not in the size of the step: with "
+        f"{steps} steps a frame {' and '.join(ratios)} as large{distance}{beside}"
+    )
 
 
 def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> str:
@@ -261,8 +274,9 @@ def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> str:
         if line.claim.primary and line.verdict == paper_claims.FAILS:
             lower, higher = run.label(line.claim.lower), run.label(line.claim.higher)
             measure = measure_of(line.compared).title.lower()
-            failed.append(f"{line.claim.says} ({measure}: {lower} {line.claim.relation} {higher})")
-    return f"; what does not hold: {'; '.join(failed)}" if failed else ""
+            says = line.claim.says.partition("; tested")[0]
+            failed.append(f"“{says}” (tested as {measure}: {lower} {line.claim.relation} {higher})")
+    return f"; what does not hold is {listed(failed)}" if failed else ""
 
 
 def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
@@ -271,20 +285,28 @@ def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
     return [name for name, method in run.methods.items() if method.family == SMALLER_STEPS and name in have]
 
 
-def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> tuple[str, str]:
-    """Return a clause on the solver stopped early that is as accurate, and a sentence on energy gaps."""
+def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
+    """Return a sentence on the fastest solver that is as accurate, and one on the best method as fast."""
     points = points_of(run, frame, scenes, GAP)
     network = next((p for p in points if p.method == NETWORK), None)
     if network is None:
-        return "", ""
+        return []
     snug = run.label(network.method)
     best, solver = beaten_by(points, network), fastest(truncated(run, points), network.error)
+    sentences = []
+    if solver is not None:
+        sentences.append(
+            f"the fastest solver stopped early that is at least as accurate ({run.label(solver.method)}; "
+            f"energy gap {number(solver.error)} J{solver.fewer} against {number(network.error)} J"
+            f"{network.fewer}) takes {number(solver.time)} ms, {number(solver.time / network.time, 2)} times "
+            f"as long as {snug}"
+        )
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
         where = "timed in all of these scenes" if partly_measured else "timed here"
         gaps = (
-            f"{snug} has an energy gap, the energy above the minimum of each time step, of "
+            f"{snug} has an energy gap, a frame's energy above the minimum of its own time step, of "
             f"{number(network.error)} J{network.fewer}; no method {where} is as fast with a smaller gap"
         )
     else:
@@ -295,13 +317,10 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> tuple[str, 
             f"{run.label(best.method)} is no slower{within} and has an energy gap of {number(best.error)} J"
             f"{best.fewer}, below the {number(network.error)} J{network.fewer} of {snug}{scatter}"
         )
-    if solver is None:
-        return "", gaps
-    costs = f"{number(solver.time)} ms ({run.label(solver.method)})"
-    return f"; the fastest solver stopped early with no larger energy gap takes {costs}", gaps
+    return [*sentences, gaps]
 
 
-def _on_other_bodies(run: Run) -> str:
+def _on_other_bodies(run: Run) -> list[str]:
     """Say how much energy networks, and skinning alone, have above the simulation."""
     rows = rows_of_other_shapes(run)
     parts = []
@@ -310,7 +329,7 @@ def _on_other_bodies(run: Run) -> str:
             above, fewer = excess_energy(run, rows, name)
             parts += [] if above is None else [f"{run.label(name)} {number(above)}{fewer}"]
     where = f"on {rows['scene'].nunique()} other bodies [J]"
-    return f"Total energy above the simulation's {where}: {', '.join(parts)}." if parts else ""
+    return [f"Total energy above the simulation's {where}: {', '.join(parts)}"] if parts else []
 
 
 def unbroken(text: str) -> str:

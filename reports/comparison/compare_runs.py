@@ -10,7 +10,7 @@ from fnmatch import fnmatchcase
 import pandas as pd
 
 from benchmarks.results.json_file import ResultsError
-from benchmarks.results.protocol import BEFORE, LEVEL, one_protocol
+from benchmarks.results.protocol import LEVEL, one_protocol
 from reports.comparison.change import (
     BETTER,
     GONE,
@@ -71,21 +71,20 @@ def compare(
     Raises:
         ResultsError: where presets or numbers of the protocol differ, or nothing is shared.
     """
-    if BEFORE not in (one.protocol, other.protocol):  # nobody knows by what protocol those of before are
-        one_protocol((one.protocol, other.protocol), "A and B")
+    one_protocol((one.protocol, other.protocol), "A and B")
     presets = [run.config.get("preset") for run in (one, other)]
     if presets[0] != presets[1]:
         raise ResultsError(f"A is of preset {presets[0]}, B of {presets[1]}: their numbers differ by design")
     frames = [_chosen(run, methods) for run in (one, other)]
     ended = endings(*frames)
     of_metrics = [frame[_matching(frame["metric"], metrics)] for frame in frames]
+    if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
+        machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
+        of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
     lost = [] if shared else gone(*of_metrics)
     keys = [frame.set_index(CELL).index for frame in of_metrics]
     added = len(keys[1].difference(keys[0]))
     kept = [frame[key.isin(rest)] for frame, key, rest in zip(of_metrics, keys, reversed(keys))]
-    if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
-        machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
-        kept = [frame[~frame["metric"].isin(machines)] for frame in kept]
     if kept[0].empty:
         raise ResultsError("the two runs share no such scene, method, seed and metric: nothing to compare")
     judged, compared, one_seed, once = _means(one, *kept)
@@ -102,10 +101,10 @@ def _chosen(run: Run, methods: str) -> pd.DataFrame:
     worn = (frame["suite"] == "garments") & (frame["garment"] != "")
     frame = frame.assign(place=frame["garment"].where(worn, frame["scene"]))
     cell = ["scene", "method", "seed"]
-    repeats = frame[frame["metric"] == REPEATS].set_index(cell)["value"] / 100.0
-    timed = frame["metric"].isin((TIME, WHOLE))
-    apart = repeats.reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell])).to_numpy()
-    frame.loc[timed, "uncertainty"] = frame.loc[timed, "value"] * apart
+    inference, repeats = (frame[frame["metric"] == name].set_index(cell)["value"] for name in (TIME, REPEATS))
+    timed = frame["metric"].isin((TIME, WHOLE))  # inference alone is repeated, its inputs are not
+    apart = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell]))
+    frame.loc[timed, "uncertainty"] = apart.to_numpy()
     # Another run has another reference ensemble: uncertainties add up.
     return frame[frame["metric"] != REPEATS].drop(columns="moved")
 
@@ -135,7 +134,7 @@ def _means(run: Run, one: pd.DataFrame, other: pd.DataFrame) -> tuple[list[Chang
         if within_tolerance(metric, mean, new, far, float(scales[place, metric.name])):
             continue
         if metric.of == "machine" and mean.uncertainty is None and mean.seeds < 2:
-            if max(far.shown, 1.0 / far.shown) < ONCE:
+            if far.scale == RATIO and max(far.shown, 1.0 / far.shown) < ONCE:
                 once[method] += 1
                 continue
         elif not _beyond_noise(metric, far, p):
@@ -184,7 +183,7 @@ def _beyond_noise(metric: Metric, far: Effect, p: float | None) -> bool:
     """Return whether a change is more than what another draw of seeds, or of times, would do."""
     if metric.of == "machine":
         low, high = far.ends or (far.value - far.uncertainty, far.value + far.uncertainty)
-        return far.scale == RATIO and max(low, -high) > math.log1p(TIME_TOLERANCE)
+        return far.scale != RATIO or max(low, -high) > math.log1p(TIME_TOLERANCE)  # from 0, or to 0
     if p is None:
         return abs(far.above()) > SPREADS * far.uncertainty
     return abs(far.above()) > far.uncertainty and p < LEVEL

@@ -9,6 +9,7 @@ from pathlib import Path
 from urllib.parse import urlencode
 
 from benchmarks.results.protocol import LEAST_MOTIONS
+from benchmarks.results.row import DECLARED
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import Run
 from reports.statistics.effects import Effect
@@ -57,7 +58,7 @@ class Scored:
         excess = excess_of(self.run, rows, self.method)
         numbers = [mean_of(rows, self.method, metric) for metric in (DYNAMICS, PENETRATION, TIME)]
         timed = rows[(rows["method"] == self.method) & (rows["metric"] == TIME)]
-        declared = timed["reason"].str.startswith("declared").any()
+        declared = (timed["reason"] == DECLARED).any()
         clock = "declared" if declared else "measured" if len(timed) else "unknown"
         shown: Cell = None
         if excess is not None:  # an interval over fewer motions says nothing

@@ -20,6 +20,11 @@ class SelectedRollOuts:
     cloths: dict[str, Trajectory]
     body: Trajectory | None
 
+    @property
+    def dt(self) -> float:
+        """Time between frames [s], of the longest roll-out; nan where none has two frames."""
+        return max(self.cloths.values(), key=lambda cloth: cloth.frames).dt
+
 
 def select_roll_outs(
     folder: RunFolder, scene: str, methods: Sequence[str], seed: int | None = None

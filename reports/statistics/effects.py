@@ -60,6 +60,7 @@ class Effect:
         motions: how many independent motions both methods have: segments of one recording are one.
         limits: of costs, the least and the greatest of what was measured, on the scale.
         possible: the least and the greatest effect that there can be, which cut the interval.
+        least_p: p-value below which no test of so few motions can go.
         uncertainty: standard deviation of the value over the reference's ensemble; 0 where no member changes
             it, or none ran.
         unit: of a plain difference, what 1 is of: TIE of it is no difference; 0 where that is unknown.
@@ -76,6 +77,7 @@ class Effect:
     motions: int = 1
     limits: tuple[float, float] | None = None
     possible: tuple[float, float] = (-math.inf, math.inf)
+    least_p: float = 0.0
     uncertainty: float = 0.0
     unit: float = 0.0
     complete: bool = True
@@ -117,8 +119,8 @@ class Effect:
             return None
         distance = abs(self.above(factor))
         if self.error == 0.0:  # every motion has the same factor between the two
-            return float(distance == 0.0)
-        return float(2.0 * stats.t.sf(distance / self.error, self.freedom))
+            return 1.0 if distance == 0.0 else self.least_p
+        return max(self.least_p, float(2.0 * stats.t.sf(distance / self.error, self.freedom)))
 
     def above(self, factor: float = 1.0) -> float:
         """Return how far `factor` times the first is above the second, on the scale."""
@@ -311,7 +313,8 @@ def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
     parts = np.array([part.var() for part in alone])
     free = np.array([len(grids[0]), *(grid.shape[1] for grid in grids)]) - 1
     known = parts[free > 0] ** 2 / free[free > 0]
-    freedom = parts.sum() ** 2 / known.sum() if known.sum() > 0.0 else math.inf
+    # Where only motion and seed together scatter, nothing tells: the fewest that any factor has.
+    freedom = parts.sum() ** 2 / known.sum() if known.sum() > 0.0 else float(free[free > 0].min(initial=1))
     return float(np.std(draws)), float(freedom)
 
 

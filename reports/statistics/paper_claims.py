@@ -235,7 +235,9 @@ def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
         one, other = pair(rows, claim.lower, claim.higher, metric.name)
         if one is None or other is None:
             return Comparison(metric, one, other, None)
-        far = replace(effect(one, half_of(one), DIFFERENCE), possible=(-HALF, HALF))
+        far = effect(one, half_of(one), DIFFERENCE)
+        # Shares lie between 0 and 100 %: of motions that agree Student's t makes more than the sign test can.
+        far = replace(far, possible=(-HALF, HALF), least_p=min(1.0, 2.0 * 0.5**far.motions))
         if far.error is None and far.motions > 1:  # all or none of the frames in every motion
             far = replace(far, error=0.0, covers="motions")
         return Comparison(metric, one, other, far)

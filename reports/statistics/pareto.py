@@ -117,7 +117,7 @@ def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
 
 
 def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
-    """Return the error [unit of the metric] below which a method is inconclusive from the reference.
+    """Return the error [unit of the metric] below which a method cannot be told from the reference.
 
     It is the root mean square over the reference's ensemble, the mean of scenes; of the energy gap what the
     reference leaves on contact planes searched at its end. 0 where none is known.
@@ -130,18 +130,14 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
 
 
 def beaten_by(points: Sequence[Point], point: Point) -> Point | None:
-    """Return the most accurate of the points that are no slower and no less accurate, or None."""
-    faster = [p for p in points if p is not point and overtaken(point, [p])]
-    return min(faster, key=lambda p: p.error) if faster else None
+    """Return the most accurate of the points that are no slower and no less accurate, or None.
 
-
-def overtaken(point: Point, others: Sequence[Point]) -> bool:
-    """Return whether another is no less accurate and no slower by more than the point's own repeats.
-
-    A rival whose run times scatter widely is no faster for that; nor is one that takes much longer.
+    No slower means: by no more than the point's own repeats. A rival whose run times scatter widely is no
+    faster for that; nor is one that takes much longer.
     """
     latest = point.time + min(point.time_spread, MOST_SLACK * point.time)
-    return any(p.error <= point.error and p.time <= latest for p in others)
+    rivals = [p for p in points if p is not point and p.error <= point.error and p.time <= latest]
+    return min(rivals, key=lambda p: p.error) if rivals else None
 
 
 def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:

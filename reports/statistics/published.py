@@ -12,7 +12,7 @@ import pandas as pd
 from scipy import stats
 
 from benchmarks.results.json_file import ResultsError
-from benchmarks.results.protocol import BEFORE, LEVEL
+from benchmarks.results.protocol import LEVEL
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
@@ -28,9 +28,9 @@ def published_beside(run: Run, method: str) -> str:
 
     It has where its preset is the default, its motions have the published frames (`--frames` cuts them), and
     the checkout has the published run. Segments of a recording count as one motion, as in the typical
-    relative excess. A method is reproduced where each of its seeds lies within the interval in which one more
-    of the published seeds is expected: their mean on the scale of relative excess, plus or minus Student's t
-    times s sqrt(1 + 1/n).
+    relative excess. A method is reproduced where the mean of its m seeds, on the scale of relative excess,
+    lies within the interval in which that of m more seeds is expected: the mean of the n published ones, plus
+    or minus Student's t times their standard deviation times sqrt(1/m + 1/n).
     """
     if run.config.get("preset") != DEFAULT or not (PUBLISHED / DEFAULT).is_dir():
         return ""
@@ -40,7 +40,7 @@ def published_beside(run: Run, method: str) -> str:
         return ""  # of an earlier version
     if published.config.get("started") == run.config.get("started"):
         return ""
-    if BEFORE != published.protocol != run.protocol:
+    if published.protocol != run.protocol:
         return ""
     ours, theirs = _by_seed(run, method), _by_seed(published, method)
     scenes = sorted(set(ours.index) & set(theirs.index))
@@ -55,8 +55,8 @@ def published_beside(run: Run, method: str) -> str:
     if len(before) < 2:
         return text
     reach = stats.t.ppf(1.0 - LEVEL / 2.0, len(before) - 1) * before.std(ddof=1)
-    reach *= math.sqrt(1.0 + 1.0 / len(before))
-    return f"{text}: {'reproduced' if np.all(np.abs(now - before.mean()) <= reach) else 'not reproduced'}"
+    reach *= math.sqrt(1.0 / len(now) + 1.0 / len(before))
+    return f"{text}: {'reproduced' if abs(now.mean() - before.mean()) <= reach else 'not reproduced'}"
 
 
 @cache

@@ -54,7 +54,8 @@ def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Seque
                 spread = f"± {duration(apart) if column.unit == 's' else number(apart, 1)}"
         elif isinstance(cell, Effect):
             mark = ("" if cell.complete else "*") + _COVERED.get(cell.covers, "")
-            spread = " to ".join("∞" if end == math.inf else number(end) for end in cell.interval or ())
+            ends = cell.interval or ()
+            spread = " to ".join("∞" if end == math.inf else number(end, column.digits) for end in ends)
         lines.append({"text": text, "spread": spread, "mark": mark})
     return lines
 
@@ -72,5 +73,7 @@ def _text(run: Run, column: Column, cell: Cell) -> str:
         return "∞"
     if column.unit == "s":
         return duration(value)
+    if value is not None and abs(value) < column.rounding:
+        return number(0.0)
     small = column.digits > 3 and value is not None and abs(value) < SMALL
     return number(value, 2 if small else column.digits, trim=column.trim)

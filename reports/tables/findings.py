@@ -69,9 +69,10 @@ def relative_excess(run: Run) -> list[Table]:
             excess.uncertainty or None, len(excess.by_motion), stands,
         ))  # fmt: skip
     columns = (
-        GARMENT, METHOD, Column("typical", "Typical", "%"), Column("mean", "Mean", "%"),
-        Column("worst", "Worst", "%"), Column("worst_motion", "Worst motion", text=True),
-        Column("left_out_low", "Left out, low", "%"), Column("left_out_high", "Left out, high", "%"),
+        GARMENT, METHOD, Column("typical", "Typical", "%", digits=2), Column("mean", "Mean", "%", digits=2),
+        Column("worst", "Worst", "%", digits=2), Column("worst_motion", "Worst motion", text=True),
+        Column("left_out_low", "Left out, low", "%", digits=2),
+        Column("left_out_high", "Left out, high", "%", digits=2),
         Column("uncertain_by", "Uncertain by", "%"), Column("motions", "Motions"),
         Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip

@@ -16,7 +16,7 @@ from reports.tables.table import Cell, Column, Table, metric_column, table
 
 ROWS = 8
 NAMED = 4  # scenes that a caption names
-ANSWERS = ("penetration/surface", "dynamics/amplitude", "dynamics/correlation")
+ANSWERS = ("distance/rms", "penetration/surface", "dynamics/amplitude", "dynamics/correlation")
 GAP = "gap/energy"
 
 
@@ -48,16 +48,18 @@ def overview(run: Run) -> list[Table]:
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
     faster = {name: _times_faster(run, timed, name) for name in chosen}
+    none_of = {run.reference: 0.0} if any(excess.values()) else {}  # by definition
     lines: list[tuple[Cell, ...]] = [
         (
-            method, known.effect if (known := excess.get(method)) else None,
+            method, known.effect if (known := excess.get(method)) else none_of.get(method),
             known.worst[1] if known else None,
             *(mean_of(rows, method, metric.name) for metric, rows in asked), faster[method],
         )
         for method in chosen
     ]  # fmt: skip
     columns = [
-        Column("relative_excess", "Relative excess", "%"), Column("worst", "Its worst motion", "%"),
+        Column("relative_excess", "Relative excess", "%", digits=2),
+        Column("worst", "Its worst motion", "%", digits=2),
         *(metric_column(metric) for metric, _ in asked), Column("faster", "Times faster"),
     ]  # fmt: skip
     kept = [k for k in range(1, len(columns) + 1) if any(line[k] is not None for line in lines)]
@@ -67,7 +69,8 @@ def overview(run: Run) -> list[Table]:
         return []
     timed_in = ", ".join(scenes) if len(scenes) <= NAMED else f"{len(scenes)} scenes"
     of_motions = (
-        f"{garment}: relative excess as a geometric mean over recordings, the rest as means over motions"
+        f"{garment}: relative excess as a geometric mean over independent sources, the rest as arithmetic "
+        "means over motions"
     )
     caption = of_motions if garment else f"Means over {timed_in}"
     caption += f"; energy gaps and run times over {timed_in}." if garment and scenes else "."

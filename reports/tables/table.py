@@ -17,6 +17,7 @@ from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.number_texts import CSV_DASH, csv_number
 
+ROUNDING = {"dynamics/amplitude": 1e-4}  # a network's float32 positions alone move a hem by 1e-6 to 1e-5
 EFFECT_PARTS = ("kind", "low", "high", "covers")
 Cell = float | int | str | Mean | Effect | None
 
@@ -27,6 +28,7 @@ class Column:
 
     text: words, set from the left; method: names of methods, printed by their labels. digits: of its numbers;
     trim: without zeros at their end; mixed: of several units, whose points need not stand in a column.
+    rounding: size below which a number is rounding error and printed as 0; the CSV keeps it.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Column:
     digits: int = 3
     trim: bool = False
     mixed: bool = False
+    rounding: float = 0.0
 
     @property
     def unit_above(self) -> str:
@@ -94,7 +97,8 @@ class Table:
 
 def metric_column(metric: Metric) -> Column:
     """Return the column of a metric."""
-    return Column(metric.name, metric.title, "" if metric.unit == "1" else metric.unit)
+    unit = "" if metric.unit == "1" else metric.unit
+    return Column(metric.name, metric.title, unit, rounding=ROUNDING.get(metric.name, 0.0))
 
 
 def table(

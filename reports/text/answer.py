@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from reports.blocks.page_one_sentences import first_sentences
+from reports.blocks.page_one_sentences import topics
 from reports.run.finished_run import Run
 from reports.tables.table import Table
 from reports.text.text_table import aligned_text, remarks_on, text_rows
@@ -30,7 +30,8 @@ def answer(run: Run, tables: Mapping[str, Table]) -> str:
         rows = text_rows(run, table, [name for name in COLUMNS if name in names][:MOST_COLUMNS])
         lines.append(aligned_text(rows))
         notes = [remarks_on(rows), f"The report also has {', '.join(left_out)}." if left_out else ""]
-    lines.append(" ".join(filter(None, [*first_sentences(run)[:1], *notes])))
+    chief = [sentences[0] for _, sentences in topics(run)[:1]]
+    lines.append(" ".join(filter(None, [*chief, *notes])))
     return "\n".join(filter(None, lines)).replace("\u00a0", " ")
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from reports.run.finished_run import Run
 from reports.statistics.effects import RATIO
-from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, Claim, Judged, in_words, judged
+from reports.statistics.paper_claims import BEFORE, EXPLORATORY, PRIMARY, Claim, Judged, in_words, judged
 from reports.statistics.verdicts import measure_of
 from reports.tables.number_texts import DASH, number
 
-HEAD = ["Claim", "Measure", "First", "Claimed", "Second", "Effect", "Interval", "p", "Verdict", "Run"]
+HEAD = ["Claim", "Tested", "Effect", "Interval", "p", "Verdict", "Run"]
 NOT_MEASURED = "not measured"
 TIMES = ("s", "ms")  # units
 
@@ -24,10 +24,12 @@ class JudgedClaims:
     Attributes:
         verdicts: claim -> name of the first run that has both of its methods, and the claim as it came out.
         labels: method -> its name for people.
+        metrics: metric -> its title, with its unit.
     """
 
     verdicts: Mapping[Claim, tuple[str, Judged]]
     labels: Mapping[str, str]
+    metrics: Mapping[str, str]
 
 
 def judge_in_first(runs: Sequence[tuple[str, Run]], timed: Collection[str]) -> JudgedClaims:
@@ -38,12 +40,14 @@ def judge_in_first(runs: Sequence[tuple[str, Run]], timed: Collection[str]) -> J
     """
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
+    metrics = {BEFORE.name: BEFORE.heading}
     for name, run in runs:
         for line in judged(run):
             if name in timed or line.compared.metric.unit not in TIMES:
                 verdicts.setdefault(line.claim, (name, line))
         labels = {method: run.label(method) for method in run.methods} | labels
-    return JudgedClaims(verdicts, labels)
+        metrics |= {metric.name: metric.heading for metric in run.metrics.values()}
+    return JudgedClaims(verdicts, labels, metrics)
 
 
 def claim_rows(claims: JudgedClaims, *, primary: bool) -> list[list[str]]:
@@ -67,9 +71,10 @@ def claim_counts(claims: JudgedClaims) -> str:
 
 def _row(claim: Claim, claims: JudgedClaims) -> list[str]:
     lower, higher = (claims.labels.get(method, method) for method in (claim.lower, claim.higher))
-    methods = [lower, claim.relation, higher]
+    relation = f"{lower} {claim.relation} {higher}"
     if claim not in claims.verdicts:
-        return [claim.says, claim.metric, *methods, DASH, DASH, DASH, NOT_MEASURED, DASH]
+        heading = claims.metrics.get(claim.metric, claim.metric)
+        return [claim.says, f"{heading}: {relation}", DASH, DASH, DASH, NOT_MEASURED, DASH]
     name, line = claims.verdicts[claim]
     far = line.compared.effect
     effect, interval = DASH, DASH
@@ -77,5 +82,5 @@ def _row(claim: Claim, claims: JudgedClaims) -> list[str]:
         effect = ("×" if far.scale == RATIO else "") + number(far.shown)
         interval = " to ".join(number(end) for end in far.interval or ()) or DASH
     p = DASH if line.p is None else number(line.p, 2)
-    outcome = [effect, interval, p, line.verdict + line.remark, name]
-    return [claim.says, measure_of(line.compared).heading, *methods, *outcome]
+    tested = f"{measure_of(line.compared).heading}: {relation}"
+    return [claim.says, tested, effect, interval, p, line.verdict + line.remark, name]

@@ -1,24 +1,25 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
-`headline of RUN`, `answer of RUN` (first sentence of each topic of the headline), `table NAME of RUN;
-COLUMN, ...`, `claims primary of RUN, ...`, `claims exploratory of RUN, ...`, `counts of RUN, ...`, `runs of
-RUN, ...`; RUN is a folder of reports/published, and the first run that has both methods of a claim judges it.
-`attributes of MODULE.CLASS`, `docstring of MODULE` (its table), `recipes of NAME, ...`, `sources of the
-library` and the parts that `code_parts.PARTS` names come from the code, `evaluations of published runs` from
-the run.json of each run; `attributes` and `options of benchmarks.run` take names after a semicolon, whose
-rows alone are shown, in that order.
+`headline of RUN`, `answer of RUN` (two sentences of each topic of the headline), `table NAME of RUN;
+COLUMN, ...; METHOD, ...` (all where none is named), `claims primary of RUN, ...`, `claims exploratory of RUN,
+...`, `counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of reports/published, and the first run that
+has both methods of a claim judges it. `attributes of MODULE.CLASS`, `docstring of MODULE` (its table),
+`recipes of NAME, ...`, `sources of the library` and the parts that `code_parts.PARTS` names come from the
+code, `evaluations of published runs` from the run.json of each run; `attributes` and `options of
+benchmarks.run` take names after a semicolon, whose rows alone are shown, in that order.
 """
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from io import StringIO
 from pathlib import Path
 
-from benchmarks.results.protocol import BEFORE
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks.page_one_sentences import first_sentences, headline
+from reports.blocks.page_one_sentences import headline, topics
 from reports.statistics.published import PUBLISHED, read_published
 from reports.tables import TABLES
 from reports.tables.table import Table
@@ -29,9 +30,10 @@ from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.motion.composition import clip_rows, distance_rows, source_rows
 
 FORMS = (
-    "headline of RUN; answer of RUN; table NAME of RUN; COLUMN, ...; claims primary of RUN, ...; claims "
-    "exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; attributes of MODULE.CLASS; NAME, ...; "
-    "docstring of MODULE; recipes of NAME, ...; sources of the library; evaluations of published runs; "
+    "headline of RUN; answer of RUN; table NAME of RUN; COLUMN, ...; METHOD, ...; claims primary of RUN, "
+    "...; claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; attributes of MODULE.CLASS; "
+    "NAME, ...; docstring of MODULE; recipes of NAME, ...; sources of the library; evaluations of published "
+    "runs; "
     f"{'; '.join(PARTS)}"
 )
 
@@ -43,7 +45,7 @@ ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
 def published_part(request: str) -> str:
     """Return the Markdown of a generated part. Raises ValueError for words of no known form."""
     what, _, source = request.partition(" of ")
-    runs, _, columns = source.partition(";")
+    runs, columns, methods = (*source.split(";"), "", "")[:3]
     folders = [PUBLISHED / name.strip() for name in runs.split(",")]
     wanted = [column.strip() for column in columns.split(",") if column.strip()]
     kind, _, name = what.partition(" ")
@@ -62,9 +64,11 @@ def published_part(request: str) -> str:
     if kind == "headline":
         return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
     if kind == "answer":
-        return " ".join(first_sentences(read_published(folders[0])))
+        answers = [(topic, " ".join(texts[:2])) for topic, texts in topics(read_published(folders[0]))]
+        return "\n".join(f"- **{topic}.** {text}" for topic, text in answers)
     if kind == "table":
         table = _table(folders[0], name)
+        table = _of_methods(table, [method.strip() for method in methods.split(",") if method.strip()])
         rows = text_rows(read_published(folders[0]), table, wanted)
         return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
     if kind == "claims":
@@ -94,8 +98,7 @@ def evaluation_rows(published: Path) -> list[tuple[str, ...]]:
     runs: dict[tuple[str, str, str], list[str]] = {}
     for path in sorted(published.glob("*/run.json")):
         config = RunFolder(path.parent).read_config()
-        number = (config.get("protocol") or {}).get("number", BEFORE)
-        group = number, str(config["split"]), str(len(config["test_looks"]))
+        group = config["protocol"]["number"], str(config["split"]), str(len(config["test_looks"]))
         runs.setdefault(group, []).append(f"`{path.parent.name}`")
     lines = [(*group, ", ".join(runs[group])) for group in sorted(runs)]
     return [("Protocol", "Split", "Test-set evaluations", "Runs"), *lines]
@@ -104,6 +107,19 @@ def evaluation_rows(published: Path) -> list[tuple[str, ...]]:
 @cache
 def _claims(*folders: Path) -> JudgedClaims:
     return judge_in_first([(folder.name, read_published(folder)) for folder in folders], TIMED)
+
+
+def _of_methods(table: Table, methods: Sequence[str]) -> Table:
+    """Return the table with the rows of these methods alone, of all where none is named.
+
+    Raises:
+        ValueError: for a method that the table has not.
+    """
+    place = next((place for place, column in enumerate(table.columns) if column.method), 0)
+    known = {str(row[place]) for row in table.rows}
+    if absent := [name for name in methods if name not in known]:
+        raise ValueError(f"table {table.name} has no row of {absent[0]}; it has {', '.join(sorted(known))}")
+    return replace(table, rows=tuple(row for row in table.rows if not methods or row[place] in methods))
 
 
 def _table(folder: Path, name: str) -> Table:

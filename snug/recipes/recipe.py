@@ -51,7 +51,7 @@ class Recipe:
         batch: sub-sequences of a step.
         window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap); a
             network of single frames learns from each frame whatever it is.
-        even: number n of parts of an epoch, each of which takes every n-th sub-sequence of all motions.
+        even: passes n of an epoch: pass k takes the sub-sequences k, k + n, k + 2n, ... of all motions.
             With 1 the order is random, and a hard pose may first appear after the network has settled,
             with a loss of joules.
         shape_range: bodies get shape numbers from U(-r, r).

@@ -1,4 +1,4 @@
-"""The documents: examples run as written, links lead somewhere."""
+"""The documents: examples run as written, links lead somewhere, words are plain and tables narrow."""
 
 from __future__ import annotations
 
@@ -29,6 +29,19 @@ LONG = (
     "A network from elsewhere",
     "A recipe",
 )  # tests/benchmarks/plan/test_user_files.py: the first and the third
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+MOST_TERMS, MOST_COLUMNS = 20, 7
+# Terms with a meaning of their own here: a page may use them because the glossary explains them.
+PRIVATE = (
+    "scene", "method", "roll-out", "suite", "preset", "recipe", "reference", "ensemble", "skinning alone",
+    "relative excess", "energy gap", "hem amplitude", "stopped early", "post-processing", "augmented", "clip",
+    "independent source", "quasi-static solution", "handle", "floor",
+)  # fmt: skip
+AVOIDED = (
+    "cannot be told", "right simulation", "moved start", "making ready", "below the skin", "given frames",
+    "falls apart", "hardly swings", "own drape",
+)  # fmt: skip
 
 
 def blocks(text: str) -> Iterator[tuple[str, str, str]]:
@@ -158,3 +171,32 @@ def test_links_lead_somewhere(path):
             target = path.parent / name if name else path
             assert target.exists(), f"{path.name}: {link}"
             assert not anchor or anchor in heading_anchors(target), f"{path.name}: {link}"
+
+
+def prose(path: Path) -> str:
+    """Text of a page without blocks of code and spans of code."""
+    text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
+    return re.sub(r"`[^`\n]*`", "", text)
+
+
+def glossary_terms(text: str) -> list[str]:
+    """First cells of the first table."""
+    lines = text.partition("\nNetworks:")[0].splitlines()
+    return [line.split("|")[1].strip() for line in lines if line.startswith("| ")][2:]
+
+
+def test_the_glossary_explains_every_private_term_that_a_page_uses_and_is_short():
+    terms = glossary_terms(GLOSSARY)
+    assert len(terms) <= MOST_TERMS
+    words = " ".join(terms)
+    used = [term for term in PRIVATE if any(term in prose(path).lower() for path in PAGES)]
+    assert [term for term in used if term not in words] == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_a_page_has_narrow_tables_leading_zeros_and_no_private_phrases(path):
+    text = prose(path)
+    wide = [line for line in text.splitlines() if line.startswith("|") and line.count(" | ") >= MOST_COLUMNS]
+    assert wide == [], f"a table has more than {MOST_COLUMNS} columns"
+    assert re.findall(r"(?<![\w./*{,-])\.\d+\b", text) == [], "a decimal lacks its leading zero"
+    assert [phrase for phrase in AVOIDED if phrase in text.lower()] == []

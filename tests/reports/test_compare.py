@@ -107,6 +107,24 @@ def test_times_count_beyond_15_percent_repeated_and_beyond_twice_taken_once_on_o
     assert found(rows_of(), elsewhere) == []
 
 
+def test_times_that_are_not_compared_are_not_missed_either():
+    without = [r for r in rows_of() if r.metric != "cost/frame"]
+    (gone,) = found(rows_of(), without)
+    assert gone[0] == "gone" and found(rows_of(), without, times=False) == []
+    elsewhere = [dataclasses.replace(r, hardware="another") for r in without]
+    assert found(rows_of(), elsewhere) == []
+
+
+def test_a_cost_that_was_nothing_is_a_change_and_the_scatter_of_end_to_end_time_is_that_of_inference():
+    def costs(train: float, whole: float = 2.0) -> list:
+        numbers = (("cost/data", train, "s"), ("cost/frame", 0.1, "ms"), ("cost/whole", whole, "ms"))
+        rows = [row(SCENES[0], "lbfgs-4", m, v, unit=u) for m, v, u in numbers]
+        return [*rows, row(SCENES[0], "lbfgs-4", "cost/spread", 50.0, unit="%")]
+
+    assert [change[-1] for change in found(costs(0.0), costs(90.0))] == ["cost/data"]
+    assert [change[-1] for change in found(costs(1.0), costs(1.0, 2.6))] == ["cost/whole"]
+
+
 def test_one_seed_in_common_is_not_judged_but_counted():
     rows = [r for r in rows_of(1, snug=3.0) if r.seed == 0]
     result = compare(run_of(rows_of()), run_of(rows), shared=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reference_sim.energies.bend_hinge.training_batch import P0, P1, P2, P3, P4, P5, P6, P7
 from reference_sim.kernels.float32_layout import (
     FAST,
     HALF,
@@ -26,18 +27,6 @@ if TYPE_CHECKING:
     from reference_sim.energies.bend_hinge.definition import BendHinge
 
 PI, HALF_PI, TWO_PI = np.float32(np.pi), np.float32(np.pi / 2), np.float32(2 * np.pi)
-
-
-def _arctangent() -> tuple[np.float32, ...]:
-    """Return the coefficients c of atan(a) = a sum c_k a^(2k) on [0, 1], from a fit at Chebyshev points."""
-    terms = 8
-    a = np.cos((np.arange(200) + 0.5) * np.pi / 400)
-    columns = a[:, None] ** (2 * np.arange(terms))
-    c, *_ = np.linalg.lstsq(columns, np.arctan(a) / a, rcond=None)
-    return tuple(np.float32(value) for value in c)
-
-
-C0, C1, C2, C3, C4, C5, C6, C7 = _arctangent()
 
 
 def lanes(term: BendHinge) -> Float32Lanes:
@@ -91,7 +80,7 @@ def hinge_gradient(data, u, gradient, s):
             size_s, size_c = abs(sine), abs(cosine)
             a = min(size_s, size_c) / (max(size_s, size_c) + TINY)
             q = a * a
-            angle = a * (C0 + q * (C1 + q * (C2 + q * (C3 + q * (C4 + q * (C5 + q * (C6 + q * C7)))))))
+            angle = a * (P0 + q * (P1 + q * (P2 + q * (P3 + q * (P4 + q * (P5 + q * (P6 + q * P7)))))))
             angle = HALF_PI - angle if size_s > size_c else angle
             angle = PI - angle if cosine < np.float32(0.0) else angle
             angle = -angle if sine < np.float32(0.0) else angle

@@ -113,12 +113,12 @@ def descend(
     """Run L-BFGS from u (3V,), which becomes the end.
 
     tolerance: [N] of the largest component of the gradient. first_step: share of the first direction that is
-    tried first. work (4, 3V): room. counts: becomes iterations, evaluations, first share taken; returns the
-    largest component of the gradient at the end [N].
+    tried first. work (4, 3V): room. counts: becomes iterations and first share taken; returns the largest
+    component of the gradient at the end [N].
     """
     gradient, trial_gradient, trial, p = work[0], work[1], work[2], work[3]
     value = evaluate(u, target, vertices, terms, gradient, scratch, energies)
-    counts[0], counts[1], counts[2] = 0.0, 1.0, first_step
+    counts[0], counts[1] = 0.0, first_step
     trial_energies = np.empty_like(energies)
     most, held, newest = len(memory.rho), 0, -1
     alphas = np.empty(most, np.float32)
@@ -139,7 +139,6 @@ def descend(
             trial[:] = u
             add_scaled(trial, share, p)
             trial_value = evaluate(trial, target, vertices, terms, trial_gradient, scratch, trial_energies)
-            counts[1] += 1
             if np.isfinite(trial_value) and trial_value <= value + SUFFICIENT_DECREASE * share * slope:
                 accepted = True
                 break
@@ -150,18 +149,16 @@ def descend(
             held = 0
             continue
         if counts[0] == 0:
-            counts[2] = share
-        newest = (newest + 1) % most
-        s, y = memory.S[newest], memory.Y[newest]
-        for i in range(len(u)):
-            s[i] = trial[i] - u[i]
-            y[i] = trial_gradient[i] - gradient[i]
-        curvature = dot(s, y)
-        if curvature > LEAST_CURVATURE * np.sqrt(dot(s, s) * dot(y, y)):
-            memory.rho[newest] = np.float32(1.0) / curvature
-            held = min(held + 1, most)
-        else:
-            newest = (newest - 1) % most
+            counts[1] = share
+        for i in range(
+            len(u)
+        ):  # the direction has done its work: it becomes the step, the gradient its change
+            p[i] = trial[i] - u[i]
+            gradient[i] = trial_gradient[i] - gradient[i]
+        curvature = dot(p, gradient)
+        if curvature > LEAST_CURVATURE * np.sqrt(dot(p, p) * dot(gradient, gradient)):
+            newest, held = (newest + 1) % most, min(held + 1, most)
+            memory.S[newest], memory.Y[newest], memory.rho[newest] = p, gradient, np.float32(1.0) / curvature
         u[:] = trial
         gradient[:] = trial_gradient
         energies[:] = trial_energies

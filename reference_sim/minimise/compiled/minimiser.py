@@ -57,7 +57,7 @@ class CompiledLBFGS:
         )
         self._work = np.empty((4, 3 * count), np.float32)
         self._scratch = np.empty(SCRATCH, np.float32)
-        self._energies, self._counts = np.zeros(iteration.ELEMENTS + len(self._lanes)), np.zeros(3)
+        self._energies, self._counts = np.zeros(iteration.ELEMENTS + len(self._lanes)), np.zeros(2)
         self.start_again()
 
     def start_again(self) -> None:
@@ -82,7 +82,7 @@ class CompiledLBFGS:
             self._tolerance, min(2.0 * self._first_step, 1.0), self._work, self._scratch, self._energies,
             self._counts,
         )  # fmt: skip
-        self._first_step = float(self._counts[2])
+        self._first_step = float(self._counts[1])
         seconds = {"assemble": middle - start, "factorise": begun - middle}
         seconds["evaluate"] = time.perf_counter() - begun
         x = x0 + u.reshape(x0.shape)

@@ -51,7 +51,7 @@ def draw_points(
         small: whether the panel is one of many.
     """
     points = [point for curve in curves for point in (*curve.points, *curve.aside)]
-    # An error that is inconclusive from the reference needs no decades of its own.
+    # An error that cannot be told from the reference needs no decades of its own.
     least = max(max((p.error for p in points), default=1.0) * 10.0**-DECADES, band / 10.0)
     edge = _limits(axes, points, reference, least)
     best = front(p for p in points if p.error > least)

@@ -7,13 +7,14 @@ import pandas as pd
 from reports.run.finished_run import Run
 from reports.tables.table import Cell, Column, Table, table
 
+SPIN = "spin_kept"  # reported, not judged
 LAWS = {
     "fall_over_discrete_law": "free fall",
     "momentum_error": "momentum",
     "asymmetry": "symmetry",
     "reaction_over_weight": "reaction",
     "energy_gap": "energy gap",
-    "spin_kept": "spin left",
+    SPIN: "spin left",
 }
 RATIOS = ("fall_over_discrete_law", "reaction_over_weight")  # right at 1; tabulated as errors in per cent
 ENGINE = Column("engine", "Engine", text=True)
@@ -26,6 +27,9 @@ def engine_audit(run: Run) -> list[Table]:
     for engine in dict.fromkeys(scene for scene, _ in values if "/" not in scene):
         names = [label for law, label in LAWS.items() if (engine, law) in violated]
         names += ["own limit"] * ((f"{engine}/x1", "distance") in violated)
+        judged = [(engine, law) for law in LAWS if law != SPIN] + [(f"{engine}/x1", "distance")]
+        if absent := sum(key not in values for key in judged):
+            names.append(f"{absent} not measured")
         budget = values.get((engine, "budget"))
         converged = None if budget is None else values.get((f"{engine}/x{budget:.0f}", "time"))
         lines.append((

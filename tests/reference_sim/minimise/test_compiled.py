@@ -17,6 +17,7 @@ from benchmarks.scenes.out_of_distribution import faster
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import LBFGS, Newton, lbfgs
+from reference_sim.minimise.compiled import iteration
 from reference_sim.minimise.compiled.iteration import ELEMENTS, evaluate
 from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
 from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern, factorise, solve
@@ -148,6 +149,19 @@ def test_many_iterations_end_at_the_minimum():
     least = Newton(potential).minimise(guess)
     assert least.status == "converged"
     assert potential.value(descent.positions) - least.energy < 1e-6 * (potential.value(guess) - least.energy)
+
+
+def test_a_pair_of_too_little_curvature_leaves_the_remembered_ones_whole(monkeypatch):
+    """As an interpreted loop, in which such pairs are made frequent, also where the memory is full."""
+    potential, guess = pressed(0)
+    monkeypatch.setattr(iteration, "LEAST_CURVATURE", 0.2)
+    monkeypatch.setattr(iteration, "descend", iteration.descend.py_func)
+    for count in range(25, 35):
+        solver = CompiledLBFGS(potential, max_iterations=count)
+        assert solver.minimise(guess).iterations == count
+        memory = solver._memory
+        curvatures = np.einsum("ij,ij->i", memory.S.astype(float), memory.Y.astype(float))
+        assert memory.rho * curvatures == pytest.approx(np.ones(len(curvatures)), rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(2))

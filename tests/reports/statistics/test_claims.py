@@ -281,20 +281,24 @@ def test_the_share_of_frames_with_more_energy_is_counted_scene_by_scene_and_seed
     assert len(with_shares(run.frame, frames, "inertia", "snug", "pbns")) == len(run.frame)
 
 
-@pytest.mark.parametrize(("snug", "verdict"), [(1.0, "holds"), (3.0, "does not hold")])
-def test_a_claim_of_frames_is_judged_by_the_share_of_them(snug, verdict):
+@pytest.mark.parametrize(
+    ("snug", "motions", "verdict"),
+    [(1.0, 6, "holds"), (3.0, 6, "does not hold"), (1.0, 4, "inconclusive")],  # a sign test of 4: p of 0.125
+)
+def test_a_claim_of_frames_is_judged_by_the_share_of_them(monkeypatch, snug, motions, verdict):
+    monkeypatch.setitem(globals(), "MOTIONS", (*MOTIONS, "tshirt/spin", "tshirt/run")[:motions])
     rows = seeds("snug", (1.0, 1.1)) + seeds("pbns", (1.2, 1.15))
     run = run_of(rows)
     claim = share_of_frames("strain").name, "snug", "pbns"
     assert claim not in {(f.claim.metric, f.claim.lower, f.claim.higher) for f in judged(run)}
     ten = [snug] * 9 + [4.0 - snug]  # the share of PBNS is what is left: one sample, not two
     frames = frame_table(snug=[ten, ten], pbns=[[2.0] * 10] * 2)
-    for place, scene in enumerate(MOTIONS):  # motions of 10, 9, 8 and 7 frames
+    for place, scene in enumerate(MOTIONS):  # motions of 10, 9, 8, ... frames
         frames = frames[(frames["scene"] != scene) | (frames["seconds"] > 0.1 * place - 0.05)]
     (line,) = (f for f in judged(replace(run, frame_energies=frames)) if f.claim.metric == claim[0])
     assert (line.claim.lower, line.claim.higher, line.verdict) == (*claim[1:], verdict)
-    share = 25.0 * sum(1.0 / frames for frames in (10, 9, 8, 7))
-    assert line.compared.one.value == pytest.approx(share if verdict == "holds" else 100.0 - share)
+    share = 100.0 / motions * sum(1.0 / (10 - place) for place in range(motions))
+    assert line.compared.one.value == pytest.approx(share if snug == 1.0 else 100.0 - share)
     assert line.claim.relation == "< in most frames" and "%" in line.compared.metric.heading
 
 

@@ -23,5 +23,5 @@ def test_violations_and_the_cost_of_the_limit_stand_in_one_line():
         of("e", "reference_time", 6.0),
     ]
     (audit,), (laws,) = engine_audit(run_of(rows)), engine_laws(run_of(rows))
-    assert audit.rows == (("e", "free fall, own limit", 2.0, 3.0, 4.0, 8.0, 6.0),)
+    assert audit.rows == (("e", "free fall, own limit, 3 not measured", 2.0, 3.0, 4.0, 8.0, 6.0),)
     assert laws.rows[0][1] == pytest.approx(-50.0) and laws.rows[0][4] == pytest.approx(0.5)

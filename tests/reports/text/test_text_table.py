@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.results.row import Row
-from reports.run.finished_run import make_run
+from reports.run.finished_run import Metric, make_run
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
-from reports.tables.table import METHOD, Column, Table
+from reports.tables.table import METHOD, Column, Table, metric_column
 from reports.text.text_table import aligned_text, markdown_table, remarks_on, text_rows
 from tests.reports.report_folder import DECLARED
 
@@ -49,3 +49,14 @@ def test_lines_are_as_wide_as_each_other_and_a_bar_in_a_cell_is_escaped():
     lines = aligned_text([["a", "b"], ["long name", "1.25"], ["c", "2"]]).splitlines()
     assert len({len(line) for line in lines}) == 1
     assert markdown_table([["a|b"], ["1"]]).splitlines()[0] == "| a\\|b |"
+
+
+def test_an_amplitude_of_rounding_alone_is_printed_as_zero():
+    amplitude = metric_column(Metric("dynamics/amplitude", "1", "Hem amplitude"))
+    means = (
+        Mean(2.15e-6, None, seeds=1, asked=0),
+        Mean(-3e-6, None, seeds=1, asked=0),
+        Mean(0.0926, None, seeds=1, asked=0),
+    )
+    rows = text_rows(RUN, Table("t", (amplitude,), tuple((mean,) for mean in means)))
+    assert [row[0] for row in rows] == ["Hem amplitude", "0", "0", "0.0926"]
