@@ -94,7 +94,7 @@ class Material:
             raise MaterialError(f"{path}: lame_lambda and lame_mu also need {', '.join(missing)}")
         try:
             return cls.from_lame(**values) if lame else cls(**values)
-        except (ValueError, ZeroDivisionError) as error:
+        except ValueError as error:
             raise MaterialError(f"{path}: {error}") from None
 
     @classmethod
@@ -121,6 +121,9 @@ class Material:
         Raises:
             ValueError: a value is not finite or outside its physical range.
         """
+        for name, value in {"thickness": thickness, "lambda + 2 mu": lame_lambda + 2 * lame_mu}.items():
+            if not value > 0:
+                raise ValueError(f"{name} = {value}: must be above 0")
         poisson_ratio = lame_lambda / (lame_lambda + 2 * lame_mu)
         return cls(
             young_modulus=2 * lame_mu * (1 + poisson_ratio),

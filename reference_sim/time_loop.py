@@ -161,7 +161,7 @@ def _fields(results: Sequence[Result]) -> dict[str, float]:
     return {
         "iterations": float(sum(result.iterations for result in results)),
         "factorisations": float(sum(result.factorisations for result in results)),
-        "gradient_norm": max(result.gradient_norm for result in results),
+        "gradient_norm": float(np.max([result.gradient_norm for result in results])),  # nan where one is
         "converged": float(all(result.status == "converged" for result in results)),
         "relaxed": float(any(result.relaxed for result in results)),
     } | {f"energy/{name}": value for name, value in results[-1].terms.items()}

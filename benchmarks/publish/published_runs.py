@@ -108,6 +108,13 @@ RUNS = {
             "snug+fast-lbfgs-1"
         },
     ),
+    "garments": PublishedRun(
+        "SNUG and PBNS in three other garments, on eight validation motions; one seed",
+        {
+            "": "--suite garments --split validation --scenes 'tank_top/*,long_sleeves/*,trousers/*' "
+            f"--methods {REFERENCES},snug,pbns"
+        },
+    ),
     "dynamics": PublishedRun(
         "a network that learns its dynamics from simulations, on eight validation motions; one seed",
         {

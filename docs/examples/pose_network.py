@@ -56,13 +56,3 @@ class PoseNetwork(Method):
 def make(*, models: object, seed: int) -> PoseNetwork:
     """Return a fresh method of that seed."""
     return PoseNetwork(seed)
-
-
-if __name__ == "__main__":  # in place of a training: no offsets at all, which is skinning
-    from snug.body.parametric_body import Body
-    from snug.garments.templates import tailor_tshirt
-
-    untrained = network(len(tailor_tshirt(Body.load(), vertices=350).rest_positions))
-    torch.nn.init.zeros_(untrained[2].weight)
-    torch.nn.init.zeros_(untrained[2].bias)
-    torch.save(untrained.state_dict(), "pose_network-0.pt")

@@ -49,8 +49,3 @@ class Constraints:
 
     kernel: Any
     freeze: Callable[[], tuple[Any, ...]]
-
-
-def whole(stencils: np.ndarray) -> np.ndarray:
-    """Return the stencils (N, k) as one piece of int64."""
-    return np.ascontiguousarray(stencils, dtype=np.int64)

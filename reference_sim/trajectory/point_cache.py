@@ -66,6 +66,8 @@ def read_point_cache(path: str | Path) -> np.ndarray:
     path = Path(path)
     if not path.is_file():
         raise TrajectoryError(f"{path}: no such file")
+    if path.suffix.lower() not in TYPES:
+        raise TrajectoryError(f"{path}: a point cache is named {' or '.join(TYPES)}")
     kind, length = np.dtype(TYPES[path.suffix.lower()]), path.stat().st_size
     with path.open("rb") as file:
         header = file.read(HEADER_SIZE)

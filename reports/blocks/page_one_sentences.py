@@ -86,8 +86,8 @@ def _near(run: Run, worn: pd.DataFrame) -> list[str]:
         scene, worst = excess.worst
         sentences += [
             f"The arithmetic mean of {run.label(first)} is {number(excess.mean, 2)} %, and its worst motion, "
-            f"{scene.partition('/')[2] or scene}, has {number(worst, 2)} %; the other numbers are geometric "
-            f"means over {_repeated(excess)}",
+            f"{scene.partition('/')[2] or scene}, has {number(worst, 2)} %; the first numbers are "
+            f"geometric means over {_repeated(excess)}",
         ]
     return [*sentences, _against_reference(run.label(first), excess)]
 
@@ -145,7 +145,7 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
         if effect := compare_methods(run, rows, run.metrics[TOTAL], one, other).effect:
             p = effect.p_value()
             stands = standing(effect, p)
-            shown = f" (p = {number(p, 2)})" if stands in (LESS, MORE) and p is not None else ""
+            shown = f" (bootstrap p = {number(p, 2)})" if stands in (LESS, MORE) and p is not None else ""
             standings.setdefault(stands, []).append(f"{run.label(other)}{shown}")
     first = run.label(one)
     says = {
@@ -252,18 +252,19 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     steps = int(run.methods[finest].level or 0)
     strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
     ratios = [
-        f"{what} {number(one.value / other.value, 2)} times"
-        for what, (one, other) in (("its strain is", strain), ("its hem amplitude", amplitude))
+        f"{number(one.value / other.value, 2)} times the {what}"
+        for what, (one, other) in (("strain", strain), ("hem amplitude", amplitude))
         if one and other and other.value
     ]
     away = value_of(timed, finest, DISTANCE)
-    distance = "" if away is None else f", and its cloth is {number(away, 2)} mm away"
     network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
     far = value_of(timed, network, DISTANCE)
-    beside = f" (that of {run.label(network)} {number(far, 2)} mm)" if distance and far is not None else ""
+    beside = "" if far is None else f", where {run.label(network)} lies {number(far, 2)} mm from it"
+    distance = [] if away is None else [f"lies {number(away, 2)} mm from it{beside}"]
+    has = [f"has {' and '.join(ratios)}"] if ratios else []
     return (
-        "the reference is converged in each time step of 1/30 s, but not in the size of the step: with "
-        f"{steps} steps a frame {' and '.join(ratios)} as large{distance}{beside}"
+        "the reference is converged in each time step of 1/30 s, but not in the size of the step: a "
+        f"simulation with {steps} steps a frame {', and '.join([*distance, *has])}"
     )
 
 
@@ -297,9 +298,9 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     if solver is not None:
         sentences.append(
             f"the fastest solver stopped early that is at least as accurate ({run.label(solver.method)}; "
-            f"energy gap {number(solver.error)} J{solver.fewer} against {number(network.error)} J"
-            f"{network.fewer}) takes {number(solver.time)} ms, {number(solver.time / network.time, 2)} times "
-            f"as long as {snug}"
+            f"{number(solver.error)} J{solver.fewer} above the minimum of each time step, {snug} "
+            f"{number(network.error)} J{network.fewer}) takes {number(solver.time)} ms, "
+            f"{number(solver.time / network.time, 2)} times as long as {snug}"
         )
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]

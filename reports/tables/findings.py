@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reports.run.finished_run import Run
+from reports.run.finished_run import Metric, Run
 from reports.statistics.paper_claims import judged
 from reports.statistics.relative_excess import Excess, excess_of, with_relative_excess
 from reports.statistics.spreads import AT_REFERENCE, in_spreads
@@ -108,6 +108,12 @@ def _measured(run: Run) -> list[tuple[str, str, Excess]]:
     return excesses
 
 
+def _error_title(metric: Metric) -> str:
+    """Return the title of the error in a metric; of an amplitude it is not the amplitude."""
+    measures_error = metric.name.startswith(("distance/", "curvature/"))
+    return metric.title if measures_error else f"Error of {metric.title[:1].lower()}{metric.title[1:]}"
+
+
 def errors_in_spreads(run: Run) -> list[Table]:
     """Tabulate distances, curvature errors and dynamics in spreads of the reference's ensemble."""
     metrics = [run.metrics[name] for name in AT_REFERENCE if name in run.metrics]
@@ -119,10 +125,10 @@ def errors_in_spreads(run: Run) -> list[Table]:
             values = [in_spreads(run, rows, method, metric.name) for metric in metrics]
             if any(value is not None for value in values):
                 lines.append((garment, method, *values))
-    columns = (GARMENT, METHOD, *(Column(metric.name, metric.title) for metric in metrics))
+    columns = (GARMENT, METHOD, *(Column(metric.name, _error_title(metric)) for metric in metrics))
     caption = (
-        "Each number is a root-mean-square error over seeds, divided by the root-mean-square distance of "
-        "the equally valid simulations from the reference; both are means over motions. 1 means: as near as "
-        "another valid simulation."
+        "Each number is an error against the reference, root mean square over seeds, divided by the same "
+        "error of the equally valid simulations; both are means over motions. 1 means: as near as another "
+        "valid simulation."
     )
     return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))

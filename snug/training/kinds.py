@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from snug.networks.architectures import ARCHITECTURES, find_architecture
 from snug.networks.garment_network import GarmentNetwork
@@ -37,18 +38,17 @@ class Kind:
         return self.targets.unit if self.targets else "J"
 
 
-KINDS = {
-    "snug": Kind(ARCHITECTURES["snug"], closed_form=True),
-    "dynamic": Kind(ARCHITECTURES["dynamic"], past=True, closed_form=True),
-    "supervised": Kind(ARCHITECTURES["supervised"], targets=VertexTargets, closed_form=True),
-    "pbns": Kind(ARCHITECTURES["pbns"]),
-    "santesteban2019": Kind(ARCHITECTURES["santesteban2019"], targets=VertexTargets, closed_form=True),
-    "tailornet": Kind(ARCHITECTURES["tailornet"], targets=BandTargets),
-    "nearest-poses": Kind(ARCHITECTURES["nearest-poses"], targets=VertexTargets),
-    "pose-regression": Kind(ARCHITECTURES["pose-regression"], targets=VertexTargets),
-    **{name: Kind(ARCHITECTURES[name]) for name in ("handles-20", "handles-40", "handles-80")},
-    **{name: Kind(ARCHITECTURES[name]) for name in ("ncs", "ncs-static")},
+# What differs from a network that learns from the energies.
+_OTHER: dict[str, dict[str, Any]] = {
+    "snug": {"closed_form": True},
+    "dynamic": {"past": True, "closed_form": True},
+    "supervised": {"targets": VertexTargets, "closed_form": True},
+    "santesteban2019": {"targets": VertexTargets, "closed_form": True},
+    "tailornet": {"targets": BandTargets},
+    "nearest-poses": {"targets": VertexTargets},
+    "pose-regression": {"targets": VertexTargets},
 }
+KINDS = {name: Kind(network, **_OTHER.get(name, {})) for name, network in ARCHITECTURES.items()}
 
 
 def find_kind(name: str) -> Kind:

@@ -54,8 +54,8 @@ def train_network(
     is used.
 
     Args:
-        model_kind: one of snug.training.kinds.KINDS; `snug` and `pbns` learn from the energies, the others
-            from a simulation.
+        model_kind: one of snug.training.kinds.KINDS, which says whether energies or simulated vertices
+            teach it.
         dressed: a garment on a body.
         motions: training motions, all of one frame rate.
         steps: number of updates.

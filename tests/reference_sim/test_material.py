@@ -83,6 +83,9 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
             "bending_stiffness": 3.96e-5}  # fmt: skip
     toml.write_text("".join(f"{name} = {value!r}\n" for name, value in lame.items()))
     assert Material.from_file(toml) == Material.from_lame(**lame)
+    for wrong in ({"thickness": 0.0}, {"lame_lambda": -47_200.0}):
+        with pytest.raises(ValueError, match=r"= 0\.0: must be above 0"):
+            Material.from_lame(**lame | wrong)
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,7 @@ SOLVERS = (
     *(
         MethodEntry(
             name=f"simulation-{exchange}",
-            label=f"Simulation, {exchange.replace('-', ' ')}",
+            label=f"Simulation, {exchange.replace('-', ' ').replace('pbns', 'PBNS')}",
             description=f"the reference with {change}",
             module="benchmarks.methods.solvers.other_material",
             options={"exchange": exchange},

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks, whole
+from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def vertex_block(term: BendHinge) -> VertexBlocks:
     """Hand the hinges of the term to vertex block descent."""
-    stencils = whole(term.stencils)
+    stencils = term.stencils
     return VertexBlocks(_add_block, stencils, np.ones_like(stencils), lambda: _arrays(term))
 
 
@@ -29,7 +29,7 @@ def constraint(term: BendHinge) -> Constraints:
 
 def _arrays(term: BendHinge) -> tuple:
     """Return hinges, stiffness and rest angles."""
-    return whole(term.stencils), term.stiffness, term.rest_angles
+    return term.stencils, term.stiffness, term.rest_angles
 
 
 @njit(cache=True, error_model="numpy")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reference_sim.energies.stretch_stvk.definition import strain
-from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks, whole
+from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def vertex_block(term: StretchStVK) -> VertexBlocks:
     """Hand the faces of the term to vertex block descent."""
-    stencils = whole(term.stencils)
+    stencils = term.stencils
     return VertexBlocks(_add_block, stencils, np.ones_like(stencils), lambda: _arrays(term))
 
 
@@ -30,7 +30,7 @@ def constraint(term: StretchStVK) -> Constraints:
 
 def _arrays(term: StretchStVK) -> tuple:
     """Return faces, Dm^-1, areas, lambda and mu."""
-    return whole(term.stencils), term.Dm_inverse, term.areas, float(term.lam), float(term.mu)
+    return term.stencils, term.Dm_inverse, term.areas, float(term.lam), float(term.mu)
 
 
 @njit(cache=True, inline="always")

@@ -17,7 +17,15 @@ import numpy as np
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.motion.clips.posture import SPINE_SHARES
-from snug.motion.motion import Motion, heading, mirror_motion, resample, transition, turn_about_vertical
+from snug.motion.motion import (
+    Motion,
+    heading,
+    mirror_motion,
+    resample,
+    smoothstep,
+    transition,
+    turn_about_vertical,
+)
 
 ORIGINAL_SHARE = 0.5  # of the clips: pieces of the original motions
 SPEEDS = (0.6, 1.5)
@@ -51,7 +59,7 @@ def make_swinging_motion(
         goal = joined.translations[-1] * [1.0, 0.0, 1.0] + height
         rise = goal - joined.translations[-1]
         s = np.linspace(0.0, 1.0, TRANSITION_FRAMES + 1)[1:-1, None]
-        lifted = joined.translations[-1] + rise * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        lifted = joined.translations[-1] + rise * smoothstep(s)
         joined = joined.followed_by(
             replace(
                 after,

@@ -24,6 +24,7 @@ from benchmarks.tasks.cell_task import judge
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.trajectory.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
+from reference_sim.trajectory.trajectory import TrajectoryError
 from tests.benchmarks.runner.tasks_by_hand import small_scene, thirds
 
 SCENE = small_scene("hanging_sheet", cells=6, frames=8)
@@ -114,6 +115,9 @@ def test_formats_of_less_precision_give_the_rows_of_the_rounded_positions(tmp_pa
     assert read_roll_out(tmp_path / "mine.pc2").dtype == "float32"
     half = read_point_cache(write("pc16", tmp_path))
     assert half.dtype == np.float16 and np.array_equal(half, X.astype(np.float16))
+    (tmp_path / "cloth.mdd").write_bytes(b"")
+    with pytest.raises(TrajectoryError, match=r"cloth\.mdd: a point cache is named \.pc2 or \.pc16"):
+        read_point_cache(tmp_path / "cloth.mdd")
 
 
 @pytest.mark.parametrize("kept", ["obstacle", "obstacle_faces"])

@@ -39,7 +39,7 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     )
     scale = "on a scale where the reference simulation is 0 % and skinning alone 100 %."
     assert f"{scale} The arithmetic mean of SNUG is 12 %, and its worst motion, jump, has 20 %" in sentences
-    assert "the other numbers are geometric means over motions. Whether SNUG differs" in sentences
+    assert "the first numbers are geometric means over motions. Whether SNUG differs" in sentences
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
     assert " and PBNS of 15 %, on a scale" in near(rows)
     assert "; whether SNUG or PBNS has less is inconclusive. The arithmetic" in near(rows)
