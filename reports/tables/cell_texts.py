@@ -50,7 +50,7 @@ def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Seque
         spread, mark = "", ""
         if isinstance(cell, Mean):
             mark = ("" if cell.complete else "*") + ("†" if cell.stalled else "")
-            if apart := cell.spread_or_uncertainty:
+            if (apart := cell.spread_or_uncertainty) and abs(cell.value) >= column.rounding:
                 spread = f"± {duration(apart) if column.unit == 's' else number(apart, 1)}"
         elif isinstance(cell, Effect):
             mark = ("" if cell.complete else "*") + _COVERED.get(cell.covers, "")

@@ -52,14 +52,12 @@ def overview(run: Run) -> list[Table]:
     lines: list[tuple[Cell, ...]] = [
         (
             method, known.effect if (known := excess.get(method)) else none_of.get(method),
-            known.worst[1] if known else None,
             *(mean_of(rows, method, metric.name) for metric, rows in asked), faster[method],
         )
         for method in chosen
     ]  # fmt: skip
     columns = [
         Column("relative_excess", "Relative excess", "%", digits=2),
-        Column("worst", "Its worst motion", "%", digits=2),
         *(metric_column(metric) for metric, _ in asked), Column("faster", "Times faster"),
     ]  # fmt: skip
     kept = [k for k in range(1, len(columns) + 1) if any(line[k] is not None for line in lines)]

@@ -113,7 +113,7 @@ SOLVERS = (
     *(
         MethodEntry(
             name=f"simulation-perturbed-{shift:.0e}".replace("e-0", "e-"),
-            label=f"Simulation, perturbed by {shift * 1e9:,.0f} nm",
+            label=f"Simulation, perturbed by {shift * 1e3:g} mm",
             description=f"the reference from a start perturbed by {shift:g} m: how far apart both end",
             module="benchmarks.methods.solvers.perturbed_start",
             options={"shift": shift},

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reference_sim.energies.contact_penalty.definition import sample_depth
-from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks, whole
+from reference_sim.kernels.element_sweeps import Constraints, VertexBlocks
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def vertex_block(term: ContactPenalty) -> VertexBlocks:
     """Hand the samples of the term to vertex block descent."""
-    return VertexBlocks(_add_block, whole(term.stencils), term.weights > 0.0, lambda: _arrays(term))
+    return VertexBlocks(_add_block, term.stencils, term.weights > 0.0, lambda: _arrays(term))
 
 
 def constraint(term: ContactPenalty) -> Constraints:
@@ -30,7 +30,7 @@ def constraint(term: ContactPenalty) -> Constraints:
 def _arrays(term: ContactPenalty) -> tuple:
     """Return stencils, weights, stiffness, margin, points and normals, as the step has frozen them."""
     planes = np.ascontiguousarray(term.points), np.ascontiguousarray(term.normals)
-    return whole(term.stencils), term.weights, term.stiffness, term.margin, *planes
+    return term.stencils, term.weights, term.stiffness, term.margin, *planes
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -8,6 +8,7 @@ import re
 
 import pytest
 
+from benchmarks.results.row import DECLARED
 from reports.entries.__main__ import main
 from reports.entries.page import page_of
 from reports.entries.tables import entries_tables, full_scenes, of_entry
@@ -28,9 +29,7 @@ def write_run(path, totals, scenes, protocol, **config):
                 dataclasses.replace(
                     row(scene, name, metric, value),
                     protocol=protocol,
-                    reason="declared by its author"
-                    if metric == "cost/frame" and "metadata" in config
-                    else "",
+                    reason=DECLARED if metric == "cost/frame" and "metadata" in config else "",
                 )
                 for metric, value in numbers.items()
             ]
