@@ -127,7 +127,7 @@ def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
     """Return the provenance of an outcome's rows; it keeps the protocol under which it was made."""
     if not outcome.origin:
         return {"protocol": protocol}
-    return outcome.origin | ({"protocol": OWN} if protocol == OWN else {})
+    return {**outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
 
 
 def _finite(number: float | None) -> float | None:
