@@ -48,7 +48,8 @@ function dot(method) {
 // At first: the reference, two networks and a baseline; else whatever there is.
 function firstMethods(available) {
   const role = (name) => available.filter((method) => content.methods[method].role === name);
-  const wanted = [...role('reference'), ...role('baseline').slice(0, 1), ...role('network').slice(0, 2), ...available];
+  const subjects = ['snug', 'pbns'].filter((method) => available.includes(method));
+  const wanted = [...role('reference'), ...role('baseline').slice(0, 1), ...subjects, ...role('network'), ...available];
   const kept = [...new Set(wanted)].slice(0, MOST);
   return available.filter((method) => kept.includes(method));
 }

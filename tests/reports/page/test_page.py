@@ -318,7 +318,7 @@ def test_a_person_can_use_it(folder, tmp_path):
     count = len(METHODS) + 1
     assert lines["csv"][0].startswith("Method,Relative excess [%],") and len(lines["csv"]) == count
     assert lines["markdown"][1].startswith("| --- | --- |") and len(lines["markdown"]) == count + 1
-    assert lines["latex"][0] == "\\begin{tabular}{lrrrr}" and len(lines["latex"]) == count + 5
+    assert lines["latex"][0] == "\\begin{tabular}{lrrr}" and len(lines["latex"]) == count + 5
     assert lines["latex"][2].startswith("Method & Relative excess [\\%] & ")
     assert state["picture"] == ["tshirt-walk@clip-4.png", "data:image/png;base64,", True]
     assert state["groups"] == ["Means", "Each scene or motion"]
