@@ -107,7 +107,8 @@ def camera_path(selected: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarra
         for corners in ([x.min(axis=1) for x in seen], [x.max(axis=1) for x in seen])
     )
     lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
-    reach = 0 if np.isnan(selected.dt) else int(SMOOTHED / selected.dt / 2.0)
+    dt = selected.longest.dt
+    reach = 0 if np.isnan(dt) else int(SMOOTHED / dt / 2.0)
     centres = uniform_filter1d((lowest + highest) / 2.0, 2 * reach + 1, axis=0, mode="nearest")
     right, up, _ = np.maximum(highest - centres, centres - lowest).max(axis=0)
     return centres @ axes.T, MARGIN * float(max(up, TALL * right))
@@ -117,8 +118,7 @@ def draw_frames(selected: SelectedRollOuts, width: int, azimuth: float) -> Itera
     """Yield every frame of the film: all views with their names, and the time."""
     stage = Stage(selected, width, azimuth)
     try:
-        longest = max(selected.cloths.values(), key=lambda cloth: cloth.frames)
-        for frame, time in enumerate(longest.times):
+        for frame, time in enumerate(selected.longest.times):
             views = {method: stage.view(method, frame) for method in selected.cloths}
             yield _composed(selected, views, frame, float(time))
     finally:
@@ -238,7 +238,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from reports.run.selected_roll_outs import select_roll_outs
 
     selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
-    dt = selected.dt
+    dt = selected.longest.dt
     rate = options.speed / dt if dt > 0.0 else 1.0
     with replacing(path) as temporary:
         WRITERS[path.suffix](temporary, draw_frames(selected, options.width, options.azimuth), rate)

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 from pose_network import network
 
-from reference_sim import Cloth, Obstacle, Potential
+from reference_sim import Obstacle, Potential
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Step, StretchStVK
 from snug import Body, DressedBody
 from snug.body.skinning import skin
@@ -42,7 +42,7 @@ def train(
     """Return the trained network and the mean energy [J] of each update."""
     torch.manual_seed(seed)
     random = np.random.default_rng(seed)
-    cloth: Cloth = dressed.garment.cloth()
+    cloth = dressed.garment.cloth()
     potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth)])
     body = dressed.body.vertices(motion.poses, motion.translations)
     obstacle = Obstacle(body, dressed.body.faces, rest_positions=dressed.body.template)

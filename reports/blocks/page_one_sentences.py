@@ -203,10 +203,15 @@ def _secondary_motion(amplitude: float) -> str:
     return "about as much" if amplitude < 1.25 else "more"
 
 
+def _first_subject(run: Run, rows: pd.DataFrame) -> str:
+    """Return the first method that page one is about and these rows have, else the name of SNUG."""
+    return next(iter(subjects(run, set(rows[rows["usable"]]["method"]))), NETWORK)
+
+
 def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> list[str]:
     """Say how long a frame takes, which solver is as accurate, and whether a method is as fast and better."""
     metric = run.metrics.get(run_time(timed))
-    network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
+    network = _first_subject(run, timed)
     compared = compare_methods(run, timed, metric, run.reference, network) if metric else None
     if compared is None or compared.effect is None or compared.other is None or not compared.other.value:
         return []
@@ -257,7 +262,7 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
         if one and other and other.value
     ]
     away = value_of(timed, finest, DISTANCE)
-    network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
+    network = _first_subject(run, timed)
     far = value_of(timed, network, DISTANCE)
     beside = "" if far is None else f", where {run.label(network)} lies {number(far, 2)} mm from it"
     distance = [] if away is None else [f"lies {number(away, 2)} mm from it{beside}"]

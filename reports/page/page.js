@@ -45,7 +45,7 @@ function dot(method) {
   return node;
 }
 
-// At first: the reference, two networks and a baseline; else whatever there is.
+// At first: the reference, a baseline, SNUG and PBNS; else other networks, then whatever there is.
 function firstMethods(available) {
   const role = (name) => available.filter((method) => content.methods[method].role === name);
   const subjects = ['snug', 'pbns'].filter((method) => available.includes(method));

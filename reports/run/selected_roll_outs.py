@@ -21,9 +21,9 @@ class SelectedRollOuts:
     body: Trajectory | None
 
     @property
-    def dt(self) -> float:
-        """Time between frames [s], of the longest roll-out; nan where none has two frames."""
-        return max(self.cloths.values(), key=lambda cloth: cloth.frames).dt
+    def longest(self) -> Trajectory:
+        """The roll-out with the most frames; its dt is nan where it has one."""
+        return max(self.cloths.values(), key=lambda cloth: cloth.frames)
 
 
 def select_roll_outs(

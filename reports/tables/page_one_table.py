@@ -48,10 +48,10 @@ def overview(run: Run) -> list[Table]:
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
     faster = {name: _times_faster(run, timed, name) for name in chosen}
-    none_of = {run.reference: 0.0} if any(excess.values()) else {}  # by definition
+    by_definition = {run.reference: 0.0} if any(excess.values()) else {}
     lines: list[tuple[Cell, ...]] = [
         (
-            method, known.effect if (known := excess.get(method)) else none_of.get(method),
+            method, known.effect if (known := excess.get(method)) else by_definition.get(method),
             *(mean_of(rows, method, metric.name) for metric, rows in asked), faster[method],
         )
         for method in chosen

@@ -45,9 +45,11 @@ ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
 def published_part(request: str) -> str:
     """Return the Markdown of a generated part. Raises ValueError for words of no known form."""
     what, _, source = request.partition(" of ")
-    runs, columns, methods = (*source.split(";"), "", "")[:3]
+    runs, *lists = source.split(";")
+    wanted, methods = (
+        [word.strip() for word in text.split(",") if word.strip()] for text in (*lists, "", "")[:2]
+    )
     folders = [PUBLISHED / name.strip() for name in runs.split(",")]
-    wanted = [column.strip() for column in columns.split(",") if column.strip()]
     kind, _, name = what.partition(" ")
     if (part := request.partition(";")[0]) in PARTS:
         return markdown_table(chosen_rows(PARTS[part](), wanted))
@@ -67,8 +69,7 @@ def published_part(request: str) -> str:
         answers = [(topic, " ".join(texts[:2])) for topic, texts in topics(read_published(folders[0]))]
         return "\n".join(f"- **{topic}.** {text}" for topic, text in answers)
     if kind == "table":
-        table = _table(folders[0], name)
-        table = _of_methods(table, [method.strip() for method in methods.split(",") if method.strip()])
+        table = _of_methods(_table(folders[0], name), methods)
         rows = text_rows(read_published(folders[0]), table, wanted)
         return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
     if kind == "claims":

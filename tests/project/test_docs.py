@@ -188,9 +188,9 @@ def glossary_terms(text: str) -> list[str]:
 def test_the_glossary_explains_every_private_term_that_a_page_uses_and_is_short():
     terms = glossary_terms(GLOSSARY)
     assert len(terms) <= MOST_TERMS
-    words = " ".join(terms)
+    explained = " ".join(terms)
     used = [term for term in PRIVATE if any(term in prose(path).lower() for path in PAGES)]
-    assert [term for term in used if term not in words] == []
+    assert [term for term in used if term not in explained] == []
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)

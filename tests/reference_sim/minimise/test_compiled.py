@@ -152,7 +152,7 @@ def test_many_iterations_end_at_the_minimum():
 
 
 def test_a_pair_of_too_little_curvature_leaves_the_remembered_ones_whole(monkeypatch):
-    """As an interpreted loop, in which such pairs are made frequent, also where the memory is full."""
+    """The loop runs interpreted: a threshold makes such pairs frequent, also where the memory is full."""
     potential, guess = pressed(0)
     monkeypatch.setattr(iteration, "LEAST_CURVATURE", 0.2)
     monkeypatch.setattr(iteration, "descend", iteration.descend.py_func)
