@@ -13,7 +13,7 @@ from reports.run.finished_run import Run
 from reports.statistics import paper_claims
 from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
 from reports.statistics.break_even import NETWORK, compared_scenes
-from reports.statistics.effects import RECORDING, recording_of
+from reports.statistics.effects import RECORDING, Effect, recording_of
 from reports.statistics.means_and_spreads import pair, value_of
 from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads, subjects
 from reports.statistics.pareto import (
@@ -30,6 +30,7 @@ from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_re
 from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, measure_of, standing
 from reports.tables.number_texts import duration, number
 
+BY_CODE = "embedded library"  # how the source of a motion of the package that code makes begins
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
 SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
 
@@ -78,16 +79,14 @@ def _near(run: Run, worn: pd.DataFrame) -> list[str]:
         f"{run.label(first)} has a relative excess of {_share(excess)}{f' ({beside})' if beside else ''}",
         *(f"{run.label(name)} of {_share(known[name])}" for name in others),
     ]
-    sentences = [
-        f"On {motions} {listed(shares)}, on a scale where the reference simulation is 0 % and skinning alone "
-        f"100 %{''.join(paired)}"
-    ]
+    scale = "where the reference has 0 % and skinning alone 100 %"
+    sentences = [f"On {motions} {listed(shares)}, {scale}{''.join(paired)}"]
     if count > 1:
-        scene, worst = excess.worst
+        means = listed([f"{run.label(n)} {number(excess.mean, 2)} %" for n, excess in known.items()])
+        worst = listed([f"{run.label(n)} {number(excess.worst[1], 2)} %" for n, excess in known.items()])
         sentences += [
-            f"The arithmetic mean of {run.label(first)} is {number(excess.mean, 2)} %, and its worst motion, "
-            f"{scene.partition('/')[2] or scene}, has {number(worst, 2)} %; the first numbers are "
-            f"geometric means over {_repeated(excess)}",
+            f"These are geometric means over {_repeated(run, excess)}. Arithmetic means: "
+            f"{means}; worst motions: {worst}",
         ]
     return [*sentences, _against_reference(run.label(first), excess)]
 
@@ -103,17 +102,24 @@ def _distances(run: Run, rows: pd.DataFrame) -> list[str]:
     return ["; ".join(parts)]
 
 
-def _repeated(excess: Excess) -> str:
+def _repeated(run: Run, excess: Excess) -> str:
     """Return what the means are taken over: "motions", or "11 independent sources" and what these are."""
     count = excess.effect.motions
     if count == len(excess.by_motion):
         return "motions"
     sources = {recording_of(scene) for scene in excess.by_motion}
-    recordings = sum(bool(RECORDING.search(name)) for name in sources)
-    others = count - recordings
-    more = f", and {others} other motion{'' if others == 1 else 's'}" if others else ""
-    recorded = f"{recordings} recording{'' if recordings == 1 else 's'}"
-    return f"{count} independent sources: {recorded}, whose segments are averaged first{more}"
+    recordings = {name for name in sources if RECORDING.search(name)}
+    others = sources - recordings
+    motions = {scene.partition("/")[2] for scene in others}
+    made = all(
+        str(run.config.get("motion_sources", {}).get(name, "")).startswith(BY_CODE) for name in motions
+    )
+    kind = (
+        f"{'' if made else 'other '}motion{'' if len(others) == 1 else 's'}{' made by code' if made else ''}"
+    )
+    more = f", and {len(others)} {kind}" if others else ""
+    recorded = f"{len(recordings)} recording{'' if len(recordings) == 1 else 's'}"
+    return f"{count} independent sources: {recorded}, each averaged over its segments{more}"
 
 
 def _ended(sentence: str) -> str:
@@ -145,7 +151,7 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
         if effect := compare_methods(run, rows, run.metrics[TOTAL], one, other).effect:
             p = effect.p_value()
             stands = standing(effect, p)
-            shown = f" (bootstrap p = {number(p, 2)})" if stands in (LESS, MORE) and p is not None else ""
+            shown = _tested(effect, p) if stands in (LESS, MORE) and p is not None else ""
             standings.setdefault(stands, []).append(f"{run.label(other)}{shown}")
     first = run.label(one)
     says = {
@@ -155,6 +161,13 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
         OPEN: f"whether {first} or {{}} has less is inconclusive",
     }
     return [text.format(listed(standings[stands])) for stands, text in says.items() if stands in standings]
+
+
+def _tested(effect: Effect, p: float) -> str:
+    """Return " (−8.1 points, 95 % interval −12 to −4.0, p = 0.002)" of an effect on relative excess."""
+    ends = effect.interval
+    interval = f", 95 % interval {number(ends[0], 2)} to {number(ends[1], 2)}" if ends else ""
+    return f" ({number(effect.shown, 2)} points{interval}, p = {number(p, 2)})"
 
 
 def listed(items: Sequence[str]) -> str:
@@ -219,11 +232,11 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> list[str]:
     times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
     milliseconds = number(compared.other.value)
     training = value_of(run.garment_rows, network, "cost/train")
-    whole = " end to end (from pose to vertices)" if compared.metric.name == "cost/whole" else ""
-    where = f" {_in_scenes(scenes)}" if scenes else ""
+    whole = " from pose to vertices" if compared.metric.name == "cost/whole" else ""
+    where = f", {_in_scenes(scenes)}" if scenes else ""
     return [
-        f"{run.label(network)} takes {milliseconds} ms a frame{whole} on one core{where}, the simulation "
-        f"{times} times as long",
+        f"on one core {run.label(network)} takes {milliseconds} ms a frame{whole}, the simulation {times} "
+        f"times as long{where}",
         *(_rivals(run, run.cells("speed", "garments"), scenes) if scenes else []),
         f"the training of {run.label(network)} took {duration(training)}" if training else "",
     ]
@@ -238,7 +251,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
         total = counted.total()
         claims = f"{total} primary claim{'' if total == 1 else 's'}"
         failing = _claims_that_fail(run, lines)
-        sentences.append(f"of {claims} taken from the paper {paper_claims.in_words(counted)}{failing}")
+        sentences.append(f"of {claims} of the paper {paper_claims.in_words(counted)}{failing}")
     where = _in_scenes(set(timed[timed["method"] == run.reference]["scene"]))
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
@@ -257,19 +270,18 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     steps = int(run.methods[finest].level or 0)
     strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
     ratios = [
-        f"{number(one.value / other.value, 2)} times the {what}"
-        for what, (one, other) in (("strain", strain), ("hem amplitude", amplitude))
+        f"{number(one.value / other.value, 2)} times {what}"
+        for what, (one, other) in (("its strain", strain), ("its hem amplitude", amplitude))
         if one and other and other.value
     ]
-    away = value_of(timed, finest, DISTANCE)
-    network = _first_subject(run, timed)
+    away, network = value_of(timed, finest, DISTANCE), _first_subject(run, timed)
     far = value_of(timed, network, DISTANCE)
-    beside = "" if far is None else f", where {run.label(network)} lies {number(far, 2)} mm from it"
-    distance = [] if away is None else [f"lies {number(away, 2)} mm from it{beside}"]
+    beside = "" if far is None else f" ({run.label(network)}: {number(far, 2)} mm)"
     has = [f"has {' and '.join(ratios)}"] if ratios else []
+    distance = [] if away is None else [f"lies {number(away, 2)} mm from it{beside}"]
     return (
-        "the reference is converged in each time step of 1/30 s, but not in the size of the step: a "
-        f"simulation with {steps} steps a frame {', and '.join([*distance, *has])}"
+        "the reference minimises each time step of 1/30 s to convergence, but smaller steps change it: a "
+        f"simulation with {steps} steps a frame {', and '.join([*has, *distance])}"
     )
 
 
@@ -280,8 +292,9 @@ def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> str:
         if line.claim.primary and line.verdict == paper_claims.FAILS:
             lower, higher = run.label(line.claim.lower), run.label(line.claim.higher)
             measure = measure_of(line.compared).title.lower()
-            says = line.claim.says.partition("; tested")[0]
-            failed.append(f"“{says}” (tested as {measure}: {lower} {line.claim.relation} {higher})")
+            says, _, tested = line.claim.says.partition("; tested")
+            test = tested or f" as {measure}: {lower} {line.claim.relation} {higher}"
+            failed.append(f"“{says}” (tested{test})")
     return f"; what does not hold is {listed(failed)}" if failed else ""
 
 
@@ -302,10 +315,10 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     sentences = []
     if solver is not None:
         sentences.append(
-            f"the fastest solver stopped early that is at least as accurate ({run.label(solver.method)}; "
-            f"{number(solver.error)} J{solver.fewer} above the minimum of each time step, {snug} "
-            f"{number(network.error)} J{network.fewer}) takes {number(solver.time)} ms, "
-            f"{number(solver.time / network.time, 2)} times as long as {snug}"
+            "of the solvers stopped early that come at least as near to the minimum of each time step "
+            f"({snug}: {number(network.error)} J{network.fewer} above it) {run.label(solver.method)} "
+            f"({number(solver.error)} J{solver.fewer}) is the fastest and takes {number(solver.time)} ms, "
+            f"{number(solver.time / network.time, 2)} times as long"
         )
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]

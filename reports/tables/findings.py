@@ -78,7 +78,7 @@ def relative_excess(run: Run) -> list[Table]:
     )  # fmt: skip
     caption = (
         "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E, over all "
-        "motions and seeds."
+        "motions and seeds; typical: geometric mean over independent sources, with its interval."
     )
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
 

@@ -71,7 +71,7 @@ def overview(run: Run) -> list[Table]:
         "means over motions"
     )
     caption = of_motions if garment else f"Means over {timed_in}"
-    caption += f"; energy gaps and run times over {timed_in}." if garment and scenes else "."
+    caption += f"; run times (and energy gaps) over {timed_in}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)
 

@@ -37,12 +37,11 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     assert sentences.startswith(
         f"On 2 unseen motions SNUG has a relative excess of {number_texts.number(typical, 2)} % ("
     )
-    scale = "on a scale where the reference simulation is 0 % and skinning alone 100 %."
-    assert f"{scale} The arithmetic mean of SNUG is 12 %, and its worst motion, jump, has 20 %" in sentences
-    assert "the first numbers are geometric means over motions. Whether SNUG differs" in sentences
+    scale = "where the reference has 0 % and skinning alone 100 %. These are geometric means over motions."
+    assert f"{scale} Arithmetic means: SNUG 12 %; worst motions: SNUG 20 %. Whether SNUG differs" in sentences
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
-    assert " and PBNS of 15 %, on a scale" in near(rows)
-    assert "; whether SNUG or PBNS has less is inconclusive. The arithmetic" in near(rows)
+    assert " and PBNS of 15 %, where the reference" in near(rows)
+    assert "; whether SNUG or PBNS has less is inconclusive. These are" in near(rows)
     # A member of the reference's ensemble is no rival, however near it is.
     assert near(rows + on_two_scenes("simulation-perturbed-1e-4", 0.5, 7.0)) == near(rows)
 
@@ -51,9 +50,11 @@ def test_page_one_says_what_the_independent_sources_are():
     scenes = [f"tshirt/{name}" for name in ("01_01_a", "01_01_b", "05_03", "kick")]
     energies = {"simulation": 0.0, "skinning": 10.0, "snug": 1.0}
     rows = [row(s, method, "energy/total", e) for s in scenes for method, e in energies.items()]
-    sources = "3 independent sources: 2 recordings, whose segments are averaged first, and 1 other motion."
+    sources = "3 independent sources: 2 recordings, each averaged over its segments, and 1 other motion."
     assert f"geometric means over {sources}" in near(rows)
-    assert "2 recordings, whose segments are averaged first. Whether" in near(rows[:9])
+    assert "2 recordings, each averaged over its segments. Arithmetic" in near(rows[:9])
+    made = dict(headline(run_of(rows, motion_sources={"kick": "embedded library: key angles"})))["How near"]
+    assert "and 1 motion made by code. Arithmetic" in made.replace("\u00a0", " ")
 
 
 def test_of_a_family_of_networks_page_one_has_the_last():
@@ -85,10 +86,10 @@ def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
     monkeypatch.setattr(paper_claims, "verdict", lambda claim, far, p: paper_claims.FAILS)
     certainty = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
     assert (
-        "Of 1 primary claim taken from the paper 1 does not hold; what does not hold is “Figure 7: close to"
+        "Of 1 primary claim of the paper 1 does not hold; what does not hold is “Figure 7: close to"
         in certainty
     )
-    tested = "(tested as relative excess: SNUG ≤ Simulation)."
+    tested = "(tested more strictly: no more energy than simulated cloth)."
     assert certainty.endswith(tested) and dict(topics(run_of(rows)))["How certain"][0].endswith(tested)
 
 
@@ -113,7 +114,7 @@ def test_run_times_are_of_the_scenes_that_both_have():
     assert (
         dict(headline(run))["At what cost"]
         .replace("\u00a0", " ")
-        .startswith("SNUG takes 0.250 ms a frame on one core, the simulation 400 times as long")
+        .startswith("On one core SNUG takes 0.250 ms a frame, the simulation 400 times as long")
     )
 
 
