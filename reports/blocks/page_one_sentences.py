@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 
 import pandas as pd
@@ -28,7 +28,7 @@ from reports.statistics.pareto import (
 from reports.statistics.published import published_beside
 from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_relative_excess
 from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, measure_of, standing
-from reports.tables.number_texts import duration, number
+from reports.tables.number_texts import duration, in_scenes, number
 
 BY_CODE = "embedded library"  # how the source of a motion of the package that code makes begins
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
@@ -85,7 +85,7 @@ def _near(run: Run, worn: pd.DataFrame) -> list[str]:
         means = listed([f"{run.label(n)} {number(excess.mean, 2)} %" for n, excess in known.items()])
         worst = listed([f"{run.label(n)} {number(excess.worst[1], 2)} %" for n, excess in known.items()])
         sentences += [
-            f"These are geometric means over {_repeated(run, excess)}. Arithmetic means: "
+            f"These percentages are geometric means over {_repeated(run, excess)}. Arithmetic means: "
             f"{means}; worst motions: {worst}",
         ]
     return [*sentences, _against_reference(run.label(first), excess)]
@@ -103,7 +103,7 @@ def _distances(run: Run, rows: pd.DataFrame) -> list[str]:
 
 
 def _repeated(run: Run, excess: Excess) -> str:
-    """Return what the means are taken over: "motions", or "11 independent sources" and what these are."""
+    """Return what the means are taken over: "motions", or how many sources of which kinds."""
     count = excess.effect.motions
     if count == len(excess.by_motion):
         return "motions"
@@ -119,7 +119,7 @@ def _repeated(run: Run, excess: Excess) -> str:
     )
     more = f", and {len(others)} {kind}" if others else ""
     recorded = f"{len(recordings)} recording{'' if len(recordings) == 1 else 's'}"
-    return f"{count} independent sources: {recorded}, each averaged over its segments{more}"
+    return f"{count} sources treated as independent: {recorded}, each averaged over its segments{more}"
 
 
 def _ended(sentence: str) -> str:
@@ -179,12 +179,6 @@ def listed(items: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))
 
 
-def _in_scenes(scenes: Collection[str]) -> str:
-    """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
-    kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
-    return f"in {len(scenes)} {kind}{'' if len(scenes) == 1 else 's'}"
-
-
 def _moves(run: Run, worn: pd.DataFrame) -> list[str]:
     """Say what each subject lacks of the simulation's motion, and how much of it lies inside the body."""
     sentences: list[str] = []
@@ -233,7 +227,7 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> list[str]:
     milliseconds = number(compared.other.value)
     training = value_of(run.garment_rows, network, "cost/train")
     whole = " from pose to vertices" if compared.metric.name == "cost/whole" else ""
-    where = f", {_in_scenes(scenes)}" if scenes else ""
+    where = f", {in_scenes(scenes)}" if scenes else ""
     return [
         f"on one core {run.label(network)} takes {milliseconds} ms a frame{whole}, the simulation {times} "
         f"times as long{where}",
@@ -252,7 +246,7 @@ def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
         claims = f"{total} primary claim{'' if total == 1 else 's'}"
         failing = _claims_that_fail(run, lines)
         sentences.append(f"of {claims} of the paper {paper_claims.in_words(counted)}{failing}")
-    where = _in_scenes(set(timed[timed["method"] == run.reference]["scene"]))
+    where = in_scenes(set(timed[timed["method"] == run.reference]["scene"]))
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest:
         sentences.append(f"{_left_out_by_the_step(run, timed, finest)}, {where}")
@@ -276,9 +270,9 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     ]
     away, network = value_of(timed, finest, DISTANCE), _first_subject(run, timed)
     far = value_of(timed, network, DISTANCE)
-    beside = "" if far is None else f" ({run.label(network)}: {number(far, 2)} mm)"
+    beside = "" if far is None else f", {run.label(network)} {number(far, 2)} mm"
     has = [f"has {' and '.join(ratios)}"] if ratios else []
-    distance = [] if away is None else [f"lies {number(away, 2)} mm from it{beside}"]
+    distance = [] if away is None else [f"lies {number(away, 2)} mm from the reference{beside}"]
     return (
         "the reference minimises each time step of 1/30 s to convergence, but smaller steps change it: a "
         f"simulation with {steps} steps a frame {', and '.join([*has, *distance])}"
@@ -315,10 +309,10 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     sentences = []
     if solver is not None:
         sentences.append(
-            "of the solvers stopped early that come at least as near to the minimum of each time step "
-            f"({snug}: {number(network.error)} J{network.fewer} above it) {run.label(solver.method)} "
-            f"({number(solver.error)} J{solver.fewer}) is the fastest and takes {number(solver.time)} ms, "
-            f"{number(solver.time / network.time, 2)} times as long"
+            "the fastest solver stopped early that comes at least as near to the minimum of each time step "
+            f"({run.label(solver.method)}: {number(solver.error)} J{solver.fewer} above it; {snug}: "
+            f"{number(network.error)} J{network.fewer}) takes {number(solver.time)} ms, "
+            f"{number(solver.time / network.time, 2)} times as long as {snug}"
         )
     if best is None:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]

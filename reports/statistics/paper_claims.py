@@ -91,8 +91,8 @@ UNSEEN = "Section 1: generalises better than supervision to unseen motion"
 UNSEEN_DISTANCE = f"{UNSEEN}; tested by distance from the simulation"
 UNSEEN_EQUAL = "Section 1, both networks with as many frames and steps: generalises better than supervision"
 CLOSE = (
-    "Figure 7: close to offline simulation on unseen motion; tested more strictly: no more energy than "
-    "simulated cloth"
+    "Figure 7: close to offline simulation on unseen motion; tested more strictly, which cannot refute it: "
+    "no more energy than simulated cloth"
 )
 OTHERS = "Figure 7: at least on par with other data-driven methods"
 SPRINGS = "Figure 3: springs deform less expressively than StVK; here, networks trained on either"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 DASH = "–"
 CSV_DASH = "-"
@@ -88,3 +88,9 @@ def aligned(texts: Sequence[str]) -> list[str]:
 
 def _is_plain(text: str) -> bool:
     return bool(text) and all(letter in "−,.0123456789" for letter in text)
+
+
+def in_scenes(scenes: Collection[str]) -> str:
+    """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
+    kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
+    return f"in {len(scenes)} {kind}{'' if len(scenes) == 1 else 's'}"

@@ -12,10 +12,10 @@ from reports.statistics.page_one_methods import EXTERNAL, leads
 from reports.statistics.pareto import run_time
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
+from reports.tables.number_texts import in_scenes
 from reports.tables.table import Cell, Column, Table, metric_column, table
 
 ROWS = 8
-NAMED = 4  # scenes that a caption names
 ANSWERS = ("distance/rms", "penetration/surface", "dynamics/amplitude", "dynamics/correlation")
 GAP = "gap/energy"
 
@@ -65,13 +65,12 @@ def overview(run: Run) -> list[Table]:
     columns = [columns[k - 1] for k in kept]
     if not columns:
         return []
-    timed_in = ", ".join(scenes) if len(scenes) <= NAMED else f"{len(scenes)} scenes"
     of_motions = (
         f"{garment}: relative excess as a geometric mean over independent sources, the rest as arithmetic "
         "means over motions"
     )
-    caption = of_motions if garment else f"Means over {timed_in}"
-    caption += f"; run times (and energy gaps) over {timed_in}." if garment and scenes else "."
+    caption = of_motions if garment else f"Means {in_scenes(scenes)}"
+    caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)
 

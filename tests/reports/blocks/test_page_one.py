@@ -37,11 +37,13 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     assert sentences.startswith(
         f"On 2 unseen motions SNUG has a relative excess of {number_texts.number(typical, 2)} % ("
     )
-    scale = "where the reference has 0 % and skinning alone 100 %. These are geometric means over motions."
-    assert f"{scale} Arithmetic means: SNUG 12 %; worst motions: SNUG 20 %. Whether SNUG differs" in sentences
+    assert (
+        "where the reference has 0 % and skinning alone 100 %. These percentages are geometric means over "
+        "motions. Arithmetic means: SNUG 12 %; worst motions: SNUG 20 %. Whether SNUG differs" in sentences
+    )
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
     assert " and PBNS of 15 %, where the reference" in near(rows)
-    assert "; whether SNUG or PBNS has less is inconclusive. These are" in near(rows)
+    assert "; whether SNUG or PBNS has less is inconclusive. These percentages" in near(rows)
     # A member of the reference's ensemble is no rival, however near it is.
     assert near(rows + on_two_scenes("simulation-perturbed-1e-4", 0.5, 7.0)) == near(rows)
 
@@ -50,8 +52,8 @@ def test_page_one_says_what_the_independent_sources_are():
     scenes = [f"tshirt/{name}" for name in ("01_01_a", "01_01_b", "05_03", "kick")]
     energies = {"simulation": 0.0, "skinning": 10.0, "snug": 1.0}
     rows = [row(s, method, "energy/total", e) for s in scenes for method, e in energies.items()]
-    sources = "3 independent sources: 2 recordings, each averaged over its segments, and 1 other motion."
-    assert f"geometric means over {sources}" in near(rows)
+    sources = "geometric means over 3 sources treated as independent: 2 recordings, each averaged over its "
+    assert f"{sources}segments, and 1 other motion." in near(rows)
     assert "2 recordings, each averaged over its segments. Arithmetic" in near(rows[:9])
     made = dict(headline(run_of(rows, motion_sources={"kick": "embedded library: key angles"})))["How near"]
     assert "and 1 motion made by code. Arithmetic" in made.replace("\u00a0", " ")
@@ -89,7 +91,7 @@ def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
         "Of 1 primary claim of the paper 1 does not hold; what does not hold is “Figure 7: close to"
         in certainty
     )
-    tested = "(tested more strictly: no more energy than simulated cloth)."
+    tested = "(tested more strictly, which cannot refute it: no more energy than simulated cloth)."
     assert certainty.endswith(tested) and dict(topics(run_of(rows)))["How certain"][0].endswith(tested)
 
 

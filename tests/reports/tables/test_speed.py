@@ -55,9 +55,9 @@ def test_garments_have_crossings_by_themselves():
 def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():
     run = run_of(all_rows())
     assert cost_sentence(run).endswith(
-        " Of the solvers stopped early that come at least as near to the minimum of each time step "
-        "(SNUG: 0.100 J above it) L-BFGS, 20 iterations (0.0500 J) is the fastest and takes 16.0 ms, 64 "
-        "times as long. SNUG has an energy gap, a frame's energy above the minimum of its own time step, of "
+        " The fastest solver stopped early that comes at least as near to the minimum of each time step "
+        "(L-BFGS, 20 iterations: 0.0500 J above it; SNUG: 0.100 J) takes 16.0 ms, 64 times as long as SNUG. "
+        "SNUG has an energy gap, a frame's energy above the minimum of its own time step, of "
         "0.100 J; no method timed here is as fast with a smaller gap."
     )
     (table,) = error_rivals(run)
@@ -81,4 +81,4 @@ def test_the_reference_has_its_uncertainty_and_its_error_in_time_in_a_table():
 def test_a_run_of_suite_speed_alone_has_its_methods_on_page_one():
     made = make_tables(run_of(all_rows()))["overview"]
     assert {"simulation", "snug", "skinning"} < {line[0] for line in made.rows}
-    assert "None" not in made.caption and all(scene in made.caption for scene in SCENES)
+    assert made.caption == "Means in 2 scenes."
