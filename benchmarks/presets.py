@@ -68,7 +68,7 @@ class Preset:
 
 def _steps(*, snug: int, ncs: int, **others: int) -> dict[str, int]:
     """Return the optimiser steps per kind: handles are trained as long as snug, ncs-static as ncs."""
-    handles = dict.fromkeys(("handles-20", "handles-40", "handles-80"), snug)
+    handles = dict.fromkeys(("handles-20", "handles-40", "handles-80", "handles-80-dynamic"), snug)
     once = {"nearest-poses": 1, "pose-regression": 1}
     return {"snug": snug, "ncs": ncs, "ncs-static": ncs, **handles, **once, **others}
 

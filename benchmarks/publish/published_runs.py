@@ -12,7 +12,9 @@ MADE = "push_recovery,dance_turn,cartwheel_lean,climbing_steps,sit_and_stand"
 ALL_TESTS = f"--test-motions {RECORDED},{MADE}"
 REFERENCES = "simulation,simulation-perturbed-1e-4,simulation-refrozen,skinning"
 THREE = "--seeds 0,1,2"
-OTHERS = "handles-20,handles-40,handles-80,ncs,nearest-poses,pose-regression"  # learned, of other forms
+OTHERS = (  # learned, of other forms
+    "handles-20,handles-40,handles-80,handles-80-dynamic,ncs,ncs-static,nearest-poses,pose-regression"
+)
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ RUNS = {
         "all methods on 22 test motions; error against run time on two clips",
         {
             "garments": f"--suite garments {THREE} {ALL_TESTS} --scenes 'tshirt/*' --methods {REFERENCES},"
-            f"simulation-1e-8,snug,pbns,supervised,fast-lbfgs-10,snug-no-collision,snug+cleanup,{OTHERS}",
+            f"simulation-1e-8,snug,pbns,supervised,fast-lbfgs-10,snug-no-collision,snug+cleanup,"
+            f"supervised+cleanup,{OTHERS}",
             "speed": f"--suite speed {THREE} {ALL_TESTS} "
             "--scenes tshirt/push_recovery@clip,tshirt/01_01_a@clip --methods 'simulation,simulation-1e-[28],"
             "simulation-dt/*,simulation-perturbed-*,simulation-refrozen,skinning,snug,supervised,pbns,"
@@ -90,8 +93,7 @@ RUNS = {
         "networks of few handles and their floors; Neural Cloth Simulation; learners without training",
         {
             "": f"--suite garments {THREE} --scenes 'tshirt/*' --methods {REFERENCES},snug,snug-floor,pbns,"
-            "handles-20,handles-40,handles-80,handles-20-floor,handles-40-floor,handles-80-floor,"
-            "nearest-poses,pose-regression,ncs"
+            f"handles-20-floor,handles-40-floor,handles-80-floor,{OTHERS}"
         },
     ),
     "self_contact": PublishedRun(

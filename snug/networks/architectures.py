@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from snug.networks.fitted import NearestPoses, PoseRegression
 from snug.networks.garment_network import GarmentNetwork
-from snug.networks.handles.network import Handles20, Handles40, Handles80
+from snug.networks.handles.network import DynamicHandles80, Handles20, Handles40, Handles80
 from snug.networks.initialisation import initialise
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.ncs.network import StaticBranch, TwoBranches
@@ -31,6 +31,7 @@ ARCHITECTURES: dict[str, type[GarmentNetwork]] = {
     "handles-20": Handles20,
     "handles-40": Handles40,
     "handles-80": Handles80,
+    "handles-80-dynamic": DynamicHandles80,
     "ncs": TwoBranches,
     "ncs-static": StaticBranch,
 }

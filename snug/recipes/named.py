@@ -137,6 +137,7 @@ RECIPE_OF_KIND = {
     "handles-20": HANDLES,
     "handles-40": HANDLES,
     "handles-80": HANDLES,
+    "handles-80-dynamic": HANDLES,
     "ncs": NCS,
     "ncs-static": NCS,
 }

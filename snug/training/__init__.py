@@ -18,8 +18,8 @@
 `snug` shows an example that trains.
 
 >>> from snug.training import KINDS
->>> [name for name, kind in KINDS.items() if kind.physics]
-['snug', 'dynamic', 'pbns', 'handles-20', 'handles-40', 'handles-80', 'ncs', 'ncs-static']
+>>> [name for name, kind in KINDS.items() if not kind.physics]
+['supervised', 'santesteban2019', 'tailornet', 'nearest-poses', 'pose-regression']
 """
 
 import lazy_loader

@@ -42,6 +42,7 @@ class Kind:
 _OTHER: dict[str, dict[str, Any]] = {
     "snug": {"closed_form": True},
     "dynamic": {"past": True, "closed_form": True},
+    "handles-80-dynamic": {"closed_form": True},
     "supervised": {"targets": VertexTargets, "closed_form": True},
     "santesteban2019": {"targets": VertexTargets, "closed_form": True},
     "tailornet": {"targets": BandTargets},

@@ -13,7 +13,7 @@ from snug.recipes.named import RECIPES
 
 MODELS = (
     "snug", "pbns", "supervised", "santesteban2019", "tailornet", "ncs", "ncs-static", "handles-20",
-    "handles-40", "handles-80",
+    "handles-40", "handles-80", "handles-80-dynamic",
 )  # fmt: skip
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices

@@ -91,6 +91,24 @@ def test_training_moves_the_numbers_and_leaves_the_shape_functions(trained):
     assert trained.history[-1]["loss"] < trained.history[0]["loss"] or len(trained.history) == 1
 
 
+def test_dynamic_handles_see_the_past_and_stay_in_the_space_of_static_ones():
+    motion, dressed = swaying(12), tube_dress()
+    model = train_network(
+        "handles-80-dynamic", dressed, [motion], steps=3, seed=0, recipe=HANDLES, progress=False
+    )
+    columns, _ = model.network.offset_space()
+    assert np.abs(columns.numpy() - span(shape_functions(dressed.garment, 80))).max() < 1e-6
+    features = torch.randn(1, 4, len(model.network.input_mean))
+    offsets, state = model.network(features)
+    alone, _ = model.network(features[:, -1:])
+    carried, _ = model.network(features[:, 2:], model.network(features[:, :2])[1])
+    assert (offsets[:, -1] - alone[:, -1]).abs().max() > 1e-6
+    assert torch.allclose(carried, offsets[:, 2:], atol=1e-6) and state.shape == (2, 1, 256)
+    last = offsets[0, -1].flatten().detach().numpy()
+    numbers = np.linalg.lstsq(columns.numpy(), last)[0]
+    assert np.abs(columns.numpy() @ numbers - last).max() < 1e-5 * np.abs(last).max()
+
+
 def test_offsets_lie_in_the_space_that_the_network_names(trained):
     columns, centre = trained.network.offset_space()
     features = torch.randn(1, 4, len(trained.network.input_mean))
