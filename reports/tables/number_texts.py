@@ -94,3 +94,12 @@ def in_scenes(scenes: Collection[str]) -> str:
     """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
     kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
     return f"in {len(scenes)} {kind}{'' if len(scenes) == 1 else 's'}"
+
+
+def listed(items: Sequence[str]) -> str:
+    """Return the words as "a, b and c".
+
+    >>> listed(["a", "b", "c"]), listed(["a"]), listed([])
+    ('a, b and c', 'a', '')
+    """
+    return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))

@@ -1,0 +1,111 @@
+"""Sentences of page one on how near the networks come to the reference, by relative excess."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from reports.run.finished_run import Run
+from reports.statistics.effects import RECORDING, Effect, recording_of
+from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads
+from reports.statistics.published import published_beside
+from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_relative_excess
+from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, standing
+from reports.tables.number_texts import listed, number
+
+BY_CODE = "embedded library"  # how the source of a motion of the package that code makes begins
+
+
+def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
+    """Say which relative excess each network of page one has, and whether the first has less energy."""
+    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
+    rows = with_relative_excess(run, worn)
+    known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
+    if not known:
+        return []
+    first, *others = known
+    excess = known[first]
+    kind = "validation " if run.config.get("split") == "validation" else "unseen "
+    unseen = "" if set(worn["scene"]) <= set(run.trained_on) else kind
+    count = len(excess.by_motion)
+    beside = published_beside(run, first)
+    motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
+    paired = [f"; {says}" for says in _paired(run, worn, first, others)]
+    shares = [
+        f"{run.label(first)} has a relative excess of {_share(excess)}{f' ({beside})' if beside else ''}",
+        *(f"{run.label(name)} of {_share(known[name])}" for name in others),
+    ]
+    scale = "where the reference has 0 % and skinning alone 100 %"
+    sentences = [f"On {motions} {listed(shares)}, {scale}{''.join(paired)}"]
+    if count > 1:
+        means = listed([f"{run.label(n)} {number(excess.mean, 2)} %" for n, excess in known.items()])
+        worst = listed([f"{run.label(n)} {number(excess.worst[1], 2)} %" for n, excess in known.items()])
+        sentences += [
+            f"These percentages are geometric means over {_repeated(run, excess)}. Arithmetic means: "
+            f"{means}; worst motions: {worst}",
+        ]
+    return [*sentences, _against_reference(run.label(first), excess)]
+
+
+def _repeated(run: Run, excess: Excess) -> str:
+    """Return what the means are taken over: "motions", or how many sources of which kinds."""
+    count = excess.effect.motions
+    if count == len(excess.by_motion):
+        return "motions"
+    sources = {recording_of(scene) for scene in excess.by_motion}
+    recordings = {name for name in sources if RECORDING.search(name)}
+    others = sources - recordings
+    motions = {scene.partition("/")[2] for scene in others}
+    made = all(
+        str(run.config.get("motion_sources", {}).get(name, "")).startswith(BY_CODE) for name in motions
+    )
+    kind = (
+        f"{'' if made else 'other '}motion{'' if len(others) == 1 else 's'}{' made by code' if made else ''}"
+    )
+    more = f", and {len(others)} {kind}" if others else ""
+    recorded = f"{len(recordings)} recording{'' if len(recordings) == 1 else 's'}"
+    return f"{count} sources treated as independent: {recorded}, each averaged over its segments{more}"
+
+
+def _share(excess: Excess) -> str:
+    """Return a relative excess as "6.1 % (95 % interval 2.3 to 14)"."""
+    interval = excess.effect.interval
+    ends = f" (95 % interval {' to '.join(number(end, 2) for end in interval)})" if interval else ""
+    return f"{number(excess.typical, 2)} %{ends}"
+
+
+def _against_reference(label: str, excess: Excess) -> str:
+    """Say how the energy of the method with this label compares with the reference's."""
+    stands = standing(excess.effect, excess.effect.p_value())
+    return {
+        TIED: f"{label} ties with the reference",
+        MORE: f"the excess of {label} is larger than the uncertainty of the reference",
+        LESS: f"{label} has less energy than the reference, which is no better: still cloth has less",
+    }.get(stands, f"whether {label} differs from the reference is inconclusive")
+
+
+def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> list[str]:
+    """Say which of these have more total energy than a method, paired by motion, and which less."""
+    standings: dict[str, list[str]] = {}
+    for other in others:
+        if effect := compare_methods(run, rows, run.metrics[TOTAL], one, other).effect:
+            p = effect.p_value()
+            stands = standing(effect, p)
+            shown = _tested(effect, p) if stands in (LESS, MORE) and p is not None else ""
+            standings.setdefault(stands, []).append(f"{run.label(other)}{shown}")
+    first = run.label(one)
+    says = {
+        LESS: f"paired by motion, {first} has less energy than {{}}",
+        MORE: f"paired by motion, {first} has more energy than {{}}",
+        TIED: f"paired by motion, {first} has as much energy as {{}}",
+        OPEN: f"whether {first} or {{}} has less is inconclusive",
+    }
+    return [text.format(listed(standings[stands])) for stands, text in says.items() if stands in standings]
+
+
+def _tested(effect: Effect, p: float) -> str:
+    """Return " (−8.1 points, 95 % interval −12 to −4.0, p = 0.002)" of an effect on relative excess."""
+    ends = effect.interval
+    interval = f", 95 % interval {number(ends[0], 2)} to {number(ends[1], 2)}" if ends else ""
+    return f" ({number(effect.shown, 2)} points{interval}, p = {number(p, 2)})"
