@@ -26,7 +26,7 @@ from reports.statistics.pareto import (
     truncated,
 )
 from reports.statistics.verdicts import compare_methods, measure_of
-from reports.tables.number_texts import duration, in_scenes, listed, number
+from reports.tables.number_texts import in_scenes, listed, number
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
 SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
@@ -119,14 +119,12 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> list[str]:
     ends = compared.effect.interval
     times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
     milliseconds = number(compared.other.value)
-    training = value_of(run.garment_rows, network, "cost/train")
     whole = " from pose to vertices" if compared.metric.name == "cost/whole" else ""
     where = f", {in_scenes(scenes)}" if scenes else ""
     return [
         f"on one core {run.label(network)} takes {milliseconds} ms a frame{whole}, the simulation {times} "
         f"times as long{where}",
         *(_rivals(run, run.cells("speed", "garments"), scenes) if scenes else []),
-        f"the training of {run.label(network)} took {duration(training)}" if training else "",
     ]
 
 
@@ -212,10 +210,12 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
         rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
         partly_measured = set(rows["method"]) - {point.method for point in points}
         where = "timed in all of these scenes" if partly_measured else "timed here"
-        gaps = (
-            f"{snug} has an energy gap, a frame's energy above the minimum of its own time step, of "
-            f"{number(network.error)} J{network.fewer}; no method {where} is as fast with a smaller gap"
-        )
+        gaps = f"no method {where} is as fast with a smaller energy gap"
+        if solver is None:
+            gaps = (
+                f"{snug} has an energy gap, a frame's energy above the minimum of its own time step, of "
+                f"{number(network.error)} J{network.fewer}; {gaps}"
+            )
     else:
         within = " within repeats" if best.time > network.time else ""
         apart = network.error - best.error > network.error_spread + best.error_spread

@@ -66,7 +66,7 @@ def _scenes(run: Run) -> Scenes:
 def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequence[Point]) -> Drawing:
     """Draw one error of a scene in a wide panel, solvers stopped early as one curve."""
     time = run_time(rows)
-    figure = new_figure(PAGE_WIDTH, 2.3)
+    figure = new_figure(PAGE_WIDTH, 2.0)
     axes = figure.subplots()
     curves = of_page_one(run, points)
     reference = value_of(rows, run.reference, time)

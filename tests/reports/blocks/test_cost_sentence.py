@@ -28,7 +28,7 @@ def test_nothing_is_nearer_of_those_that_were_looked_at():
     run = run_of(rows)
     frame = run.cells("speed", "garments")
     (sentence,) = page_one_sentences._rivals(run, frame, ["a", "b"])
-    others = "no method timed in all of these scenes is as fast with a smaller gap"
+    others = "no method timed in all of these scenes is as fast with a smaller energy gap"
     assert sentence.endswith(others)
     assert page_one_sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
 
