@@ -30,9 +30,9 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
         raise MeshError(f"obstacle with {len(positions)} frames and {len(faces)} faces: nothing to touch")
     if faces.min() < 0 or faces.max() >= positions.shape[1]:
         raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
-    bad = np.argwhere(~np.isfinite(positions))
-    if bad.size:
-        raise MeshError(f"obstacle vertex {bad[0, 1]} of frame {bad[0, 0]} is not finite")
+    if not np.isfinite(positions).all():
+        frame, vertex, _ = np.argwhere(~np.isfinite(positions))[0]
+        raise MeshError(f"obstacle vertex {vertex} of frame {frame} is not finite")
     _check_edges(faces, positions.shape[1])
     for frame, x in enumerate(positions):
         _check_shape(x[faces], frame)
