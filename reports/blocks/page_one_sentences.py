@@ -145,8 +145,9 @@ def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(
-            f"equally valid simulations lie {number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean "
-            f"curvature from the reference, {where}: errors below that show no difference"
+            "equally valid simulations (another start, contact search or tolerance) lie "
+            f"{number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean curvature from the reference, "
+            f"{where}: errors below that show no difference"
         )
     return sentences
 
@@ -162,7 +163,7 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     ]
     away, network = value_of(timed, finest, DISTANCE), _first_subject(run, timed)
     far = value_of(timed, network, DISTANCE)
-    beside = "" if far is None else f", {run.label(network)} {number(far, 2)} mm"
+    beside = "" if far is None else f", from which {run.label(network)} lies {number(far, 2)} mm"
     has = [f"has {' and '.join(ratios)}"] if ratios else []
     distance = [] if away is None else [f"lies {number(away, 2)} mm from the reference{beside}"]
     return (
