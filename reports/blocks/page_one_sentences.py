@@ -179,9 +179,10 @@ def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> str:
         if line.claim.primary and line.verdict == paper_claims.FAILS:
             lower, higher = run.label(line.claim.lower), run.label(line.claim.higher)
             measure = measure_of(line.compared).title.lower()
-            says, _, tested = line.claim.says.partition("; tested")
-            test = tested or f" as {measure}: {lower} {line.claim.relation} {higher}"
-            failed.append(f"“{says}” (tested{test})")
+            says, _, condition = line.claim.says.partition(paper_claims.STRICTER)
+            tested = f" (tested as {measure}: {lower} {line.claim.relation} {higher})"
+            stricter = f", in a test stricter than these words: {condition}"
+            failed.append(f"“{says.partition('; tested')[0]}”{stricter if condition else tested}")
     return f"; what does not hold is {listed(failed)}" if failed else ""
 
 

@@ -91,7 +91,7 @@ def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
         "Of 1 primary claim of the paper 1 does not hold; what does not hold is “Figure 7: close to"
         in certainty
     )
-    tested = "(tested more strictly, which cannot refute it: no more energy than simulated cloth)."
+    tested = "unseen motion”, in a test stricter than these words: no more energy than simulated cloth."
     assert certainty.endswith(tested) and dict(topics(run_of(rows)))["How certain"][0].endswith(tested)
 
 
