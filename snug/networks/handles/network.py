@@ -35,10 +35,10 @@ class HandleNetwork(GarmentNetwork):
 
     handles: ClassVar[int]
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def _add_handles(self) -> None:
+        """Add last layer and shape functions. What a seed draws depends on which layers are added before."""
         self.numbers = nn.Linear(WIDTHS[-1], 12 * self.handles)
-        self.functions = nn.Parameter(torch.zeros(vertices, self.handles, 4), requires_grad=False)
+        self.functions = nn.Parameter(torch.zeros(self.vertices, self.handles, 4), requires_grad=False)
 
     def wear(self, garment: Garment) -> None:
         """Place the handles on the garment. Raises HandleError where it cannot have as many."""
@@ -69,6 +69,7 @@ class StaticHandles(HandleNetwork):
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
         self.activations = perceptron(inputs, *WIDTHS, activation=nn.SiLU)
+        self._add_handles()
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""
@@ -80,14 +81,16 @@ class StaticHandles(HandleNetwork):
         plan.add_handles(self, self.functions, plan.add_linear(self.numbers, x))
 
 
-class DynamicHandles(HandleNetwork):
-    """Recurrent units of the motion, as SNUG has, but two layers in place of four; the state is theirs."""
+class DynamicHandles80(HandleNetwork):
+    """Eighty handles by recurrent units of the motion, two layers of SNUG's four; the state is theirs."""
 
+    handles = 80
     feature_set = "motion"
     sequential = True
 
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
+        self._add_handles()
         self.gru = nn.GRU(inputs, WIDTHS[-1], len(WIDTHS), batch_first=True)
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
@@ -115,11 +118,5 @@ class Handles40(StaticHandles):
 
 class Handles80(StaticHandles):
     """Eighty handles."""
-
-    handles = 80
-
-
-class DynamicHandles80(DynamicHandles):
-    """Eighty handles, moved by recurrent units."""
 
     handles = 80

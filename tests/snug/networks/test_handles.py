@@ -9,6 +9,9 @@ import pytest
 import torch
 
 from snug.body.skeleton import rotation_matrices
+from snug.networks.architectures import make_network
+from snug.networks.garment_network import perceptron
+from snug.networks.handles.network import WIDTHS
 from snug.networks.handles.shape_functions import HandleError, farthest_points, shape_functions, span
 from snug.networks.roll_out import roll_out
 from snug.recipes.named import HANDLES
@@ -89,6 +92,17 @@ def test_training_moves_the_numbers_and_leaves_the_shape_functions(trained):
     assert np.abs(trained.network.functions.numpy() - functions).max() < 1e-6
     assert trained.network.numbers.weight.abs().max() > 0.0
     assert trained.history[-1]["loss"] < trained.history[0]["loss"] or len(trained.history) == 1
+
+
+def test_a_seed_draws_the_perceptron_before_the_last_layer():
+    """As in the published trainings: another order gives other networks for the same seed."""
+    network = make_network("handles-20", 141, 150, replace(HANDLES, initialisation="torch"), seed=7)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(7)
+        drawn = perceptron(141, *WIDTHS, activation=torch.nn.SiLU)
+    for parameter, same in zip(network.activations.parameters(), drawn.parameters(), strict=True):
+        assert torch.equal(parameter, same)
+    assert [name for name, _ in network.named_children()] == ["activations", "numbers"]  # as rules draw
 
 
 def test_dynamic_handles_see_the_past_and_stay_in_the_space_of_static_ones():
