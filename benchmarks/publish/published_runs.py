@@ -50,7 +50,7 @@ RUNS = {
         "all methods on 22 test motions; error against run time on two clips",
         {
             "garments": f"--suite garments {THREE} {ALL_TESTS} --scenes 'tshirt/*' --methods {REFERENCES},"
-            f"simulation-1e-8,snug,pbns,supervised,fast-lbfgs-10,snug-no-collision,snug+cleanup,"
+            "simulation-1e-8,snug,pbns,supervised,fast-lbfgs-10,snug-no-collision,snug+cleanup,"
             f"supervised+cleanup,{OTHERS}",
             "speed": f"--suite speed {THREE} {ALL_TESTS} "
             "--scenes tshirt/push_recovery@clip,tshirt/01_01_a@clip --methods 'simulation,simulation-1e-[28],"

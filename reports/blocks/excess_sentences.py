@@ -39,8 +39,8 @@ def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
     scale = "where the reference has 0 % and skinning alone 100 %"
     sentences = [f"On {motions} {listed(shares)}, {scale}{''.join(paired)}"]
     if count > 1:
-        means = listed([f"{run.label(n)} {number(excess.mean, 2)} %" for n, excess in known.items()])
-        worst = listed([f"{run.label(n)} {number(excess.worst[1], 2)} %" for n, excess in known.items()])
+        means = listed([f"{run.label(name)} {number(of.mean, 2)} %" for name, of in known.items()])
+        worst = listed([f"{run.label(name)} {number(of.worst[1], 2)} %" for name, of in known.items()])
         sentences += [
             f"These percentages are geometric means over {_repeated(run, excess)}. Arithmetic means: "
             f"{means}; worst motions: {worst}",
@@ -56,13 +56,10 @@ def _repeated(run: Run, excess: Excess) -> str:
     sources = {recording_of(scene) for scene in excess.by_motion}
     recordings = {name for name in sources if RECORDING.search(name)}
     others = sources - recordings
-    motions = {scene.partition("/")[2] for scene in others}
-    made = all(
-        str(run.config.get("motion_sources", {}).get(name, "")).startswith(BY_CODE) for name in motions
-    )
-    kind = (
-        f"{'' if made else 'other '}motion{'' if len(others) == 1 else 's'}{' made by code' if made else ''}"
-    )
+    origins = run.config.get("motion_sources", {})
+    made = all(origins.get(scene.partition("/")[2], "").startswith(BY_CODE) for scene in others)
+    motions = f"motion{'' if len(others) == 1 else 's'}"
+    kind = f"{motions} made by code" if made else f"other {motions}"
     more = f", and {len(others)} {kind}" if others else ""
     recorded = f"{len(recordings)} recording{'' if len(recordings) == 1 else 's'}"
     return f"{count} sources treated as independent: {recorded}, each averaged over its segments{more}"
@@ -70,9 +67,14 @@ def _repeated(run: Run, excess: Excess) -> str:
 
 def _share(excess: Excess) -> str:
     """Return a relative excess as "6.1 % (95 % interval 2.3 to 14)"."""
-    interval = excess.effect.interval
-    ends = f" (95 % interval {' to '.join(number(end, 2) for end in interval)})" if interval else ""
-    return f"{number(excess.typical, 2)} %{ends}"
+    interval = _interval(excess.effect)
+    return f"{number(excess.typical, 2)} %{f' ({interval})' if interval else ''}"
+
+
+def _interval(effect: Effect) -> str:
+    """Return "95 % interval 2.3 to 14", empty of an effect without one."""
+    ends = effect.interval
+    return f"95 % interval {' to '.join(number(end, 2) for end in ends)}" if ends else ""
 
 
 def _against_reference(label: str, excess: Excess) -> str:
@@ -106,6 +108,5 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
 
 def _tested(effect: Effect, p: float) -> str:
     """Return " (−8.1 points, 95 % interval −12 to −4.0, p = 0.002)" of an effect on relative excess."""
-    ends = effect.interval
-    interval = f", 95 % interval {number(ends[0], 2)} to {number(ends[1], 2)}" if ends else ""
-    return f" ({number(effect.shown, 2)} points{interval}, p = {number(p, 2)})"
+    parts = (f"{number(effect.shown, 2)} points", _interval(effect), f"p = {number(p, 2)}")
+    return f" ({', '.join(filter(None, parts))})"

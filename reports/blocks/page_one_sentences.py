@@ -157,11 +157,12 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     steps = int(run.methods[finest].level or 0)
     strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
     ratios = [
-        f"{number(one.value / other.value, 2)} times {what}"
-        for what, (one, other) in (("its strain", strain), ("its hem amplitude", amplitude))
+        f"{number(one.value / other.value, 2)} times its {what}"
+        for what, (one, other) in (("strain", strain), ("hem amplitude", amplitude))
         if one and other and other.value
     ]
-    away, network = value_of(timed, finest, DISTANCE), _first_subject(run, timed)
+    away = value_of(timed, finest, DISTANCE)
+    network = _first_subject(run, timed)
     far = value_of(timed, network, DISTANCE)
     beside = "" if far is None else f", from which {run.label(network)} lies {number(far, 2)} mm"
     has = [f"has {' and '.join(ratios)}"] if ratios else []
