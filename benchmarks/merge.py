@@ -36,6 +36,7 @@ skipped row. Runs go on in their own folders, not in the merged one.
 exit status: 0 written; 2 the runs differ in what has to be the same, or a file is damaged: one line says
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
+NETWORK = "network"  # kind of task that trains a network
 SAME = ("format", "protocol", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
@@ -145,9 +146,11 @@ def _join(joined: dict[str, Any], other: Mapping[str, Any], where: str, *, stric
 def check_entries(folders: Iterable[RunFolder]) -> None:
     """Raise MergeError where two tasks came of other code or packages, or one task of other inputs.
 
-    The machine on which a task ran is no such input.
+    The machine on which a task ran is no such input, but a network has one file: of one seed, processors of
+    two kinds train two networks.
     """
     seen: dict[Any, tuple[str, Path]] = {}
+    files: dict[Path, tuple[dict[str, str], Path]] = {}
     for folder in folders:
         paths = sorted(folder.cache.rglob("*.json"))
         if not paths:
@@ -156,8 +159,15 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
             entry = read_entry(path)
             if entry is None:
                 raise MergeError(f"{path}: damaged, or of an earlier version; run it again with --fresh")
+            place = path.relative_to(folder.cache)
+            if place.parts[0] == NETWORK:
+                network, where = files.setdefault(place, (entry["files"], folder.path))
+                if network != entry["files"]:
+                    raise MergeError(
+                        f"{entry['task']}: another in {folder.path} than in {where}: copy its file"
+                    )
             for name, value in entry["parts"].items():
-                key = (path.relative_to(folder.cache), name) if name in entry["inputs"] else name
+                key = (place, name) if name in entry["inputs"] else name
                 before, where = seen.setdefault(key, (value, folder.path))
                 if before != value and name != MACHINE:
                     difference = f"{entry['task']}: another {name} in {folder.path} than in {where}"
@@ -183,7 +193,7 @@ def joined_rows(runs: Mapping[str, Sequence[Row]], timed: frozenset[str]) -> lis
             key = (row.suite, row.scene, row.method, row.seed, row.metric)
             if earlier := kept.get(key):
                 _compare(earlier, (row, where), of_a_machine=row.metric in timed)
-            kind = row.metric if row.metric in BEFORE_FRAMES else ""
+            kind = row.metric if row.metric in BEFORE_FRAMES else row.suite
             measured = row.metric in timed and row.value is not None
             if measured and (first := machine.setdefault(kind, row.hardware)) != row.hardware:
                 reason = f"{row.value:.4g} {row.unit} on {row.hardware}; other times are of {first}"

@@ -45,14 +45,18 @@ def package_version(name: str) -> str:
 
 
 def processor_name() -> str:
-    """Return the name that the processor gives itself, or the architecture where it gives none."""
+    """Return the processor's name, family, model and stepping, or the architecture where it has no name.
+
+    Clouds give processors of several generations one name, which run times and last bits are not the same of.
+    """
     try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return " ".join(line.split(":", 1)[1].split())
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0].splitlines()
     except OSError:
-        pass  # not Linux
-    return platform.processor() or platform.machine()
+        lines = []  # not Linux
+    facts = {name.strip(): " ".join(value.split()) for name, _, value in (s.partition(":") for s in lines)}
+    name = facts.get("model name") or platform.processor() or platform.machine()
+    which = [f"{key.split()[-1]} {facts[key]}" for key in ("cpu family", "model", "stepping") if key in facts]
+    return f"{name} ({', '.join(which)})" if which else name
 
 
 def usable_cores() -> int:

@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
 
 
-LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
-
-
 def simulate(
     cloth: Cloth,
     energies: Sequence[Energy],
@@ -73,21 +70,25 @@ def simulate(
         path: write the VTKHDF file there, frame by frame.
         resume: go on after the last whole frame of `path`, where a run with the same arguments left it (more
             frames may be asked for); without such a file start at the beginning. The same bits come out as
-            without the interruption.
+            without the interruption, but for what a minimiser has learned in earlier steps: CompiledLBFGS
+            begins with another length of its first step, and after pairs that came and went, a barrier's,
+            Newton's method sums in another order.
         progress: label of a progress bar with time left; None for silence.
         options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
             that makes one of a potential and the other options), tolerance, max_iterations, ... The default
             method is "lbfgs", or "newton" with a term whose pairs change with x, as a barrier's do.
 
     Returns:
-        A Trajectory whose status is "converged" if every frame converged, else the first other status; a
-        frame that is not finite ends it. frame_fields: iterations, factorisations, gradient_norm (relative
-        residual, see `Result`), converged (0/1), relaxed (1 where the residual is within the tolerance up to
-        round-off alone; the reason tells of the first), energy/<term> [J].
+        A Trajectory whose status is "converged" if every frame converged, else the worst of the others:
+        "diverged", then "stalled" and "timeout", then "max_iterations"; the reason tells of the first frame
+        with it. A frame that is not finite ends the run. frame_fields: iterations, factorisations,
+        gradient_norm (relative residual, see `Result`), converged (0/1), relaxed (1 where the residual is
+        within the tolerance up to round-off alone; the reason tells of the first), energy/<term> [J].
 
     Raises:
         ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, a step of no size, a
-            tolerance that is no number above 0, refreeze with resume.
+            tolerance that is no number above 0, refreeze with resume, a function as method beside a term that
+            joins a step late (self-contact alone), which Newton's method ends.
         TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
 
     Example: a triangle that one corner holds falls by g dt^2 in the first step.
@@ -103,15 +104,6 @@ def simulate(
         >>> fall.positions[:, 1, 1].round(6).tolist()
         [0.0, -0.000981, -0.002943]
     """
-    for name, count in (("frames", frames), ("substeps", substeps)):
-        if count < 1:
-            raise ValueError(f"simulate: {name} = {count}: must be at least 1")
-    if 0 < (step := dt / substeps) < LEAST_DT or MOST_DT < step < float("inf"):
-        raise ValueError(f"simulate: dt / substeps = {step:.3g} s: give {LEAST_DT:g} to {MOST_DT:g} s")
-    if refreeze and resume:
-        raise ValueError("simulate: a run with refreeze cannot be resumed: start it again without resume")
-    x = _checked(start, cloth.rest_positions, "start")
-    v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
     stepper = TimeStepper(
         cloth,
         energies,
@@ -121,8 +113,48 @@ def simulate(
         guess=guess,
         quasi_static=quasi_static,
         refreeze=refreeze,
-        options=options,
+        **options,
     )
+    return simulate_with(
+        stepper, frames=frames, start=start, velocity=velocity, pin_positions=pin_positions, path=path,
+        resume=resume, progress=progress,
+    )  # fmt: skip
+
+
+def simulate_with(
+    stepper: TimeStepper,
+    *,
+    frames: int = 60,
+    start: np.ndarray | None = None,
+    velocity: np.ndarray | None = None,
+    pin_positions: Callable[[int], np.ndarray] | None = None,
+    path: str | Path | None = None,
+    resume: bool = False,
+    progress: str | None = None,
+) -> Trajectory:
+    """Simulate with a stepper that is set up, which `simulate` makes anew for each run.
+
+    Args:
+        stepper: new, or one that has served another run and was told to `start_again`.
+        frames: number of frames T in the result.
+        start: (V, 3) [m] at frame 0; default the rest positions.
+        velocity: (V, 3) [m/s] at frame 0; default zero.
+        pin_positions: frame -> (P, 3) [m], for handles that move.
+        path: of the VTKHDF file.
+        resume: whether to go on after the last whole frame of `path`.
+        progress: label of a progress bar.
+
+    Raises:
+        ValueError: wrong shapes, fewer than 1 frame, refreeze with resume.
+        TrajectoryError: `path` cannot be resumed.
+    """
+    cloth = stepper.cloth
+    if frames < 1:
+        raise ValueError(f"simulate: frames = {frames}: must be at least 1")
+    if stepper.refreeze and resume:
+        raise ValueError("simulate: a run with refreeze cannot be resumed: start it again without resume")
+    x = _checked(start, cloth.rest_positions, "start")
+    v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
     provenance = stepper.provenance() | {"start": fingerprint(x, v)}
     earlier = recover(path, provenance, frames=frames) if resume and path else None
     if earlier and earlier.complete(frames):
@@ -143,7 +175,7 @@ def simulate(
             if after is None:
                 break
             state = after
-            record.add(state.x, frame * dt, seconds, _fields(results), state.before)
+            record.add(state.x, frame * stepper.frame_dt, seconds, _fields(results), state.before)
     return record.trajectory()
 
 

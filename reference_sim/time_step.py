@@ -13,7 +13,7 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.inertia import Inertia
 from reference_sim.fingerprint import fingerprint
-from reference_sim.minimise.minimisers import Minimiser, make_minimiser
+from reference_sim.minimise.minimisers import Minimiser, Restartable, make_minimiser
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 from reference_sim.trajectory.resume import PartialRun
@@ -22,6 +22,7 @@ from reference_sim.trajectory.trajectory import TrajectoryError
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
 
+LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
 GUESSES = ("previous", "extrapolated", "body_transported")
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
 LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
@@ -49,6 +50,8 @@ class State:
 class TimeStepper:
     """Backward Euler from frame to frame: the potential, its minimiser, the rule for a first guess.
 
+    All that many runs of one scene can share is set up here; `start_again` stands between two of them.
+
     Args:
         cloth: the rest state.
         energies: the terms of Phi; inertia is added.
@@ -58,10 +61,11 @@ class TimeStepper:
         guess: one of GUESSES, see `simulate`.
         quasi_static: whether the velocity is forgotten at every frame.
         refreeze: times that what a step freezes is searched again at its end, and the step solved again.
-        options: of the minimiser.
+        options: of the minimiser, see `simulate`.
 
     Raises:
-        ValueError: unknown guess, or a negative refreeze.
+        ValueError: unknown guess, fewer than 1 sub-step, a step of no size, a negative refreeze, a tolerance
+            that is no number above 0, or a function as method beside a term that joins late.
     """
 
     def __init__(
@@ -75,8 +79,12 @@ class TimeStepper:
         guess: str | None = None,
         quasi_static: bool = False,
         refreeze: int = 0,
-        options: dict[str, Any],
+        **options: Any,
     ) -> None:
+        if substeps < 1:
+            raise ValueError(f"simulate: substeps = {substeps}: must be at least 1")
+        if 0 < (step := dt / substeps) < LEAST_DT or MOST_DT < step < float("inf"):
+            raise ValueError(f"simulate: dt / substeps = {step:.3g} s: give {LEAST_DT:g} to {MOST_DT:g} s")
         if guess is None:
             guess = "extrapolated" if obstacle is None else "body_transported"
         if guess not in GUESSES or (guess == "body_transported" and obstacle is None):
@@ -98,9 +106,27 @@ class TimeStepper:
         self.opening: Minimiser | None = None
         self.ending = self.options
         if self.late and not early.impassable:
+            if callable(self.options["method"]):
+                raise ValueError(
+                    f"simulate: Newton's method, not a function, ends steps that {self.late[0].name!r} joins:"
+                    " choose method 'lbfgs' or 'newton', or leave the term out"
+                )
             self.opening = make_minimiser(early, **{"method": "lbfgs"} | options)
             self.ending = ENDING | {name: options[name] for name in LIMITS if name in options}
         self.minimiser = make_minimiser(self.potential, **self.ending)
+
+    def start_again(self) -> None:
+        """Let the next run give the bits of a first one: minimisers forget what they have learned.
+
+        A minimiser without `start_again` is made anew.
+        """
+        self.__dict__.pop("rough_minimiser", None)
+        if isinstance(self.opening, Restartable):
+            self.opening.start_again()
+        if isinstance(self.minimiser, Restartable):
+            self.minimiser.start_again()
+        else:
+            self.minimiser = make_minimiser(self.potential, **self.ending)
 
     def check_start(self, x: np.ndarray, v: np.ndarray) -> None:
         """Raise ValueError where x (V, 3) [m] at frame 0 is impossible for a term that nothing may pass."""

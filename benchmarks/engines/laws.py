@@ -118,6 +118,9 @@ def energy_gap(run: RollOut) -> float | None:
 
     0 is the minimum, found by Newton's method from the same state; 100 is the inertial guess x + h v. None
     where energies are not documented.
+
+    Raises:
+        RuntimeError: Newton's method did not converge in one of these steps.
     """
     if not run.energies:
         return None
@@ -131,5 +134,8 @@ def _gap(step: Step, run: RollOut) -> float:
     guess = step.x + step.dt * step.v
     guess[cloth.pins] = step.x[cloth.pins]
     potential.prepare(FrozenStep(step.x, step.v, guess, step.dt))
-    least = Newton(potential, max_iterations=200).minimise(guess).energy
+    found = Newton(potential, max_iterations=200).minimise(guess)
+    if found.status != "converged":
+        raise RuntimeError(f"energy gap: the minimum of a step is not known: {found.status}, {found.reason}")
+    least = found.energy
     return 100.0 * (potential.value(step.after) - least) / (potential.value(guess) - least)

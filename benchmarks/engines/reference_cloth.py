@@ -24,9 +24,10 @@ class ReferenceCloth(EngineCloth):
     def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Take one step. Raises ValueError where it diverges."""
         if dt not in self._steppers:
-            options = {"method": "newton", "max_iterations": self.iterations}
             terms = [*self.energies, Gravity(self.cloth)]
-            self._steppers[dt] = TimeStepper(self.cloth, terms, dt=dt, options=options)
+            self._steppers[dt] = TimeStepper(
+                self.cloth, terms, dt=dt, method="newton", max_iterations=self.iterations
+            )
         after, (result,) = self._steppers[dt].advance(1, State(x, v), None)
         if after is None:
             raise ValueError(f"the reference diverged: {result.reason}")

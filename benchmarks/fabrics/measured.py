@@ -81,7 +81,12 @@ def _fabric(where: str, number: int, line: Sequence[str], columns: dict[str, tup
                 f"--fabrics {where}: {field} {text} is {values[field]:g} in SI units, outside {low:g} to "
                 f"{high:g}: check its unit"
             )
-    name = plain_name(line[columns["name"][0]]) if "name" in columns else ""
+    name = ""
+    if "name" in columns:
+        place, _ = columns["name"]
+        if place >= len(line):
+            raise FabricFileError(f"--fabrics {where}: ends before its name: give it as many cells as heads")
+        name = plain_name(line[place])
     return Fabric(name or f"line_{number}", **values)
 
 

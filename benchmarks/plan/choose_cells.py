@@ -12,6 +12,7 @@ from benchmarks.cell import Cell
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
+from benchmarks.metrics import MODULES
 from benchmarks.performance.microbenchmark import SUITE, Microbenchmark
 from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.motion_split import nearest
@@ -120,12 +121,30 @@ def choose_cells(
         (*chosen.values(), *stored),
         key=lambda c: (places[c.scene.name], order.get(c.method, last), c.seed),
     )
+    cells = _timed_once(cells)
     scenes = {cell.scene.name: cell.scene for cell in cells}
     settled = (*SCENES, *further_scenes(selection.motions.first_garment))  # those that any run may start from
     known = {scene.name: scene for scene in settled} | scenes
     for user_scene in (scene for scene in scenes.values() if scene.declared_in):
         _check_user_scene(user_scene, known, selection.motions)
     return tuple(cells), cases, microbenchmarks
+
+
+def _timed_once(cells: Sequence[Cell]) -> list[Cell]:
+    """Return the cells; of a garment's whole motions the first alone keeps its costs.
+
+    Timed cells run one by one, the others side by side. What a frame costs, one motion tells.
+    """
+    untimed = tuple(name for name in MODULES if name != "cost")
+    begun: dict[str, Scene] = {}
+    kept = []
+    for cell in cells:
+        scene = cell.scene
+        whole = scene.part == "whole" and scene.metrics is None and not scene.declared_in
+        if whole and begun.setdefault(scene.garment, scene) != scene:
+            cell = replace(cell, scene=replace(scene, metrics=untimed))
+        kept.append(cell)
+    return kept
 
 
 def _nothing_to_run(selection: Selection) -> str:

@@ -130,19 +130,31 @@ def _sampling() -> dict[str, Any]:
     from benchmarks.metrics.energies import energy_gap
     from benchmarks.metrics.motion import hem
     from benchmarks.metrics.surface import body_intersections, surface_distance, swept_crossings
+    from benchmarks.scenes import dressed_body
+    from snug.networks.roll_out import QUASI_STATIC_FRAMES
 
     return {
         "presets": {preset.name: asdict(replace(preset, description="", steps={})) for preset in PRESETS},
         "gap": (energy_gap.PRECISION, energy_gap.NEGLIGIBLE, energy_gap.ITERATIONS),
-        "hem": (hem.HELD, hem.SHIFTING, hem.MAX_LAG, hem.SHORTEST, hem.NO_MOTION),
+        "hem": (
+            hem.HELD, hem.SHIFTING, hem.MAX_LAG, hem.SHORTEST, hem.NO_MOTION, float(hem.TURNING), hem.AFTER,
+        ),
+        "start": (dressed_body.HOLD, dressed_body.SHORT),
+        "quasi-static frames": QUASI_STATIC_FRAMES,
         "body": (body_intersections.SAMPLED_FRAMES, body_intersections.OFFSET),
         "surface": surface_distance.SAMPLED_FRAMES,
         "crossings": swept_crossings.SAMPLED_STEPS,
-    }
+    }  # fmt: skip
 
 
 def _reference() -> dict[str, Any]:
-    return {"ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": REFERENCE_TOLERANCE}
+    from benchmarks.tasks import ground_truth
+    from snug.recipes.recipe import DEFAULT
+
+    return {
+        "ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": REFERENCE_TOLERANCE,
+        "quasi-static": (ground_truth.SLOW, ground_truth.TOLERANCE), "skinning": DEFAULT.smoothing,
+    }  # fmt: skip
 
 
 def _statistics() -> dict[str, Any]:

@@ -13,6 +13,7 @@ from benchmarks.merge import merge
 from benchmarks.process.timing import one_thread
 from benchmarks.provenance import commit
 from benchmarks.publish.published_runs import RUNS, PublishedRun
+from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
@@ -20,6 +21,7 @@ from reference_sim.files.atomic_files import new_folder
 PROGRAM = "benchmarks.publish"
 WORK = Path("reports/runs/published")
 TARGET = Path("reports/published")
+AGAIN = ("--only", "failed,stale,missing")  # so a task that lacked memory once is done again
 KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
 EXAMPLES = """examples:
   python -m benchmarks.publish --list                what is published, and by which commands
@@ -78,7 +80,7 @@ def commands(name: str, run: PublishedRun, out: Path, more: Sequence[str] = ()) 
     folders = {part: out / (f"{name}-{part}" if part else name) for part in run.parts}
     program = [sys.executable, "-m", "benchmarks.run"]
     return {
-        folder: [*program, *shlex.split(run.parts[part]), *more, "-o", str(folder)]
+        folder: [*program, *shlex.split(run.parts[part]), *AGAIN, *more, "-o", str(folder)]
         for part, folder in folders.items()
     }
 
@@ -104,7 +106,8 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
             with new_folder(folder) as part:  # networks and their data are not made twice
                 shutil.copytree(whole, part, dirs_exist_ok=True)
         print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
-        if status := subprocess.run(line, check=False).returncode:
+        status = subprocess.run(line, check=False).returncode
+        if status and not (status == 1 and all_usable(RunFolder(folder))):
             print(f"{PROGRAM}: {name}: {folder}: exit status {status}; not published", file=sys.stderr)
             return False
         if others := sorted({row.commit for row in RunFolder(folder).read_rows()} - {head, ""}):
@@ -124,6 +127,22 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
     keep(whole, into / name, run.shown)
     print(f"{name}: published in {into / name}", flush=True)
     return True
+
+
+def all_usable(folder: RunFolder) -> bool:
+    """Return whether a run has ended and all its numbers count, those of stalled simulations too.
+
+    `benchmarks.run` ends with status 1 where a simulation has stalled. Extreme cases may end as they do.
+    """
+    if not folder.rows_path.is_file():
+        return False
+    config = folder.read_config()
+    tasks = (facts for of_kind in config.get("tasks", {}).values() for facts in of_kind.values())
+    counted = all(
+        row.status in (*USABLE, "skipped") or (row.suite == "extremes" and row.status != "failed")
+        for row in folder.read_rows()
+    )
+    return "finished" in config and counted and not any("failed" in facts for facts in tasks)
 
 
 def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:

@@ -18,8 +18,8 @@ DIGESTS = {
     "materials": "832890dcb5d69952",
     "motions": "dc71f7b3a0e629a9",
     "metrics": "3aafcf42de3f3d3f",
-    "reference": "28da648b87037fbc",
-    "sampling": "5cb5be5dcae80426",
+    "reference": "7c745c22c1ea3e12",
+    "sampling": "c899256a7a704edf",
     "statistics": "bbdacc941ceaa26a",
 }
 DIGEST = digest(DIGESTS)

@@ -295,9 +295,9 @@ def judge(
     if trajectory.status not in STATUS_OF:
         return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(STATUS_OF)}; {reason}"
     status = STATUS_OF[trajectory.status]
-    if status != "ok" and "converged" in trajectory.frame_fields:
+    if status != "ok" and not truncated and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
-        reason = f"{bad} of {trajectory.frames} frames did not converge; first {reason}"
+        reason = f"{bad} of {trajectory.frames} frames did not converge; {reason}"
     return status, reason
 
 

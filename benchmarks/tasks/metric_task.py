@@ -177,22 +177,27 @@ def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> N
 
 
 def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
-    """(N,24,3) [rad], mixed ones included; None of a network that was not trained. Kept within a batch."""
+    """(N,24,3) [rad], mixed ones included; None of a network that was not trained.
+
+    Mixing takes seconds and depends on little, so networks of one seed share the poses, in every scene.
+    """
     from snug.training.augmentation.mixed_clips import augment, make_shared_clips
     from snug.training.kinds import find_kind
 
     assets, how = context.assets, training.chosen
     if how is None or assets is None:
         return None
-    if training.id not in context.memo:
+    recipe, simulated, drawn = how.recipe, how.simulated, find_kind(how.kind).physics
+    mixed = (training.seed, recipe.mixed, recipe.mixed_turn, recipe.mixed_lift) if drawn else None
+    key = ("training poses", training.garment, training.motions, mixed, simulated)
+    if key not in context.kept:
         given = assets.named(training.motions)
         vertices = len(assets.garments[training.garment].rest_positions)
-        drawn = find_kind(how.kind).physics
-        mixed = augment(given, how.recipe, vertices=vertices, seed=training.seed) if drawn else []
-        if simulated := how.simulated:
-            mixed += make_shared_clips(given, simulated.mixed, vertices=vertices, swinging=simulated.swinging)
-        context.memo[training.id] = np.concatenate([motion.poses for motion in (*given, *mixed)])
-    return context.memo[training.id]
+        clips = augment(given, recipe, vertices=vertices, seed=training.seed) if drawn else []
+        if simulated is not None:
+            clips += make_shared_clips(given, simulated.mixed, vertices=vertices, swinging=simulated.swinging)
+        context.kept[key] = np.concatenate([motion.poses for motion in (*given, *clips)])
+    return context.kept[key]
 
 
 def _positions(path: Path) -> np.ndarray:

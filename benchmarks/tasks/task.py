@@ -60,12 +60,14 @@ class Context:
         assets: body, garments and motions; None where no task needs a dressed body.
         tell: reports units of progress.
         memo: kept between the tasks of one batch in this process.
+        kept: between all tasks of this process: what every scene asks for again.
     """
 
     folder: RunFolder
     assets: Assets | None = None
     tell: Callable[[float], None] = tell_nobody
     memo: dict[Any, Any] = field(default_factory=dict)
+    kept: dict[Any, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

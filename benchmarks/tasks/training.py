@@ -27,6 +27,8 @@ VALIDATIONS = 25  # in the steps of others: after so many that were no better it
 # Of a step, where a step of SNUG's network takes 1: the longest training begins first.
 COST = {"pbns": 0.4, "ncs": 2.5, "ncs-static": 2.5, "handles-20": 0.4, "handles-40": 0.4, "handles-80": 0.5}
 LOG_EVERY = 20  # training steps between two reports of progress
+# Of a training's summary: what its guard against divergence has done, and its epochs.
+INCIDENTS = ("high_windows", "skipped_updates", "restored", "epochs")
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
 
 
@@ -201,6 +203,7 @@ def facts_of(model: TrainedModel) -> dict[str, Any]:
         "setup_seconds": model.setup_seconds,
         "megabytes": model.megabytes,
         "steps": model.steps,
+        **{name: model.summary[name] for name in INCIDENTS if name in model.summary},
         "validation": model.summary.get("validation", {}),
         "last": dict(model.history[-1]) if model.history else {},
     }

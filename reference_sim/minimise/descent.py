@@ -134,6 +134,13 @@ class Descent:
         """Return the relative residual [1]; see `Result.gradient_norm`."""
         return float(np.abs(self.g).max(initial=0.0)) / self.weight
 
+    def add_costs(self, other: Descent | Result) -> None:
+        """Add the counts and the time by part of another minimisation of the same step."""
+        self.iterations += other.iterations
+        self.factorisations += other.factorisations
+        for part, seconds in other.seconds.items():
+            self.seconds[part] = self.seconds.get(part, 0.0) + seconds
+
     def late(self, timeout: float) -> bool:
         """Return whether more than `timeout` seconds have passed since the start."""
         return time.perf_counter() - self.started > timeout

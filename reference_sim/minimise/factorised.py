@@ -28,6 +28,7 @@ class FactorisedHessian:
         cloth = potential.cloth
         self._pattern = potential.pattern(cloth.free)
         self._analyse()
+        self._first = self._pattern, self._solver
         self.static = potential.time_step is None
         self.metric = np.repeat(cloth.masses[cloth.free] / (potential.time_step or REFERENCE_DT) ** 2, 3)
         self.flat = tolerance * mean_weight(potential) / float(np.sqrt(cloth.areas.sum()))
@@ -35,6 +36,10 @@ class FactorisedHessian:
     def _analyse(self) -> None:
         pattern = self._pattern
         self._solver = analyse(pattern.indptr, pattern.indices, pattern.order)
+
+    def start_again(self) -> None:
+        """Go back to the pattern without what dynamic terms have added."""
+        self._pattern, self._solver = self._first
 
     def assemble(self, x: np.ndarray, convexity: float) -> np.ndarray:
         """Return values (nnz,) at x (V, 3), with that share of the elements' negative curvature taken out.

@@ -94,16 +94,27 @@ class LBFGS:
         """Scalar stiffness of the potential, analysed when first needed."""
         return ScalarPreconditioner(self.potential)
 
+    def start_again(self) -> None:
+        """Forget what earlier minimisations have taught, as before a first step."""
+        if self._newton is not None:
+            self._newton.start_again()
+
     def minimise(self, x0: np.ndarray) -> Result:
         """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
+        refused: Descent | None = None
         if self._newton is not None and self._compiled is not None:
-            first = self._in_float32(self._compiled, x0)
-            if first is not None:
+            first = Descent(self.potential, x0)
+            if self._in_float32(self._compiled, first):
                 if self.observe is not None:
                     self.observe(x0.copy())
                 return self._newton.minimise(first.x, after=first)
+            refused = first
         run = LBFGSRun(self, x0)
+        if refused is not None:
+            run.started = refused.started
         stop = iterate(self, run)
+        if refused is not None:
+            run.add_costs(refused)
         if self._newton is None or stop.status in ("diverged", "timeout"):
             return run.result(stop)
         return self._newton.minimise(run.x, after=run)
@@ -126,26 +137,23 @@ class LBFGS:
             return None
         return Stop("stalled", "no step along the quasi-Newton direction lowers the energy")
 
-    def _in_float32(self, compiled: CompiledLBFGS, x0: np.ndarray) -> Descent | None:
-        """Return the state where the compiled part ends.
+    def _in_float32(self, compiled: CompiledLBFGS, run: Descent) -> bool:
+        """Move `run` to where the compiled part ends; return whether Newton may go on from there.
 
-        None if that is not below x0 (V, 3), if x0 has no energy, or if nothing is left to Newton though the
-        tolerance is below the switch: the rounding of float32 would stay in an answer that is meant to be
-        nearer.
+        It may not if that is not below the start, if the start has no energy, or if nothing is left to it
+        though the tolerance is below the switch: the rounding of float32 would stay in an answer that is
+        meant to be nearer.
         """
-        run = Descent(self.potential, x0)
         if not run.finite:
-            return None
+            return False
         compiled.start_again()  # a resumed run has to give the same bits
-        result = compiled.minimise(x0)
+        result = compiled.minimise(run.x)
         start, run.x = run.value, result.positions
         run.value, run.g = run.evaluate(run.x)
-        run.iterations, run.factorisations = result.iterations, result.factorisations
-        for part, seconds in result.seconds.items():
-            run.seconds[part] += seconds
+        run.add_costs(result)
         falls = run.finite and run.value <= start
         loose = self.tolerance >= self.switch
-        return run if falls and (loose or run.gradient_norm() > self.tolerance) else None
+        return falls and (loose or run.gradient_norm() > self.tolerance)
 
 
 def _compiled(potential: Potential, max_iterations: int, switch: float) -> CompiledLBFGS:

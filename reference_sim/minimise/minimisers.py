@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,15 @@ class Minimiser(Protocol):
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
+        ...
+
+
+@runtime_checkable
+class Restartable(Minimiser, Protocol):
+    """Minimiser that can serve run after run: after `start_again` it gives the bits of a new one."""
+
+    def start_again(self) -> None:
+        """Forget what earlier minimisations have taught."""
         ...
 
 

@@ -82,6 +82,10 @@ class Newton:
         self.first_level = len(CONVEXITY) - 1 if start_projected else 0
         self.step_tolerance = STEP_TOLERANCE * float(potential.cloth.edge_lengths.mean())
 
+    def start_again(self) -> None:
+        """Forget which vertices dynamic terms have coupled, as before a first step."""
+        self.hessian.start_again()
+
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
         """Minimise from x0 (V, 3) [m]; counts and clock go on from those of `after`."""
         return self.descend(NewtonRun(self, x0, after))

@@ -24,8 +24,10 @@ class Result:
 
     Attributes:
         positions: (V, 3) [m], the best found.
-        status: one of STATUSES. "converged" means: gradient within tolerance, the unregularised Newton step
-            negligible, and no negative curvature left, of which a factorisation is the proof.
+        status: one of STATUSES. "converged" means: gradient within tolerance, no negative curvature beyond
+            round-off left, of which a factorisation of the Hessian plus a tiny shift is the proof, and a
+            negligible Newton step of that matrix. A longer step is accepted where the Hessian without the
+            shift has no factorisation, as for cloth that may move rigidly: its length means nothing there.
         reason: one line in words.
         relaxed: whether "converged" holds within round-off alone: the residual, or the round-off in it, is
             above the tolerance; the reason says which.
@@ -34,7 +36,8 @@ class Result:
             component of dPhi/dx over the free vertices, divided by the mean weight of a vertex.
         energy: value at positions [J].
         terms: energy of each term [J].
-        seconds: time by part: assemble, factorise, solve, evaluate.
+        seconds: time by part: assemble, factorise, solve, evaluate; descend is a whole compiled descent,
+            evaluations and solves with the preconditioner included.
     """
 
     positions: np.ndarray

@@ -11,7 +11,7 @@ need be, line search, and the test of curvature, here of the subspace, before a 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,8 +107,8 @@ class SubspaceNewton(Newton):
     Args:
         potential: the sum of energies.
         basis: U, (V, 3, K), with orthonormal columns; zero at pinned vertices.
-        placements: one for each step.
-        offsets: (V, 3) in the span: where the first step starts.
+        placements: one for each step of a run.
+        offsets: (V, 3) in the span: where the first step of a run starts.
         options: of Newton.
     """
 
@@ -117,17 +117,23 @@ class SubspaceNewton(Newton):
         potential: Potential,
         *,
         basis: np.ndarray,
-        placements: Iterator[Placement],
+        placements: Sequence[Placement],
         offsets: np.ndarray,
         **options: Any,
     ) -> None:
         super().__init__(potential, **{"reuse": True, "start_projected": True} | options)
         self.hessian: SubspaceHessian = SubspaceHessian(potential, tolerance=self.tolerance)
-        self._basis, self._placements, self._offsets = basis, placements, offsets
+        self._basis, self._placements, self._first_offsets = basis, placements, offsets
+        self.start_again()
+
+    def start_again(self) -> None:
+        """Go back to the first placement, and to the offsets where its step starts."""
+        super().start_again()
+        self._steps, self._offsets = iter(self._placements), self._first_offsets
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
         """Minimise in the next placement, from the last step's offsets; x0 (V, 3) [m] holds the pins."""
-        placement = next(self._placements)
+        placement = next(self._steps)
         free = self.potential.cloth.free
         posed = np.einsum("vij,vjk->vik", placement.turns, self._basis)[free]
         self.hessian.basis = posed.reshape(-1, posed.shape[-1])

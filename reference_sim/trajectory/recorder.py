@@ -71,12 +71,13 @@ class Recorder:
     def note(self, frame: int, results: Sequence[Result]) -> None:
         """Take the status of the whole from the minimisations on the way to `frame`.
 
-        It is that of the first that did not converge; until there is one, the reason is that of the first
+        The worst counts, and of equally bad ones the first: a solver that is stopped early gives up in frame
+        1, which must not hide a later divergence. Until one did not converge, the reason is that of the first
         that converged within round-off alone.
         """
         for result in results:
-            failed = result.status != "converged" and self.status == "converged"
-            if failed or (result.relaxed and not self.reason):
+            worse = _severity(result.status) > _severity(self.status)
+            if worse or (result.relaxed and not self.reason):
                 self._tell(result.status, f"frame {frame}: {result.reason}")
 
     def _tell(self, status: str, reason: str) -> None:
@@ -112,3 +113,8 @@ class Recorder:
             provenance=self._provenance,
             frame_fields={k: np.array([f[k] for f in self._fields]) for k in self._fields[0]},
         )
+
+
+def _severity(status: str) -> int:
+    """Return how bad the status of a minimisation is: 0 is good."""
+    return {"converged": 0, "max_iterations": 1, "diverged": 3}.get(status, 2)

@@ -2,7 +2,8 @@
 
 A resumed run takes up positions and velocity exactly as they were, and prepares the last step once more
 (terms may remember something of it, as lagged friction does), so that on one machine it ends in the same
-bits as a run that was never interrupted.
+bits as a run that was never interrupted. What a minimiser has learned in earlier steps is not stored: see
+`simulate` for the two that learn.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class PartialRun:
     """Whole frames of an earlier run.
 
     Attributes:
-        trajectory: those frames, with the status of the first that failed, or "converged".
+        trajectory: those frames, with the status of the worst that failed, or "converged".
         before: positions and velocity (2, V, 3) from which the last step to the last frame was made; None
             where the file does not hold them.
         ended: False if the run that wrote the file did not end by itself.

@@ -69,7 +69,7 @@ def compare(
         shared: leave out what the later run lacks; otherwise it is a change for the worse.
 
     Raises:
-        ResultsError: where presets or numbers of the protocol differ, or nothing is shared.
+        ResultsError: where presets or protocols differ, of the runs or of a cell, or nothing is shared.
     """
     one_protocol((one.protocol, other.protocol), "A and B")
     presets = [run.config.get("preset") for run in (one, other)]
@@ -87,6 +87,14 @@ def compare(
     kept = [frame[key.isin(rest)] for frame, key, rest in zip(of_metrics, keys, reversed(keys))]
     if kept[0].empty:
         raise ResultsError("the two runs share no such scene, method, seed and metric: nothing to compare")
+    before, after = (frame.set_index(CELL)["protocol"] for frame in kept)
+    differ = before[before != after.reindex(before.index)]
+    if len(differ):
+        place = " x ".join(map(str, differ.index[0][:2]))
+        now = after[differ.index[0]]
+        raise ResultsError(
+            f"{place}: of protocol {differ.iloc[0]} in A, {now} in B: another reference or scene"
+        )
     judged, compared, one_seed, once = _means(one, *kept)
     order = (GONE, WORSE, BETTER, OTHER)
     changes = sorted([*lost, *ended, *judged], key=lambda change: order.index(change.verdict))

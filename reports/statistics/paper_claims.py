@@ -89,7 +89,9 @@ DETAIL = "Figure 5: SNUG learns more realistic detail than vertex-wise supervisi
 WRINKLES = "Abstract: fine wrinkles; tested: no less curved than the simulation"
 UNSEEN = "Section 1: generalises better than supervision to unseen motion"
 UNSEEN_DISTANCE = f"{UNSEEN}; tested by distance from the simulation"
-UNSEEN_EQUAL = "Section 1, both networks with as many frames and steps: generalises better than supervision"
+UNSEEN_EQUAL = (
+    "Section 1, both networks with the same frames and as many steps: generalises better than supervision"
+)
 STRICTER = "; tested more strictly: "  # before a condition that the paper's words do not ask for
 CLOSE = f"Figure 7: close to offline simulation on unseen motion{STRICTER}no more energy than simulated cloth"
 OTHERS = "Figure 7: at least on par with other data-driven methods"

@@ -12,7 +12,7 @@ import pandas as pd
 from scipy import stats
 
 from benchmarks.results.json_file import ResultsError
-from benchmarks.results.protocol import LEVEL
+from benchmarks.results.protocol import LEVEL, OWN
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
@@ -38,8 +38,8 @@ def published_beside(run: Run, method: str) -> str:
         published = read_published(PUBLISHED / DEFAULT)
     except ResultsError:
         return ""  # of an earlier version
-    if published.config.get("started") == run.config.get("started"):
-        return ""
+    if all(published.config.get(name) == run.config.get(name) for name in ("started", "finished")):
+        return ""  # the published run itself
     if published.protocol != run.protocol:
         return ""
     ours, theirs = _by_seed(run, method), _by_seed(published, method)
@@ -72,9 +72,13 @@ def _frames(run: Run, scenes: Sequence[str]) -> list[int | None]:
 
 
 def _by_seed(run: Run, method: str) -> pd.DataFrame:
-    """Return scene x seed -> relative excess of a method of the first garment, on its scale."""
+    """Return scene x seed -> relative excess of a method of the first garment, on its scale.
+
+    Rows of a user's own scenes or settings, as of self-contact, are left out.
+    """
     rows = run.garment_rows
     rows = with_relative_excess(run, rows[rows["garment"] == run.first_garment])
-    kept = rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"] & (rows["method"] == method)]
+    rows = rows[rows["usable"] & (rows["protocol"] != OWN)]
+    kept = rows[(rows["metric"] == RELATIVE_EXCESS.name) & (rows["method"] == method)]
     shares = kept.pivot_table(index="scene", columns="seed", values="value")
     return shares.apply(lambda column: np.asarray(on_scale(column.to_numpy(), EXCESS))).dropna()

@@ -31,6 +31,7 @@ from reports.statistics.effects import (
 from reports.statistics.means_and_spreads import Mean, pair
 
 TOTAL = "energy/total"
+SKINNING = "skinning"  # the method that has 100 %
 RELATIVE_EXCESS = Metric(
     "relative_excess/total", "%", "Relative excess",
     "excess of the total energy over the reference's as a share of skinning's excess", lower_is_better=True,
@@ -61,7 +62,7 @@ def with_relative_excess(
     have relative excesses of the metric already come back as they are.
 
     Args:
-        run: declares the reference, its ensemble and the baseline, whose first one is skinning.
+        run: declares the reference and its ensemble, of which members that stalled are left out.
         rows: of the run, as Run.frame.
         metric: an energy.
         basis: rows whose reference and skinning are the basis; those given by default.
@@ -69,19 +70,19 @@ def with_relative_excess(
     if (rows["metric"] == relative_metric(metric).name).any():
         return rows
     basis = rows if basis is None else basis
-    skinning = next(iter(run.with_role("baseline")), "")
-    zeros = _values(basis, metric, [run.reference, *run.reference_ensemble])
-    totals = _values(basis, TOTAL, [run.reference, *run.reference_ensemble, skinning])
+    sound = basis[(basis["status"] == "ok") | ~basis["method"].isin(run.reference_ensemble)]
+    zeros = _values(sound, metric, [run.reference, *run.reference_ensemble])
+    totals = _values(sound, TOTAL, [run.reference, *run.reference_ensemble, SKINNING])
     lines = rows[(rows["metric"] == metric) & rows["usable"]]
     parts = []
     for place, row in lines.iterrows():
         zero, total = zeros.get(row["scene"], {}), totals.get(row["scene"], {})
-        shares = _shares(row["value"], zero, total, skinning)
+        shares = _shares(row["value"], zero, total)
         if run.reference in shares:
             value = shares.pop(run.reference)
             # The reference is zero by definition, whichever simulation it is.
             moved = () if row["method"] == run.reference else tuple((k, v - value) for k, v in shares.items())
-            share = 100.0 / (total[skinning] - total[run.reference])
+            share = 100.0 / (total[SKINNING] - total[run.reference])
             parts.append((place, value, share * row["uncertainty"], moved))
     if not parts:
         return rows
@@ -101,14 +102,12 @@ def _values(rows: pd.DataFrame, metric: str, methods: Sequence[str]) -> dict[str
     return values
 
 
-def _shares(
-    value: float, zeros: Mapping[str, float], totals: Mapping[str, float], skinning: str
-) -> dict[str, float]:
+def _shares(value: float, zeros: Mapping[str, float], totals: Mapping[str, float]) -> dict[str, float]:
     """Return reference -> relative excess [%] by the reference and by each member of its ensemble."""
     return {
-        name: 100.0 * (value - zeros[name]) / (totals[skinning] - totals[name])
+        name: 100.0 * (value - zeros[name]) / (totals[SKINNING] - totals[name])
         for name in zeros.keys() & totals.keys()
-        if skinning in totals and totals[skinning] > totals[name]
+        if SKINNING in totals and totals[SKINNING] > totals[name]
     }
 
 

@@ -19,11 +19,11 @@ def in_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float 
 
     In each scene the spread is the root mean square over the members of the ensemble, and the method's error
     that over its seeds. The result is the mean error of the scenes over their mean spread; None where fewer
-    than LEAST_MEMBERS members were measured.
+    than LEAST_MEMBERS members converged.
     """
     kept = rows[(rows["metric"] == metric) & rows["usable"]]
     away = kept.assign(square=(kept["value"] - AT_REFERENCE[metric]) ** 2)
-    members = away[away["method"].isin(run.reference_ensemble)]
+    members = away[away["method"].isin(run.reference_ensemble) & (away["status"] == "ok")]
     of_scene = members.groupby("scene")["square"]
     spread = of_scene.mean()[of_scene.size() >= LEAST_MEMBERS] ** 0.5
     error = away[away["method"] == method].groupby("scene")["square"].mean() ** 0.5

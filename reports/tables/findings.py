@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from reports.run.finished_run import Metric, Run
 from reports.statistics.paper_claims import judged
-from reports.statistics.relative_excess import Excess, excess_of, with_relative_excess
+from reports.statistics.relative_excess import SKINNING, Excess, excess_of, with_relative_excess
 from reports.statistics.spreads import AT_REFERENCE, in_spreads
 from reports.statistics.verdicts import measure_of, standing, untested
 from reports.tables.table import GARMENT, METHOD, SCENE, Cell, Column, Table, table
@@ -101,7 +101,7 @@ def _measured(run: Run) -> list[tuple[str, str, Excess]]:
     excesses = []
     for garment in run.garments(run.garment_rows):
         rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
-        zero = {*run.with_role("reference", "reference-variant"), *run.with_role("baseline")[:1]}
+        zero = {*run.with_role("reference", "reference-variant"), SKINNING}
         for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):
                 excesses.append((garment, method, excess))

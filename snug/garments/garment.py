@@ -90,7 +90,7 @@ class Garment:
             betas: shape coefficients of the body.
         """
         if not len(self.pins):
-            return np.empty((len(poses), 0, 3))  # and torch, which poses the joints, is not loaded
+            return np.empty((len(poses), 0, 3))
         transforms = body.transforms(poses, translations, betas)
         blended = np.einsum("pj,tjab->tpab", self.skinning_weights[self.pins], transforms)
         rest = self.rest_for(body, betas)[self.pins]

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from snug.networks.fitted import NearestPoses, PoseRegression
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.handles.network import DynamicHandles80, Handles20, Handles40, Handles80
-from snug.networks.initialisation import initialise
+from snug.networks.initialisation import initialise, seeded
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.ncs.network import StaticBranch, TwoBranches
 from snug.networks.pbns import PoseSpaceDeformation
@@ -72,8 +72,7 @@ def make_network(
         ((2, 3, 4, 3), None)
     """
     architecture = find_architecture(kind)
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+    with seeded(seed):
         network = architecture(inputs, vertices, output_scale=recipe.output_scale)
         initialise(network, recipe.initialisation)
     if recipe.zero_last_layer:

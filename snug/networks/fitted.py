@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from snug.networks.garment_network import GarmentNetwork
+from snug.networks.initialisation import seeded
 from snug.networks.pbns import PoseSpaceDeformation
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 NEIGHBOURS = 4
 NEAR = 1e-8  # squared distance of two poses below which they are one
 COMPONENTS = 64
-RIDGE = 0.1  # of the squared weights against the mean squared error, inputs of spread one
+RIDGE = 0.1  # of the squared weights against the mean squared error; inputs are as they are
 PASSES = 4  # of the subspace iteration that finds the principal components (Halko et al. 2011)
 
 
@@ -89,8 +90,7 @@ class PoseRegression(PoseSpaceDeformation):
         """Find the components, and the least squared error of their coefficients with a ridge penalty."""
         flat = offsets.flatten(1) / self.output_scale
         centre, count = flat.mean(0), min(self.widths[0], *flat.shape)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(0)
+        with seeded(0):
             directions = torch.pca_lowrank(flat - centre, count, center=False, niter=PASSES)[2]  # (3V, K)
         coefficients = ((flat - centre) @ directions).double()
         x_mean = features.double().mean(0)

@@ -1,7 +1,7 @@
 """Named recipes, and the recipe that each kind of network is trained by.
 
-`default` trains well on a CPU in minutes, `paper` follows the paper's text except for its contact (see the
-comment below), the ablations are the default with one option changed.
+`default` trains well on a CPU in minutes, `paper` follows the paper's text except for what the comment below
+lists, the ablations are the default with one option changed.
 """
 
 from __future__ import annotations

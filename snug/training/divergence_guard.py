@@ -3,15 +3,16 @@
 Three cases, from harmless to grave:
 - a window is above the recipe's `spike`: the gradient of its step is clipped;
 - a window, or the gradient of a batch, is not finite: the update is left out;
-- `PATIENCE` batches in a row are not finite, or above `RUNAWAY` times the usual energy with a window above
-  `spike`: the network is lost. Weights and Adam's moments go back to the last ones seen to be good, and the
-  learning rate is halved.
+- `PATIENCE` batches in a row are not finite, or their mean is above both `spike` and `RUNAWAY` times the size
+  of the usual energy, which is negative where a garment hangs below the pelvis: the network is lost. Weights
+  and Adam's moments go back to the last ones seen to be good, and the learning rate is halved.
 A recipe with a spike beyond all energies, as the paper's, is left alone until something is not finite.
 No decision comes from a clock, so a run with incidents repeats as exactly as one without.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -24,7 +25,7 @@ NAMED_WINDOWS = 50  # incidents that are named one by one; all are counted
 SETTLING = 50  # steps before which a high window is no cause for a remark
 PATIENCE = 3  # bad batches in a row, after which good weights come back
 GIVE_UP = 100  # updates left out in a row, after which training stops
-RUNAWAY = 10.0  # times the usual energy of a batch
+RUNAWAY = 10.0  # times the size of the usual energy of a batch
 MEMORY = 0.98  # of the usual energy, per step
 SNAPSHOT_EVERY = 100  # steps between two copies of good weights
 
@@ -68,10 +69,10 @@ class DivergenceGuard:
         if bad.any():
             self._leave_out(number, bad, joules, name, "update left out")
             return "leave out"
-        judged = self.spike is not None and number >= SETTLING
+        spike = math.inf if self.spike is None or number < SETTLING else self.spike
         mean = float(joules.mean(dtype=np.float64))
-        peaks = joules > self.spike if judged else np.zeros(len(joules), bool)
-        runaway = bool(peaks.any()) and self._usual is not None and mean > RUNAWAY * self._usual
+        peaks = joules > spike
+        runaway = self._usual is not None and mean > max(spike, RUNAWAY * abs(self._usual))
         if runaway:
             if self._count_bad(number, joules, name):
                 return "leave out"

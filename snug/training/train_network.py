@@ -120,6 +120,7 @@ def _fitted_model(
     network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
     ready = time.perf_counter()
     network.learn(data.features, unskin_damped(vertices, data.rest, weights, data.transforms, DAMPING))
+    seconds = time.perf_counter() - ready
     loss = 0.0
     with torch.no_grad():
         for rows in torch.arange(data.frames).split(PIECE):
@@ -127,7 +128,6 @@ def _fitted_model(
                 network(data.features[rows, None])[0][:, 0] + data.rest, weights, data.transforms[rows]
             )
             loss += float(vertex_loss(posed, vertices[rows]).sum()) / data.frames
-    seconds = time.perf_counter() - ready
     return TrainedModel(
         model_kind, network.eval(), recipe, seed=seed, steps=1, seconds=seconds, setup_seconds=ready - begun,
         history=[{"step": 1, "seconds": seconds, "loss": loss}],

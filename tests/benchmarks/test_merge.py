@@ -39,6 +39,11 @@ class Run(Task):
     stage = "cells"
 
 
+class Train(Task):
+    kind = "network"
+    stage = "training"
+
+
 def cell(name: str, machine: str, **inputs) -> Task:
     given = {"scene": "kick", "machine": machine, **inputs}
     return Run(name=name, label=name, inputs=given, modules=("benchmarks.results.json_file",))
@@ -149,6 +154,20 @@ def test_runs_of_other_inputs_are_refused_by_name(folder, tmp_path, changes, inp
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "two"]
 
 
+def test_two_networks_of_one_name_are_refused(folder, tmp_path, capsys):
+    """Processors of two kinds train two networks of one seed, and no row need tell."""
+    folders = [folder(name, [row("energy/total", 1.0)]) for name in ("one", "two")]
+    arguments = [*map(str, folders), "-o", str(tmp_path / "both")]
+    for path, weights in zip(folders, ("some", "others")):
+        run = RunFolder(path)
+        (path / "models").mkdir()
+        (path / "models/snug.safetensors").write_text(weights)
+        network = Train(name="snug", label="snug seed 0", inputs={}, modules=())
+        Cache(run).keep(network, Outcome(files=("models/snug.safetensors",)), {})
+    assert command.main(arguments) == 2
+    assert "network snug seed 0: another in" in capsys.readouterr().err
+
+
 def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path, monkeypatch, capsys):
     one = folder("one", [row("energy/total", 1.0)])
     monkeypatch.setattr(
@@ -229,3 +248,5 @@ def test_times_are_of_the_first_machine_that_measured_them():
         joined_rows({"a": sizes[:1], "b": sizes[1:]}, TIMED)
     twin = row("cost/frame", 4.0, "ms", method="pbns")  # the same machine again: its times stand beside
     assert joined_rows({"a": [a], "c": [twin]}, TIMED) == [a, twin]
+    clip = dataclasses.replace(b, suite="speed")  # a suite that one machine alone has timed
+    assert joined_rows({"a": [a], "b": [clip]}, TIMED) == [a, clip]

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import re
 import time
+from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 import torch
 
-from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, simulate
+from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, minimise, simulate
 from reference_sim.command.summary import summarise
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Energy, Gravity, StretchStVK
 from reference_sim.progress import progress_bar
@@ -144,6 +146,27 @@ def test_divergence_is_recorded_and_not_raised(tmp_path):
     assert 3 <= result.frames <= 4 and np.isfinite(result.positions).all()
     loaded = Trajectory.load(path)
     assert loaded.status == "diverged" and loaded.frames == result.frames and loaded.reason == result.reason
+
+
+def test_a_divergence_is_not_hidden_by_frames_that_were_stopped_early(tmp_path):
+    cloth, path = Cloth(SHEET, FACES, pins=[0, 6]), tmp_path / "run.vtkhdf"
+    scene = {"cloth": cloth, "energies": [*terms_of(cloth), Poison(cloth)], "frames": 20, "path": path}
+    result = simulate(**scene, max_iterations=1, method="newton")
+    assert result.frame_fields["converged"][1] == 0 and result.frames < 20
+    assert result.status == "diverged" and result.reason.startswith(f"frame {result.frames}: ")
+    written = path.read_bytes()
+    again = simulate(**scene, max_iterations=1, method="newton", resume=True)  # nothing is left to do
+    assert again.status == "diverged" and again.reason == result.reason and path.read_bytes() == written
+
+
+def test_the_status_of_a_run_is_its_worst_and_the_reason_the_first_with_it():
+    cloth, frames = Cloth(SHEET, FACES), iter(["max_iterations", "stalled", "timeout", "max_iterations"])
+
+    def stopping(potential, **options):
+        return SimpleNamespace(minimise=lambda x0: replace(minimise(potential, x0), status=next(frames)))
+
+    result = simulate(cloth, terms_of(cloth), frames=5, method=stopping)
+    assert result.status == "stalled" and result.reason.startswith("frame 2: ")
 
 
 def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():

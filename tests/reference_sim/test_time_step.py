@@ -7,6 +7,9 @@ import pytest
 
 from reference_sim import Cloth, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
+from reference_sim.minimise import Newton
+from reference_sim.time_loop import simulate_with
+from reference_sim.time_step import TimeStepper
 from tests.reference_sim.meshes import grid, sphere
 
 SHEET, FACES = grid(5, 5, width=0.4, depth=0.4)
@@ -62,3 +65,20 @@ def test_sub_steps_meet_a_moving_obstacle_as_small_steps_do():
     fine = simulate(cloth, terms, dt=0.02, frames=7, obstacle=Obstacle(ways[2], ball_faces), tolerance=1e-9)
     np.testing.assert_allclose(coarse.positions, fine.positions[::2], atol=1e-7)
     assert coarse.frame_fields["energy/collision"][-1] > 0
+
+
+def test_a_minimiser_that_cannot_start_again_is_made_anew_for_the_next_run():
+    class Learning:
+        def __init__(self, potential, **options):
+            self.steps, self.newton = 0, Newton(potential, max_iterations=1)
+
+        def minimise(self, x0):
+            self.steps += 1
+            return self.newton.minimise(x0 + 1e-3 * self.steps)
+
+    cloth = Cloth(SHEET, FACES)
+    stepper = TimeStepper(cloth, [StretchStVK(cloth), Gravity(cloth)], dt=0.02, method=Learning)
+    first = simulate_with(stepper, frames=4).positions
+    assert not np.array_equal(simulate_with(stepper, frames=4).positions, first)
+    stepper.start_again()
+    assert np.array_equal(simulate_with(stepper, frames=4).positions, first)

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from benchmarks.results.json_file import ResultsError
 from reports import compare as command
 from reports.comparison.compare_runs import compare
 from tests.reports.report_folder import row, run_folder, run_of
@@ -67,6 +68,14 @@ def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
         for r in rows_of(**{"lbfgs-4": 1.1})
     ]
     assert found(rows_of(), unsure) == []
+
+
+def test_cells_of_two_protocols_are_refused():
+    """As beside another reference, in scenes of one's own, though other rows are of one protocol."""
+    own = [dataclasses.replace(r, protocol="own" if r.scene == "tshirt/bow" else "1.0") for r in rows_of()]
+    frozen = [dataclasses.replace(r, protocol="1.0") for r in rows_of()]
+    with pytest.raises(ResultsError, match=r"tshirt/bow x simulation: of protocol 1\.0 in A, own in B"):
+        compare(run_of(frozen), run_of(own))
 
 
 def test_where_zero_is_a_choice_no_change_hangs_on_it():

@@ -40,6 +40,10 @@ class SweepSolver(ABC):
         run = SweepRun(self.potential, x0)
         return run.result(iterate(self, run))
 
+    def start_again(self) -> None:
+        """Do nothing: sweeps learn nothing from step to step."""
+        return
+
     @abstractmethod
     def init(self, run: SweepRun) -> Stop | None:
         """Set `run.swept` and `run.sweep`."""

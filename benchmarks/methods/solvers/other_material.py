@@ -29,8 +29,12 @@ class OtherMaterial(Simulation):
     def prepare(self, scene: BuiltScene) -> None:
         """Exchange the energies and prepare; the start stays that of the scene's own material."""
         start = scene.start_state
-        energies = tuple(map(EXCHANGES[self.exchange], scene.energies))
-        super().prepare(dataclasses.replace(scene, energies=energies, settle=lambda: start))
+        energies, minimised = (
+            tuple(map(EXCHANGES[self.exchange], terms)) for terms in (scene.energies, scene.minimised)
+        )
+        super().prepare(
+            dataclasses.replace(scene, energies=energies, minimised=minimised, settle=lambda: start)
+        )
 
 
 def _printed_bending(term: Energy) -> Energy:

@@ -60,8 +60,9 @@ class SubspaceFloor(Method):
         start[scene.cloth.pins] = scene.start[scene.cloth.pins]
 
         def in_subspace(potential: Potential, **options: Any) -> SubspaceNewton:
-            steps = iter(placements[1:])
-            return SubspaceNewton(potential, basis=basis, placements=steps, offsets=offsets, **options)
+            return SubspaceNewton(
+                potential, basis=basis, placements=placements[1:], offsets=offsets, **options
+            )
 
         self.simulation.options = {"method": in_subspace}
         state = np.stack([start, scene.start_velocity])

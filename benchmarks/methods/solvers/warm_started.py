@@ -21,7 +21,7 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
 from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
-from reference_sim.minimise.minimisers import Minimiser, make_minimiser
+from reference_sim.minimise.minimisers import Restartable, make_minimiser
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 from reference_sim.trajectory.trajectory import Trajectory
@@ -35,20 +35,29 @@ SHARE = 0.6  # of the last residual
 
 
 class FromElsewhere:
-    """Minimiser that starts each step where `starts` says, whatever guess it is given.
+    """Minimiser that starts each step at the next of the frames, whatever guess it is given.
 
     With `carry`, SHARE of the last frame's residual, carried by the skin, is added to each start.
-    The residual is what the inner minimiser added to the last frame. first: (V, 3) [m] what the start of the
-    scene adds to frame 0 of the starts.
+    The residual is what the inner minimiser added to the last frame; that of frame 0 is what the start of the
+    scene, `start` (V, 3) [m], adds. frames: yields positions (V, 3) [m] from frame 0 on, at each call.
     """
 
     def __init__(
-        self, inner: Minimiser, starts: Iterator[np.ndarray], pins: np.ndarray,
-        carry: ResidualTransport | None = None, first: np.ndarray | None = None,
+        self, inner: Restartable, frames: Callable[[], Iterator[np.ndarray]], pins: np.ndarray,
+        start: np.ndarray, carry: ResidualTransport | None = None,
     ) -> None:  # fmt: skip
-        self._inner, self._starts, self._pins, self._carry = inner, starts, pins, carry
-        self._added: Any = first
-        self._frame = 0
+        self._inner, self._frames, self._pins = inner, frames, pins
+        self._start, self._carry = start, carry
+        self._begin()
+
+    def _begin(self) -> None:
+        self._starts, self._frame = self._frames(), 0
+        self._added = self._start - next(self._starts)  # frame 0 is the scene's start, as for every solver
+
+    def start_again(self) -> None:
+        """Begin the frames anew, without the residual of the last run."""
+        self._inner.start_again()
+        self._begin()
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from the next start; pinned vertices stay where x0 (V, 3) [m] has them."""
@@ -86,10 +95,9 @@ class WarmStarted(Method):
         carry = self._carry(scene) if self.residual else None
 
         def from_elsewhere(potential: Potential, **options: Any) -> FromElsewhere:
-            starts = frames()
-            first = next(starts)  # frame 0 is the scene's start, as for every solver
             inner, pins = make_minimiser(potential, **self.solver), np.asarray(potential.cloth.pins)
-            return FromElsewhere(inner, starts, pins, carry, None if carry is None else scene.start - first)
+            assert isinstance(inner, Restartable)
+            return FromElsewhere(inner, frames, pins, scene.start, carry)
 
         self.simulation.options = {"method": from_elsewhere}
         self.simulation.prepare(scene)

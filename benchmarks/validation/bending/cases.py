@@ -90,7 +90,7 @@ TORSION = (
         known_answer(f"slit_annulus_{corner}",
             f"lift of the {corner} corner of a slit annular plate, nu = 0; expected: shells (Sze 2004)",
             "bending.slit_annulus", "corner", options={"which": corner}, unit="m", expected=expected,
-            tolerance=0.08, smoke=False,
+            tolerance=0.08, smoke=False, long=True,
             reason="half of what 3 % of bending stiffness changes; the limit of three meshes is 0.04 m off")
         for corner, expected in SZE
     ),
@@ -98,7 +98,7 @@ TORSION = (
         known_answer(f"slit_annulus_{corner}_hinges_alone",
             f"the same without the energy that takes nu = -1/3 of hinges to 0, {corner} corner",
             "bending.slit_annulus", "corner", options={"which": corner, "poisson_ratio": "hinges"}, unit="m",
-            expected=expected, smoke=False, reason="reported: the price of nu = -1/3")
+            expected=expected, smoke=False, long=True, reason="reported: the price of nu = -1/3")
         for corner, expected in SZE
     ),
 )  # fmt: skip

@@ -84,16 +84,24 @@ class CompiledLBFGS:
         )  # fmt: skip
         self._first_step = float(self._counts[1])
         seconds = {"assemble": middle - start, "factorise": begun - middle}
-        seconds["evaluate"] = time.perf_counter() - begun
+        seconds["descend"] = time.perf_counter() - begun
         x = x0 + u.reshape(x0.shape)
         if not np.isfinite(self._energies.sum()):
             return self._result(x, "diverged", "the energy is not finite", seconds, residual)
-        reason = f"stopped after {int(self._counts[0])} iterations"
-        return self._result(x, "max_iterations", reason, seconds, residual)
+        return self._result(x, "max_iterations", self._reason(residual), seconds, residual)
 
     def freeze(self, x0: np.ndarray) -> tuple[tuple[np.ndarray, tuple[Any, ...]], ...]:
         """Return kernel and data of each term of elements for a step from x0 (V, 3) [m]."""
         return tuple(zip(self._gradients, (lanes.freeze(x0) for lanes in self._lanes)))
+
+    def _reason(self, residual: float) -> str:
+        """Say why the iterations ended where the largest component of the gradient is `residual` [N]."""
+        count = int(self._counts[0])
+        if residual <= self._tolerance:
+            return f"gradient within tolerance after {count} iterations; curvature not checked"
+        if count < self.max_iterations:
+            return f"no step along the quasi-Newton direction lowers the energy, after {count} iterations"
+        return f"stopped after {count} iterations"
 
     def _result(
         self, x: np.ndarray, status: str, reason: str, seconds: dict[str, float], residual: float

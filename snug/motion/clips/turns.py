@@ -1,7 +1,7 @@
 """Twists and turning walks that end within one frame: they set a wide hem swinging, and let it ring.
 
 A body cannot stop within a frame. That is the point: the cloth then moves by itself, and its motion cannot be
-told from the pose. Test and training differ in amplitude, frequency and the phase of the stop.
+told from the pose.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _turn(poses: np.ndarray, joint: str, degrees: np.ndarray) -> None:
     poses[:, JOINT[joint]] = axis_angles(yaw @ rotation_matrices(poses[:, JOINT[joint]]))
 
 
-# Signs, phases and amplitudes of the stops differ; the last two are for tests alone.
+# Signs, phases and amplitudes of the stops differ.
 STOPS: dict[str, Twist | TurningWalk] = {
     "twist_1": Twist(-30.0, 0.7, 0.33, 1.6),
     "twist_2": Twist(55.0, 0.8, 0.33, 2.1),

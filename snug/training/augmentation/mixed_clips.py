@@ -159,8 +159,9 @@ def _mixed(
 def hang_arms(motion: Motion, nearest: np.ndarray) -> Motion:
     """Turn each shoulder about the chest's front axis, by one angle in all frames.
 
-    Afterwards the smallest angle between upper arm and downward spine is `nearest`, (2,) [rad], left and
-    right. An arm held forward, which is not square to that axis, is moved less.
+    The angle is that which brings the smallest angle between upper arm and downward spine to `nearest`, (2,)
+    [rad], left and right, where the arm is square to that axis. Others end elsewhere: of 666 arms of clips of
+    seed 0, 6 % below 25 degrees.
     """
     poses = motion.poses.copy()
     outward = (nearest - arm_clearance(motion).min(axis=0)) * [1.0, -1.0]

@@ -29,6 +29,7 @@ from torch import Tensor, nn
 
 from snug.body.skinning import unskin
 from snug.motion.motion import Motion
+from snug.networks.initialisation import seeded
 from snug.networks.motion_perceptron import MotionPerceptron
 from snug.training.losses.vertex_targets import Targets, load_relative, match_targets
 from snug.training.training_set import Batch, TrainingSet
@@ -72,8 +73,7 @@ class SimulatedPast:
         offsets = (unskin(self.frames, weights, data.transforms[:count]) - data.rest).flatten(1)
         offsets /= network.output_scale
         mean, components = offsets.mean(0), min(COMPONENTS, *offsets.shape)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
+        with seeded(seed):
             directions = torch.pca_lowrank(offsets, components)[2]  # (3V, K)
             head = nn.Linear(network.widths[-1], components).to(offsets.device)
         coefficients = (offsets - mean) @ directions

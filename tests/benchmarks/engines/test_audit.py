@@ -15,7 +15,9 @@ from benchmarks.engines.specimens import specimen
 from benchmarks.plan.choose_cells import choose_suites
 from benchmarks.validation.engines import audit
 from benchmarks.validation.engines.cases import CASES
+from reference_sim.energies import StretchStVK
 from reference_sim.material import GRAVITY
+from reference_sim.minimise import Newton
 
 
 class Falling(EngineCloth):
@@ -107,6 +109,30 @@ def test_without_energies_the_reaction_is_that_of_the_centre():
 def test_an_engine_that_explodes_says_when():
     with pytest.raises(EngineDiverged, match="frame 1: a vertex"):
         roll_out(fake(gravity=1e9), specimen("falling"))
+
+
+def test_what_compiles_in_a_late_frame_is_not_timed(monkeypatch):
+    clock = [0.0]
+
+    class Compiling(Falling):
+        steps = 0
+
+        def advance(self, x, v, dt):
+            self.steps += 1
+            clock[0] += 100.0 if self.steps == 40 else 1.0
+            return super().advance(x, v, dt)
+
+    monkeypatch.setattr("benchmarks.engines.roll_outs.time.process_time", lambda: clock[0])
+    engine = dataclasses.replace(REFERENCE, substeps=4, make=lambda sample, iterations: Compiling())
+    assert roll_out(engine, specimen("falling")).seconds == pytest.approx(4.0)
+
+
+def test_a_gap_to_a_minimum_that_was_not_found_is_no_number(monkeypatch):
+    run = roll_out(fake(), specimen("hanging"))
+    run = dataclasses.replace(run, energies=(StretchStVK(run.specimen.cloth),))
+    monkeypatch.setattr(laws, "Newton", lambda potential, **options: Newton(potential, max_iterations=1))
+    with pytest.raises(RuntimeError, match="the minimum of a step is not known: max_iterations"):
+        laws.energy_gap(run)
 
 
 @pytest.mark.parametrize("sample", ["falling", "thrown", pytest.param("hanging", marks=pytest.mark.slow)])

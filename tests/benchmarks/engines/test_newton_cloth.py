@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from benchmarks.engines.newton_cloth import NewtonCloth, build_model, spring_stiffness
 from benchmarks.engines.newton_energies import StableNeoHookean, UnequalSprings
+from benchmarks.methods.solvers import newton_physics
 from benchmarks.performance.sheet import DT, regular_sheet
 from reference_sim import Potential, simulate
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import Newton
+from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 
 def test_stable_neo_hookean_meets_its_closed_form_and_stvk_at_rest():
@@ -88,3 +94,30 @@ def test_newton_descends_the_energy_that_we_say_it_does(solver, energy, iteratio
     positions, _ = NewtonCloth(cloth, solver, iterations=iterations).advance(x, v, dt)
     assert (positions[cloth.pins] == x[cloth.pins]).all()
     assert 0 <= potential.value(positions) - lowest + 1e-12 < 1e-5 * (potential.value(guess) - lowest)
+
+
+def test_pins_move_evenly_over_the_sub_steps_of_a_frame(monkeypatch):
+    """The solver is a fake that moves nothing, so it is tested without newton too."""
+    seen = []
+
+    class Still:
+        def __init__(self, cloth, solver, iterations):
+            pass
+
+        def advance(self, x, v, dt):
+            seen.append(x[scene.cloth.pins].copy())
+            return x.copy(), v
+
+    scene = small_scene("hanging_sheet", frames=3)
+    handles, up = scene.start[scene.cloth.pins], np.array([0.0, 0.1, 0.0])
+    scene = dataclasses.replace(scene, pin_positions=lambda frame: handles + frame * up)
+    monkeypatch.setattr(newton_physics, "NewtonCloth", Still)
+    monkeypatch.setitem(sys.modules, "newton", SimpleNamespace(__version__="fake"))
+    method = newton_physics.make(models=None, seed=0, solver="VBD", iterations=1, substeps=4)
+    method.prepare(scene)
+    seen.clear()
+    trajectory = method.run()
+    risen = np.array(seen)[:, 0, 1] - handles[0, 1]
+    assert risen == pytest.approx(0.025 * np.arange(1, 9))
+    for frame in (1, 2):
+        assert np.array_equal(trajectory.positions[frame][scene.cloth.pins], scene.pin_positions(frame))

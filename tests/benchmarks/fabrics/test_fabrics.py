@@ -131,6 +131,7 @@ def test_a_file_is_read_in_si_and_by_its_heads(tmp_path):
         (TABLE.replace("2.1", "soft"), "line 2: warp 'soft' is no number"),
         (TABLE.replace("62", "62000"), "line 2: density 62000 is 62 in SI units"),
         (TABLE.replace("2.1", "nan"), "line 2: warp nan"),
+        ("density[g/m2],bending warp[uN.m],bending weft[uN.m],name\n62,2.1,1.4", "line 2: ends before"),
     ],
 )
 def test_a_bad_file_is_refused_with_its_line(tmp_path, text, complaint):

@@ -204,13 +204,22 @@ def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step
             seen.append(x0.copy())
             return make_minimiser(potential, max_iterations=1).minimise(x0)
 
+        def start_again(self):
+            seen.clear()
+
+    def frames():
+        return (frame.copy() for frame in [guess, *starts])
+
     pins = potential.cloth.pins
-    warm_started = FromElsewhere(Looking(), iter([start.copy() for start in starts]), pins)
+    warm_started = FromElsewhere(Looking(), frames, pins, guess)
     for start in starts:
         result = warm_started.minimise(guess)
         free = potential.cloth.free
         assert np.array_equal(seen[-1][free], start[free]) and np.array_equal(seen[-1][pins], guess[pins])
         assert np.array_equal(result.positions[pins], guess[pins])
+    warm_started.start_again()
+    warm_started.minimise(guess)
+    assert len(seen) == 1 and np.array_equal(seen[0][free], starts[0][free])
 
 
 def test_a_warm_started_solver_has_no_starts_for_steps_between_frames(tmp_path):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from benchmarks.metrics import names_of
 from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.motion_split import split_motions
@@ -34,6 +35,17 @@ def test_a_cell_in_two_suites_is_run_once():
     # Whole motions and their clips are scenes of their own: a suite that times every solver takes the clips.
     assert {cell.suites for cell in cells if cell.scene.part == "clip"} == {("speed",)}
     assert {cell.suites for cell in cells if cell.scene.name == "tshirt/kick"} == {("garments",)}
+
+
+def test_of_whole_motions_the_first_alone_is_timed_and_all_else_is_measured_in_all():
+    cells, _ = chosen(("garments", "speed"))
+    scenes = {cell.scene.name: cell.scene for cell in cells}
+    assert scenes["tshirt/kick"].timed and not scenes["tshirt/punch"].timed
+    assert scenes["tshirt/kick@clip"].timed and scenes["hanging_sheet"].timed
+    assert set(names_of(None)) - set(names_of(scenes["tshirt/punch"].metrics)) == {"cost"}
+    assert scenes["tshirt/punch"].dynamic
+    cells, _ = chosen(("garments",), scenes=("tshirt/punch",))
+    assert all(cell.scene.timed for cell in cells)
 
 
 def test_a_method_that_a_suite_lists_twice_is_of_it_once():

@@ -12,8 +12,9 @@ import pytest
 from benchmarks.plan.plan import runs
 from benchmarks.provenance import commit
 from benchmarks.publish import __main__ as command
-from benchmarks.publish.__main__ import PublishError, keep, publish
+from benchmarks.publish.__main__ import PublishError, all_usable, keep, publish
 from benchmarks.publish.published_runs import RUNS, PublishedRun
+from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks import FIGURES
 from tests.benchmarks.plan.planned import planned
@@ -68,6 +69,36 @@ def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch,
     monkeypatch.setattr(RunFolder, "read_rows", lambda _: [SimpleNamespace(commit=c) for c in ("abc", "def")])
     assert not publish("fall", run, tmp_path, tmp_path / "kept", "abc")
     assert "rows of commit def" in capsys.readouterr().err and not (tmp_path / "kept").exists()
+
+
+@pytest.mark.parametrize(
+    "suite, status, config, usable",
+    [
+        ("garments", "stalled", {"finished": "now"}, True),
+        ("extremes", "diverged", {"finished": "now"}, True),
+        ("extremes", "failed", {"finished": "now"}, False),
+        ("garments", "diverged", {"finished": "now"}, False),
+        ("garments", "ok", {}, False),
+        ("garments", "ok", {"finished": "now", "tasks": {"training": {"snug": {"failed": "?"}}}}, False),
+    ],
+)
+def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
+    tmp_path, suite, status, config, usable
+):
+    """benchmarks.run ends with status 1 for a stalled simulation, whose numbers count."""
+    folder = RunFolder(tmp_path)
+    assert not all_usable(folder)  # no rows yet
+    fields = {
+        "scene": "tshirt/kick",
+        "method": "simulation",
+        "seed": 0,
+        "metric": "energy/total",
+        "unit": "J",
+    }
+    row = Row(suite=suite, status=status, reason="why" * (status != "ok"), value=1.0, **fields)
+    folder.write_rows([row])
+    folder.write_config(config)
+    assert all_usable(folder) == usable
 
 
 def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, capsys):

@@ -58,7 +58,10 @@ def test_a_trajectory_is_judged_by_what_is_in_it():
     stalled = judged(
         status="stalled", reason="frame 2: x", frame_fields={"converged": np.array([1, 1, 0, 0.0])}
     )
-    assert stalled == ("stalled", "2 of 4 frames did not converge; first frame 2: x")
+    assert stalled == ("stalled", "2 of 4 frames did not converge; frame 2: x")
+    early = {"truncated": True, "frame_fields": {"converged": np.array([1, 0, 0, 0.0])}}
+    assert judged(status="stalled", reason="frame 3: x", **early) == ("stalled", "frame 3: x")
+    assert judged(status="diverged", reason="frame 3: y", frames=3, truncated=True)[0] == "diverged"
     relaxed = judged(status="converged", reason="frame 1: round-off: residual 2e-6 above tolerance 1e-6")
     assert relaxed == ("ok", "frame 1: round-off: residual 2e-6 above tolerance 1e-6")
 

@@ -19,6 +19,7 @@ from benchmarks.scenes import of_garment
 from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.minimise import Newton
 from reference_sim.time_loop import simulate
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid
@@ -72,6 +73,28 @@ def test_solvers_that_stop_early_know_no_self_contact():
     whole = Simulation(options={})
     whole.prepare(scene)
     assert "energy/barrier" in whole.run().frame_fields
+
+
+def test_nor_do_those_that_start_elsewhere_and_subspaces_whose_minimiser_is_a_function():
+    scene = two_sheets(0.05)
+    declared = Simulation(options={"method": lambda potential, **options: Newton(potential, **options)})
+    declared.prepare(dataclasses.replace(scene, minimised=with_self_contact(scene.energies)))
+    trajectory = declared.run()
+    assert trajectory.status == "converged" and "energy/barrier" not in trajectory.frame_fields
+
+
+@pytest.mark.parametrize("exchange", ["springs", "pbns-springs", "printed-bending"])
+def test_another_material_is_minimised_beside_the_barrier(exchange):
+    scene = two_sheets(0.05)
+    scene = dataclasses.replace(scene, minimised=with_self_contact(scene.energies))
+    other = find_method(f"simulation-{exchange}").make(models=None, seed=0)
+    other.prepare(scene)
+    minimised = {term.name: term for term in other.stepper.potential.energies}
+    assert minimised["barrier"] is scene.minimised[-1]
+    for declared, theirs in zip(scene.energies, other.scene.energies):
+        mine, kept = minimised[theirs.name], theirs is declared
+        assert type(mine) is type(theirs) and (mine is declared) == kept
+        assert mine.parameters() == theirs.parameters()
 
 
 def test_laws_are_those_of_what_is_minimised():

@@ -205,6 +205,8 @@ def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp
     assert "differs from the package's by up to 0.5" in capsys.readouterr().out
     assert command.main([*options, "--preset", "smoke", "--into-package"]) == 2
     assert "networks of preset quick" in capsys.readouterr().err
+    assert command.main([*options, "--motions", "library", "--into-package"]) == 2
+    assert "its own body, garments and motions" in capsys.readouterr().err
 
 
 def test_parts_of_simulations_do_not_depend_on_the_machine():

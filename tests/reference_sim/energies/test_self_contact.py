@@ -10,6 +10,7 @@ import pytest
 
 from reference_sim import Cloth, Material, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactBarrier, ContactPenalty, Gravity, StretchStVK
+from reference_sim.minimise import Newton
 from tests.reference_sim.energies.barriers import assert_free, cuts, folded, sheet
 from tests.reference_sim.meshes import box, grid
 
@@ -75,3 +76,10 @@ def test_a_barrier_against_nothing_is_refused():
     strip, _ = folded(5)
     with pytest.raises(ValueError, match="meets nothing: give self_contact=True or obstacle=True"):
         ContactBarrier(strip, self_contact=False, obstacle=False)
+
+
+def test_a_function_as_method_is_refused_where_newtons_method_would_end_its_steps():
+    cloth, _ = two_sheets()
+    terms = [StretchStVK(cloth), Gravity(cloth), self_contact(cloth)]
+    with pytest.raises(ValueError, match="not a function, ends steps that 'barrier' joins: choose"):
+        simulate(cloth, terms, frames=2, method=lambda potential, **options: Newton(potential))

@@ -21,6 +21,7 @@ from reference_sim.minimise.compiled import iteration
 from reference_sim.minimise.compiled.iteration import ELEMENTS, evaluate
 from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
 from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.minimise.result import Result
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion
 from tests.benchmarks.runner.tasks_by_hand import small_scene
@@ -201,6 +202,57 @@ def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
     torn = np.random.default_rng(0).normal(0, 0.1, guess.shape) * potential.cloth.free[:, None]
     solver.minimise(guess + torn)  # which allows its first direction a hundredth only
     assert np.array_equal(solver.minimise(guess).positions, LBFGS(potential).minimise(guess).positions)
+    stopped = CompiledLBFGS(potential, max_iterations=3)
+    stopped.minimise(guess + torn)
+    new = CompiledLBFGS(potential, max_iterations=3).minimise(guess).positions
+    assert not np.array_equal(stopped.minimise(guess).positions, new)
+    stopped.minimise(guess + torn)
+    stopped.start_again()
+    assert np.array_equal(stopped.minimise(guess).positions, new)
+
+
+def test_the_time_of_the_whole_descent_has_a_name_of_its_own():
+    potential, guess = pressed(0)
+    assert set(CompiledLBFGS(potential, max_iterations=5).minimise(guess).seconds) == {
+        "assemble", "factorise", "descend",
+    }  # fmt: skip
+    assert LBFGS(potential).minimise(guess).seconds["descend"] > 0.0
+
+
+def test_it_says_why_it_ended():
+    potential, guess = pressed(0)
+    assert CompiledLBFGS(potential, max_iterations=3).minimise(guess).reason == "stopped after 3 iterations"
+    near = CompiledLBFGS(potential, max_iterations=400, tolerance=0.1).minimise(guess)
+    assert near.reason.startswith(f"gradient within tolerance after {near.iterations} iterations; ")
+    stuck = CompiledLBFGS(potential, max_iterations=10_000, tolerance=1e-30).minimise(guess)
+    assert stuck.iterations < 10_000 and stuck.status == "max_iterations"
+    assert stuck.reason.startswith("no step along the quasi-Newton direction lowers the energy, after ")
+
+
+def test_a_start_in_float32_that_is_refused_counts(monkeypatch):
+    potential, guess = pressed(0)
+    clock, cost = [0.0], {}
+
+    def raised(solver: CompiledLBFGS, x0: np.ndarray) -> Result:
+        clock[0] += cost["seconds"]
+        return Result(
+            positions=x0 + 0.1 * potential.cloth.free[:, None] * np.arange(len(x0))[:, None],
+            status="max_iterations", reason="", iterations=cost["iterations"], factorisations=1,
+            gradient_norm=1.0, energy=0.0, terms={}, seconds={"descend": cost["seconds"]},
+        )  # fmt: skip
+
+    monkeypatch.setattr(CompiledLBFGS, "minimise", raised)
+    monkeypatch.setattr("time.perf_counter", lambda: clock[0])
+    cost |= {"iterations": 0, "seconds": 0.0}
+    free = LBFGS(potential, timeout=50.0).minimise(guess)
+    cost |= {"iterations": 7, "seconds": 40.0}
+    paid = LBFGS(potential, timeout=50.0).minimise(guess)
+    assert free.status == paid.status == "converged" and np.array_equal(free.positions, paid.positions)
+    assert paid.iterations == free.iterations + 7 and paid.factorisations == free.factorisations
+    assert paid.seconds["descend"] == 40.0
+    cost |= {"seconds": 60.0}
+    late = LBFGS(potential, timeout=50.0).minimise(guess)
+    assert late.status == "timeout" and late.seconds["descend"] == 60.0
 
 
 def test_what_it_has_no_kernel_for_is_refused_by_name():

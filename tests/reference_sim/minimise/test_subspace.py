@@ -51,7 +51,7 @@ def basis(size: int) -> np.ndarray:
 
 def solved(space: np.ndarray, offsets: np.ndarray | None = None, placement: Placement | None = None):
     start = np.zeros((COUNT, 3)) if offsets is None else offsets
-    steps = iter([placement or placed()])
+    steps = [placement or placed()]
     return SubspaceNewton(potential(), basis=space, placements=steps, offsets=start).minimise(SHEET)
 
 
@@ -103,7 +103,7 @@ def test_the_residual_of_a_minimum_is_that_of_automatic_differentiation():
     # Elsewhere too, and second derivatives.
     elsewhere = q + 0.01 * torch.randn(len(q), generator=torch.Generator().manual_seed(0), dtype=q.dtype)
     x = placement.posed(np.einsum("vik,k->vi", space, elsewhere.numpy()))
-    solver = SubspaceNewton(terms, basis=space, placements=iter(()), offsets=placement.unposed(x))
+    solver = SubspaceNewton(terms, basis=space, placements=[], offsets=placement.unposed(x))
     free = terms.cloth.free
     posed = np.einsum("vij,vjk->vik", placement.turns, space)[free].reshape(3 * free.sum(), -1)
     assert isinstance(solver.hessian, SubspaceHessian)
@@ -123,7 +123,7 @@ def test_each_step_starts_from_the_last_ones_offsets():
     solver = SubspaceNewton(
         potential(),
         basis=basis(4),
-        placements=iter([first, second]),
+        placements=[first, second],
         offsets=np.zeros((COUNT, 3)),
         max_iterations=0,
     )
@@ -131,6 +131,16 @@ def test_each_step_starts_from_the_last_ones_offsets():
     after = solver.minimise(SHEET).positions
     free = potential().cloth.free
     assert np.allclose((after - before)[free], [0.0, 0.0, 0.01], atol=1e-12)
+
+
+def test_a_run_that_starts_again_gives_the_bits_of_the_first():
+    steps = [placed(), Placement(placed().turns, SHEET + np.array([0.0, 0.0, 0.01]))]
+    solver = SubspaceNewton(potential(), basis=basis(4), placements=steps, offsets=np.zeros((COUNT, 3)))
+    runs = []
+    for _ in range(2):
+        runs.append([solver.minimise(SHEET).positions for _ in steps])
+        solver.start_again()
+    assert np.array_equal(*runs)
 
 
 def test_columns_that_others_express_are_left_out():

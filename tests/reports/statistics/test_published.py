@@ -89,3 +89,6 @@ def test_nothing_stands_beside_another_preset_the_published_run_itself_or_motion
     assert published_beside(run_of({0: 5.2}, started="before"), "snug") == ""
     assert published_beside(run_of({0: 5.2}, ("tshirt/a", "tshirt/mine")), "snug") == ""
     assert published_beside(run_of({0: 5.2}), "pbns") == ""
+    own = run_of({0: 5.2})  # say, beside a reference whose cloth does not cross itself
+    own = replace(own, frame=own.frame.assign(protocol="own"))
+    assert published_beside(own, "snug") == ""

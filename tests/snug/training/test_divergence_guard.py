@@ -127,6 +127,19 @@ def test_runaway_energy_brings_good_weights_back():
     assert trainer.guard.summary["restored"] == 1 and trainer.guard.summary["skipped_updates"] == 0
 
 
+@pytest.mark.parametrize("usual", [0.4, 0.01, -0.01, -0.8])
+def test_an_energy_around_zero_makes_no_runaway_of_one_high_window(usual):
+    """Trousers hang below the pelvis, where their height, and with it their energy, is negative."""
+    guard = made().guard
+    batch = np.full(16, usual)
+    for number in range(SETTLING + 1):
+        assert guard.judge(number, batch, str) == "update"
+    batch[0] = 2.1
+    verdicts = [guard.judge(SETTLING + 1 + k, batch, str) for k in range(2 * PATIENCE)]
+    assert set(verdicts) == {"clip"} and guard.rate == 1.0
+    assert guard.judge(SETTLING + 9, np.full(16, 20.0), str) == "distrust"
+
+
 def test_the_papers_recipe_is_left_alone_by_the_guard():
     """No clip, no weights back: the paper has neither."""
     trainer = made(replace(PLAIN, spike=PAPER.spike))

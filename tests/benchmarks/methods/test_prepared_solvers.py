@@ -1,0 +1,121 @@
+"""Solvers that are prepared once: a run sets nothing up, and gives the bits of a simulation made anew."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from benchmarks.method import Method
+from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.methods.solvers.warm_started import WarmStarted
+from benchmarks.scene import BuiltScene
+from benchmarks.scenes.self_contact import with_self_contact
+from reference_sim import Cloth, Material, simulate
+from reference_sim.assembly import hessian_pattern
+from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim.minimise import factorised, scalar_preconditioner
+from reference_sim.minimise.compiled import scalar_factor
+from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.reference_sim.meshes import grid
+
+SOLVERS = (
+    "simulation", "simulation-dt/2", "simulation-refrozen", "newton-2", "lbfgs-10", "fast-lbfgs-10", "vbd-20",
+    "xpbd-40",
+)  # fmt: skip
+SET_UP = (  # what analyses a pattern
+    (hessian_pattern, "nested_dissection"),
+    (scalar_factor, "nested_dissection"),
+    (factorised, "analyse"),
+    (scalar_preconditioner, "analyse"),
+)
+
+
+def simulated_anew(method: Simulation) -> np.ndarray:
+    """Positions of `simulate`, with the scene and the options of a method."""
+    scene = method.scene
+    assert scene is not None
+    options = method.options | {"substeps": scene.substeps * method.options.get("substeps", 1)}
+    energies = scene.energies if "max_iterations" in options else scene.simulated_energies
+    return simulate(
+        scene.cloth, energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle, start=scene.start,
+        velocity=scene.start_velocity, pin_positions=scene.pin_positions, **options,
+    ).positions  # fmt: skip
+
+
+def assert_sets_nothing_up(method: Method, monkeypatch) -> None:
+    def set_up(*arguments):
+        raise AssertionError("set up on the clock")
+
+    with monkeypatch.context() as patch:
+        for module, name in SET_UP:
+            patch.setattr(module, name, set_up)
+        method.run()
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_run_sets_nothing_up_and_all_runs_give_the_bits_of_a_new_simulation(name, monkeypatch):
+    scene = small_scene("sheet_on_sphere", cells=6, frames=6)
+    method = find_method(name).make(models=None, seed=0)
+    method.prepare(scene)
+    assert_sets_nothing_up(method, monkeypatch)
+    runs = [method.run().positions for _ in range(2)]
+    assert np.array_equal(*runs) and np.array_equal(runs[0], simulated_anew(method))
+
+
+class Carried:
+    """Residuals as they are."""
+
+    def carried(self, residual: np.ndarray, frame: int) -> np.ndarray:
+        return residual
+
+
+@pytest.mark.parametrize("solver", [CompiledLBFGS, "newton", "lbfgs"])
+def test_a_warm_started_solver_begins_its_frames_and_residuals_anew(solver, monkeypatch, tmp_path):
+    scene = small_scene("hanging_sheet", frames=6)
+
+    def frames() -> Iterator[np.ndarray]:
+        return (scene.start + np.array([0.0, -2e-3 * frame, 0.0]) for frame in range(scene.frames))
+
+    def method() -> WarmStarted:
+        made = WarmStarted("skinning", tmp_path, {"method": solver, "max_iterations": 2}, residual=True)
+        monkeypatch.setattr(made, "_frames", lambda scene: frames)
+        monkeypatch.setattr(made, "_carry", lambda scene: Carried())
+        made.prepare(scene)
+        return made
+
+    served = method()
+    assert_sets_nothing_up(served, monkeypatch)
+    runs = [served.run().positions, served.run().positions, method().run().positions]
+    assert np.array_equal(runs[0], runs[1]) and np.array_equal(runs[0], runs[2])
+    assert np.abs(runs[0][1:] - scene.start).max() > 1e-3
+
+
+def pressed_together() -> BuiltScene:
+    """A scene of two sheets, the upper one thrown onto the lower one."""
+    scene = small_scene("hanging_sheet", cells=4, frames=8)
+    x, faces = grid(3, 3, width=0.06, depth=0.06)
+    above = x[:, [2, 1, 0]] * [0.8, 1, 0.9] + np.array([5e-3, 3e-3, 7e-3])
+    start = np.concatenate([x, above])
+    cloth = Cloth(start, np.concatenate([faces, faces[:, ::-1] + len(x)]), Material(), pins=[0, 3, 12, 15])
+    thrown = np.zeros_like(start)
+    thrown[len(x) :] = [0.1, -0.3, 0.05]
+    energies = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
+    return dataclasses.replace(
+        scene, cloth=cloth, energies=energies, minimised=with_self_contact(energies), pin_positions=None,
+        settle=lambda: np.stack([start, thrown]), exact=None,
+    )  # fmt: skip
+
+
+def test_pairs_of_a_barrier_that_the_last_run_met_are_forgotten():
+    pytest.importorskip("ipctk", reason="ipctk is not installed: no self-contact")
+    method = Simulation(options={})
+    method.prepare(pressed_together())
+    first = method.run()
+    assert first.status == "converged" and first.frame_fields["energy/barrier"][-1] > 0.0
+    assert np.array_equal(first.positions, method.run().positions)
+    assert np.array_equal(first.positions, simulated_anew(method))
