@@ -146,8 +146,8 @@ def _join(joined: dict[str, Any], other: Mapping[str, Any], where: str, *, stric
 def check_entries(folders: Iterable[RunFolder]) -> None:
     """Raise MergeError where two tasks came of other code or packages, or one task of other inputs.
 
-    The machine on which a task ran is no such input, but a network has one file: of one seed, processors of
-    two kinds train two networks.
+    The machine on which a task ran is no such input, but a network has one set of weights: of one
+    seed, processors of two kinds train two networks.
     """
     seen: dict[Any, tuple[str, Path]] = {}
     files: dict[Path, tuple[dict[str, str], Path]] = {}
@@ -161,11 +161,10 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
                 raise MergeError(f"{path}: damaged, or of an earlier version; run it again with --fresh")
             place = path.relative_to(folder.cache)
             if place.parts[0] == NETWORK:
-                network, where = files.setdefault(place, (entry["files"], folder.path))
-                if network != entry["files"]:
-                    raise MergeError(
-                        f"{entry['task']}: another in {folder.path} than in {where}: copy its file"
-                    )
+                names, where = files.setdefault(place, (entry["files"], folder.path))
+                if names != entry["files"] and not _equal_weights(where, folder.path, names):
+                    difference = f"{entry['task']}: other weights in {folder.path} than in {where}"
+                    raise MergeError(f"{difference}: run one of them with --trained and the other's folder")
             for name, value in entry["parts"].items():
                 key = (place, name) if name in entry["inputs"] else name
                 before, where = seen.setdefault(key, (value, folder.path))
@@ -174,6 +173,19 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
                     raise MergeError(
                         f"{difference}: run both by the same code; --fresh forgets what is older"
                     )
+
+
+def _equal_weights(one: Path, other: Path, names: Iterable[str]) -> bool:
+    """Return whether the files of these names hold the same weights; their headers have times."""
+    import torch
+
+    from snug.networks.tensor_file import read_tensors
+
+    for name in names:
+        first, second = (read_tensors(folder / name)[0] for folder in (one, other))
+        if first.keys() != second.keys() or not all(torch.equal(first[key], second[key]) for key in first):
+            return False
+    return True
 
 
 def of_machines(config: Mapping[str, Any]) -> frozenset[str]:

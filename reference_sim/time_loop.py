@@ -80,7 +80,7 @@ def simulate(
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the worst of the others:
-        "diverged", then "stalled" and "timeout", then "max_iterations"; the reason tells of the first frame
+        "diverged", then "timeout", then "stalled" or "max_iterations"; the reason tells of the first frame
         with it. A frame that is not finite ends the run. frame_fields: iterations, factorisations,
         gradient_norm (relative residual, see `Result`), converged (0/1), relaxed (1 where the residual is
         within the tolerance up to round-off alone; the reason tells of the first), energy/<term> [J].

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -51,8 +52,9 @@ def _declared_with(motion: str) -> dict[str, Scene]:
 
 
 def _is_declared(scene: Scene, preset: str) -> bool:
+    """Return whether the project declares the scene so; a run may leave out what is measured in it."""
     declared = _declared_with(scene.motion).get(scene.name)
-    return declared is not None and declared.at(find_preset(preset)) == scene
+    return declared is not None and replace(declared.at(find_preset(preset)), metrics=scene.metrics) == scene
 
 
 def _trains_as_declared(plan: Plan) -> bool:

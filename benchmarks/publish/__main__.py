@@ -142,7 +142,7 @@ def all_usable(folder: RunFolder) -> bool:
         row.status in (*USABLE, "skipped") or (row.suite == "extremes" and row.status != "failed")
         for row in folder.read_rows()
     )
-    return "finished" in config and counted and not any("failed" in facts for facts in tasks)
+    return bool(config.get("finished")) and counted and not any("failed" in facts for facts in tasks)
 
 
 def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:

@@ -92,8 +92,14 @@ def _rows(
 ) -> Iterator[Row]:
     """Yield a row for each metric of a cell in one suite; one that says why, where there is none."""
     scene, entry = cell.scene, cell.entry
+    # Of a cell without numbers: nobody has asked for a time where none is taken.
+    alone = (
+        ("energy/total", "J")
+        if "energy" in (scene.metrics or ()) and not scene.timed
+        else ("cost/frame", "ms")
+    )
     base = Row(
-        suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric="cost/frame", unit="ms",
+        suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric=alone[0], unit=alone[1],
         status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
         dtype=entry.dtype, **origin, garment=scene.garment, motion=scene.motion, part=scene.part,
         family=entry.reporting.family or entry.name, level=entry.reporting.level, role=entry.role,

@@ -117,4 +117,4 @@ class Recorder:
 
 def _severity(status: str) -> int:
     """Return how bad the status of a minimisation is: 0 is good."""
-    return {"converged": 0, "max_iterations": 1, "diverged": 3}.get(status, 2)
+    return {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}[status]

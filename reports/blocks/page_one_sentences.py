@@ -40,9 +40,10 @@ def topics(run: Run) -> list[tuple[str, list[str]]]:
     cells = run.cells("speed", "garments")
     compared = next(iter(compared_scenes(run, cells).values()), [])
     timed = cells[cells["scene"].isin(compared)] if compared else worn
+    clips = timed if (timed["suite"] == "speed").any() else worn  # one whole motion is timed
     sentences = {
         "How near": relative_excesses(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
-        "At what cost": _cost(run, timed, compared), "How certain": _trust(run, timed),
+        "At what cost": _cost(run, timed, compared), "How certain": _trust(run, clips),
         "On other bodies": _on_other_bodies(run),
         "Textile tests": [textile_tests(run)], "Engines": [engines(run)],
     }  # fmt: skip

@@ -38,8 +38,8 @@ def published_beside(run: Run, method: str) -> str:
         published = read_published(PUBLISHED / DEFAULT)
     except ResultsError:
         return ""  # of an earlier version
-    if all(published.config.get(name) == run.config.get(name) for name in ("started", "finished")):
-        return ""  # the published run itself
+    if published.config.get("started") == run.config.get("started"):
+        return ""  # the published run itself, or another that is made to be published
     if published.protocol != run.protocol:
         return ""
     ours, theirs = _by_seed(run, method), _by_seed(published, method)

@@ -108,7 +108,9 @@ def error_rivals(run: Run) -> list[Table]:
 def reference_uncertainty(run: Run) -> list[Table]:
     """Tabulate how far equally valid references, and smaller time steps, lie from the reference."""
     frame = run.cells("speed", "garments")
-    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    scenes = next(iter(compared_scenes(run, run.cells("speed")).values()), [])
+    if not scenes:  # all whole motions, timed or not
+        scenes = next(iter(run.garments(run.garment_rows).values()), [])
     rows = frame[frame["scene"].isin(scenes)]
     metrics = [run.metrics[name] for name in (*OF_STEPS, *UNCERTAIN) if name in run.metrics]
     ensemble = [

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 import pytest
+import torch
 
 from benchmarks import merge as command
 from benchmarks.fingerprint.digest import digest_of_file
@@ -14,6 +15,7 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.tasks.task import Outcome, Task
+from snug.networks.tensor_file import write_tensors
 
 CONFIG = {
     "preset": "smoke", "preset_values": {"frames": 20}, "split": "test", "body": "of the package",
@@ -158,14 +160,22 @@ def test_two_networks_of_one_name_are_refused(folder, tmp_path, capsys):
     """Processors of two kinds train two networks of one seed, and no row need tell."""
     folders = [folder(name, [row("energy/total", 1.0)]) for name in ("one", "two")]
     arguments = [*map(str, folders), "-o", str(tmp_path / "both")]
-    for path, weights in zip(folders, ("some", "others")):
-        run = RunFolder(path)
-        (path / "models").mkdir()
-        (path / "models/snug.safetensors").write_text(weights)
+
+    def trained(path: Path, weight: float, seconds: float) -> None:
+        file = path / "models/snug.safetensors"
+        file.parent.mkdir(exist_ok=True)
+        write_tensors(file, {"weight": torch.full((2,), weight)}, {"seconds": seconds})
         network = Train(name="snug", label="snug seed 0", inputs={}, modules=())
-        Cache(run).keep(network, Outcome(files=("models/snug.safetensors",)), {})
+        kept = Cache(RunFolder(path)).keep(network, Outcome(files=("models/snug.safetensors",)), {})
+        config = RunFolder(path).read_config()
+        RunFolder(path).write_config(config | {"digests": config["digests"] | kept.outcome.digests})
+
+    trained(folders[0], 1.0, seconds=5.0)
+    trained(folders[1], 1.5, seconds=5.0)
     assert command.main(arguments) == 2
-    assert "network snug seed 0: another in" in capsys.readouterr().err
+    assert "network snug seed 0: other weights in" in capsys.readouterr().err
+    trained(folders[1], 1.0, seconds=6.0)
+    assert command.main(arguments) == 0
 
 
 def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path, monkeypatch, capsys):

@@ -86,6 +86,7 @@ def test_titles_and_prose_are_no_part_of_it(monkeypatch):
     ("request_fields", "expected"),
     [
         ({"scenes": ("flag",)}, NUMBER),
+        ({"scenes": ("tshirt/dance_turn", "tshirt/07_02")}, NUMBER),
         ({"scenes": ("tshirt/dance_turn",)}, NUMBER),
         (
             {

@@ -115,7 +115,8 @@ class TrainingContact:
         walk = x is not None
         if walk:
             held = np.unique(batch.frames)
-            self._before = held, self.cache.age[held], *(table[held] for table in self._tables())
+            # Ages of all frames: in a group every process keeps those of the others' windows too.
+            self._before = self.cache.age.copy(), held, *(table[held] for table in self._tables())
         if isinstance(self.cache, ContactCache):
             cache, (of_body, *body) = self.cache, posed
             rows = of_body.reshape(batch.frames.shape)
@@ -194,8 +195,8 @@ class TrainingContact:
         Then every process gives its own to the others. frames: see `requery`.
         """
         if self._before and not trusted:
-            rows, age, *before = self._before
-            self.cache.age[rows] = age
+            age, rows, *before = self._before
+            self.cache.age[:] = age
             for table, held in zip(self._tables(), before):
                 table[rows] = held
         self._before = None
