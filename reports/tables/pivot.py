@@ -117,8 +117,8 @@ def metric_tables(run: Run) -> list[Table]:
 def declared_pivots(name: str) -> tuple[Pivot, Pivot]:
     """Declare the table of means over the scenes of a garment, and the one of every scene in all suites."""
     title = name.replace("_", " ").capitalize()
-    timed = " that are timed" if name == "cost" else ""
-    caption = f"{title}: mean over the motions{timed} and seeds of each garment."
+    which = "timed" if name == "cost" else "the"
+    caption = f"{title}: mean over {which} motions and seeds of each garment."
     by_garment = Pivot(
         name, caption, ("garment", "method"), of_table=name,
         select=lambda run: run.garment_rows, lines=_methods_of_garments, grouped_by=("garment",),

@@ -12,7 +12,7 @@ from snug.garments.garment import Garment
 from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
 from snug.garments.templates import TSHIRT, GarmentTemplate, find_template
 from snug.motion.files import load_motions
-from snug.motion.library import DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion
+from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion
 from snug.motion.motion import Motion
 from snug.motion.options import parse_motion_options
 from snug.training.simulated_data import DataSet
@@ -68,7 +68,7 @@ def choose_motions(options: argparse.Namespace, data: DataSet | None) -> tuple[l
         motions = load_motions(options.motions, options=reading)
     names = [motion.name for motion in motions]
     others = [
-        name for name in (*VALIDATION, *DYNAMIC_VALIDATION) if name not in names
+        name for name in (*VALIDATION, *DYNAMIC_VALIDATION, *CONTROL) if name not in names
     ]  # of the library: they never train
     for option, known in (("hold_out", names), ("validation", [*names, *others])):
         for name in getattr(options, option):

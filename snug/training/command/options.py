@@ -60,8 +60,8 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         help="file to write; of several garments each adds its name (default: by --model)")  # fmt: skip
     add = parser.add_argument_group("early stop").add_argument
     add("--validation", metavar="NAME", action="append", default=[],
-        help="roll this motion out now and then, held out of training, or one of the library's validation "
-        "motions; may be repeated. The weights that do best are kept")  # fmt: skip
+        help="roll this motion out now and then: one held out of training, or of the library a validation "
+        "motion or one without a role; may be repeated. The weights that do best are kept")  # fmt: skip
     add("--validate-every", metavar="STEPS", type=int, default=200, help="(default: %(default)s)")
     add("--patience", metavar="N", type=int, default=0,
         help="validations without a better value, after which training stops (default: never)")  # fmt: skip
