@@ -60,13 +60,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with contextlib.redirect_stdout(sys.stderr):
         rows, config = scores.scored(entry, page=options.page)
     if entry.scores.rows_path.is_file() and not options.replace:
-        differing = scores.differences(entry.scores.read_rows(), rows)
+        elsewhere, how = scores.scored_elsewhere(entry), {}
+        if elsewhere:
+            program = bool(entry.metadata.program)
+            how = {"energies_of": entry.name, "tolerance": scores.SAME_PROGRAM if program else scores.SAME}
+        differing = scores.differences(entry.scores.read_rows(), rows, **how)
         for line in (lines := list(islice(differing, SHOWN))):
             print(line)
         if lines:
             print(f"{options.entry}: refused: its scores are not the recorded ones")
             return 1
-        print(f"{options.entry}: scored again, {len(rows)} rows as recorded")
+        what = "its energies as recorded, on another processor" if elsewhere else "as recorded"
+        print(f"{options.entry}: scored again, {len(rows)} rows, {what}")
         return 0
     scores.write(entry, rows, config)
     print(f"{options.entry}: {len(rows)} rows in {entry.scores.rows_path}")

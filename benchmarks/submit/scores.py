@@ -12,13 +12,16 @@ from typing import Any
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.metrics import find_metric
+from benchmarks.provenance import processor_name
 from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from benchmarks.submit.entry import Entry, EntryError
 
-SAME = 1e-6  # relative difference of two scores that are one: another processor rounds otherwise
+SAME = 1e-6  # relative difference of two scores that are one
+SAME_PROGRAM = 1e-3  # of the energies of a program's roll-outs on another processor, where float32 rounds
+SCORED_ON = "scored_on"  # entry of run.json: the processor
 ABSOLUTE = 1e-9  # in the unit of a score, where it is nearly 0
 DECLARED = "cost/frame"  # the one cost that an entry has: as its authors say
 KEPT = ("preset", "metrics", "methods", "scenes", "cases")  # of run.json
@@ -65,8 +68,22 @@ def _bare(row: Row) -> Row:
     return dataclasses.replace(row, commit="", hardware="")
 
 
-def differences(recorded: Sequence[Row], now: Sequence[Row]) -> Iterator[str]:
+def scored_elsewhere(entry: Entry) -> bool:
+    """Return whether the recorded scores are of another kind of processor."""
+    return entry.scores.read_config().get(SCORED_ON) != processor_name()
+
+
+def differences(
+    recorded: Sequence[Row], now: Sequence[Row], *, energies_of: str = "", tolerance: float = SAME
+) -> Iterator[str]:
     """Yield a line for each score that is not the recorded one.
+
+    Args:
+        recorded: rows of the scores.
+        now: rows of another scoring.
+        energies_of: method whose energies alone are compared by their values; empty: all rows are. On another
+            kind of processor the simulation parts from the recorded one, and with it all that hangs on it.
+        tolerance: relative difference up to which two values are one.
 
     >>> row = Row("garments", "tshirt/kick", "mine", 0, "energy/strain", "J", value=0.5)
     >>> list(differences([row], [dataclasses.replace(row, value=0.6)]))
@@ -77,7 +94,8 @@ def differences(recorded: Sequence[Row], now: Sequence[Row]) -> Iterator[str]:
         one, other = before.get(key), after.get(key)
         named = one or other
         assert named is not None
-        if one is None or other is None or not _same(one, other):
+        by_value = not energies_of or (key[2] == energies_of and str(key[4]).startswith("energy/"))
+        if one is None or other is None or not _same(one, other, tolerance if by_value else math.inf):
             values = [("none" if row is None else _shown(row)) for row in (other, one)]
             yield f"{named.method} in {named.scene}, {named.metric}: {values[0]}, recorded is {values[1]}"
 
@@ -86,12 +104,12 @@ def _key(row: Row) -> tuple[object, ...]:
     return row.suite, row.scene, row.method, row.seed, row.metric
 
 
-def _same(one: Row, other: Row) -> bool:
+def _same(one: Row, other: Row, tolerance: float) -> bool:
     if (one.status, one.unit, one.protocol) != (other.status, other.unit, other.protocol):
         return False
     if one.value is None or other.value is None:
         return one.value == other.value
-    return math.isclose(one.value, other.value, rel_tol=SAME, abs_tol=ABSOLUTE)
+    return tolerance == math.inf or math.isclose(one.value, other.value, rel_tol=tolerance, abs_tol=ABSOLUTE)
 
 
 def _shown(row: Row) -> str:
@@ -105,6 +123,7 @@ def write(entry: Entry, rows: Sequence[Row], config: dict[str, Any]) -> None:
     folder.write_rows(rows)
     metadata = dataclasses.asdict(entry.metadata)
     folder.write_config({
-        "protocol": {"number": NUMBER, "digest": DIGEST}, **config, "metadata": metadata,
+        "protocol": {"number": NUMBER, "digest": DIGEST}, SCORED_ON: processor_name(), **config,
+        "metadata": metadata,
         "entry": entry.digests(), "digests": {folder.rows_path.name: digest_of_file(folder.rows_path)},
     })  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -16,6 +17,7 @@ from benchmarks.scenes import find_scene
 from benchmarks.submit import entry as entries
 from benchmarks.submit.__main__ import main
 from benchmarks.submit.entry import read_entry
+from benchmarks.submit.scores import KEPT, write
 from snug.motion.library import TEST
 from tests.benchmarks.runner.tasks_by_hand import run_in_this_process
 
@@ -82,7 +84,32 @@ def test_scoring_twice_gives_the_same_bytes(scored, entry, capsys):
     for name in ("results.csv", "run.json"):
         assert (entry / "scores" / name).read_bytes() == (scored / "scores" / name).read_bytes()
     assert main(["score", str(entry)]) == 0
-    assert "rows as recorded" in capsys.readouterr().out
+    assert "rows, as recorded" in capsys.readouterr().out
+
+
+def test_on_another_processor_the_energies_of_the_entry_are_compared(copy, monkeypatch, capsys):
+    """The simulation is chaotic: there it parts from the recorded one, and so do distances from it."""
+    rows = [
+        dataclasses.replace(row, value=1.02 * row.value)
+        if row.value is not None and not (row.method == "waving" and row.metric.startswith("energy/"))
+        else row
+        for row in RunFolder(copy / "scores").read_rows()
+    ]
+    config = {name: value for name, value in RunFolder(copy / "scores").read_config().items() if name in KEPT}
+    write(read_entry(copy)[0], rows, config)
+    assert main(["score", str(copy)]) == 1
+    monkeypatch.setattr("benchmarks.submit.scores.processor_name", lambda: "another")
+    capsys.readouterr()
+    assert main(["score", str(copy)]) == 0
+    assert "its energies as recorded, on another processor" in capsys.readouterr().out
+    strains = [row.method == "waving" and row.metric == "energy/strain" for row in rows]
+    changed = [
+        dataclasses.replace(row, value=1.01 * row.value) if mine else row for row, mine in zip(rows, strains)
+    ]
+    write(read_entry(copy)[0], changed, config)
+    monkeypatch.setattr("benchmarks.submit.scores.processor_name", lambda: "a third")
+    assert main(["score", str(copy)]) == 1
+    assert "waving in" in capsys.readouterr().out
 
 
 def test_scores_are_those_of_a_run_without_clock_and_machine(scored):
@@ -210,4 +237,4 @@ def test_every_entry_here_is_as_it_was_scored(full_size, path):
 @pytest.mark.parametrize("path", FOLDERS, ids=lambda path: path.name)
 def test_every_entry_here_is_scored_again(full_size, path, capsys):
     assert main(["score", str(path)]) == 0
-    assert "rows as recorded" in capsys.readouterr().out
+    assert "rows, " in (shown := capsys.readouterr().out) and "as recorded" in shown
