@@ -21,7 +21,7 @@ class RunCase(Task):
 
     kind = "case"
     stage = "validation"
-    unit_seconds = 0.25
+    unit_seconds = 0.5
     case: Case
 
     def warm_up(self) -> None:

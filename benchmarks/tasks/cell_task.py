@@ -202,6 +202,7 @@ class RunUntimedCell(RunCell):
     """The trajectory of a cell whose time nobody asks for: it runs beside others."""
 
     stage = "cells that are not timed"
+    unit_seconds = 6.0  # many are simulations
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
