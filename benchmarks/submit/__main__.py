@@ -60,11 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with contextlib.redirect_stdout(sys.stderr):
         rows, config = scores.scored(entry, page=options.page)
     if entry.scores.rows_path.is_file() and not options.replace:
-        elsewhere, how = scores.scored_elsewhere(entry), {}
-        if elsewhere:
-            program = bool(entry.metadata.program)
-            how = {"energies_of": entry.name, "tolerance": scores.SAME_PROGRAM if program else scores.SAME}
-        differing = scores.differences(entry.scores.read_rows(), rows, **how)
+        elsewhere = scores.scored_elsewhere(entry)
+        differing = scores.differences(
+            entry.scores.read_rows(), rows, energies_of=entry.name if elsewhere else "",
+            tolerance=scores.SAME_PROGRAM if elsewhere and entry.metadata.program else scores.SAME,
+        )  # fmt: skip
         for line in (lines := list(islice(differing, SHOWN))):
             print(line)
         if lines:
