@@ -22,6 +22,7 @@ from benchmarks.results.json_file import ResultsError
 from benchmarks.results.row import BEFORE_FRAMES, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import read_entry
+from benchmarks.tasks.training import TrainNetwork
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
 
@@ -36,7 +37,6 @@ skipped row. Runs go on in their own folders, not in the merged one.
 exit status: 0 written; 2 the runs differ in what has to be the same, or a file is damaged: one line says
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
-NETWORK = "network"  # kind of task that trains a network
 SAME = ("format", "protocol", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
@@ -160,7 +160,7 @@ def check_entries(folders: Iterable[RunFolder]) -> None:
             if entry is None:
                 raise MergeError(f"{path}: damaged, or of an earlier version; run it again with --fresh")
             place = path.relative_to(folder.cache)
-            if place.parts[0] == NETWORK:
+            if place.parts[0] == TrainNetwork.kind:
                 names, where = files.setdefault(place, (entry["files"], folder.path))
                 if names != entry["files"] and not _equal_weights(where, folder.path, names):
                     difference = f"{entry['task']}: other weights in {folder.path} than in {where}"

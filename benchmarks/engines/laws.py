@@ -134,8 +134,10 @@ def _gap(step: Step, run: RollOut) -> float:
     guess = step.x + step.dt * step.v
     guess[cloth.pins] = step.x[cloth.pins]
     potential.prepare(FrozenStep(step.x, step.v, guess, step.dt))
-    found = Newton(potential, max_iterations=200).minimise(guess)
-    if found.status != "converged":
-        raise RuntimeError(f"energy gap: the minimum of a step is not known: {found.status}, {found.reason}")
-    least = found.energy
+    minimum = Newton(potential, max_iterations=200).minimise(guess)
+    if minimum.status != "converged":
+        raise RuntimeError(
+            f"energy gap: the minimum of a step is not known: {minimum.status}, {minimum.reason}"
+        )
+    least = minimum.energy
     return 100.0 * (potential.value(step.after) - least) / (potential.value(guess) - least)

@@ -15,6 +15,7 @@ from benchmarks.provenance import commit
 from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.execute_plan import accepted
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
 
@@ -138,10 +139,7 @@ def all_usable(folder: RunFolder) -> bool:
         return False
     config = folder.read_config()
     tasks = (facts for of_kind in config.get("tasks", {}).values() for facts in of_kind.values())
-    counted = all(
-        row.status in (*USABLE, "skipped") or (row.suite == "extremes" and row.status != "failed")
-        for row in folder.read_rows()
-    )
+    counted = all(accepted(row) or row.status in USABLE for row in folder.read_rows())
     return bool(config.get("finished")) and counted and not any("failed" in facts for facts in tasks)
 
 

@@ -13,7 +13,7 @@ from reports.blocks.suite_sentences import engines, textile_tests
 from reports.run.finished_run import Run
 from reports.statistics import paper_claims
 from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
-from reports.statistics.break_even import NETWORK, compared_scenes
+from reports.statistics.break_even import NETWORK, compared_scenes, reference_scenes
 from reports.statistics.means_and_spreads import pair, value_of
 from reports.statistics.page_one_methods import subjects
 from reports.statistics.pareto import (
@@ -40,10 +40,10 @@ def topics(run: Run) -> list[tuple[str, list[str]]]:
     cells = run.cells("speed", "garments")
     compared = next(iter(compared_scenes(run, cells).values()), [])
     timed = cells[cells["scene"].isin(compared)] if compared else worn
-    clips = timed if (timed["suite"] == "speed").any() else worn  # one whole motion is timed
+    beside = cells[cells["scene"].isin(reference_scenes(run))]
     sentences = {
         "How near": relative_excesses(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
-        "At what cost": _cost(run, timed, compared), "How certain": _trust(run, clips),
+        "At what cost": _cost(run, timed, compared), "How certain": _trust(run, beside),
         "On other bodies": _on_other_bodies(run),
         "Textile tests": [textile_tests(run)], "Engines": [engines(run)],
     }  # fmt: skip

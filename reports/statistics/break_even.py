@@ -71,6 +71,15 @@ def compared_scenes(run: Run, frame: pd.DataFrame) -> dict[str, list[str]]:
     return run.garments(of_speed if len(of_speed) else rows)
 
 
+def reference_scenes(run: Run) -> list[str]:
+    """Return the scenes of the first garment in which references are compared with each other.
+
+    Those of suite speed in which SNUG was timed beside a truncated solver; without any, all whole motions.
+    """
+    clips = compared_scenes(run, run.cells("speed"))
+    return next(iter((clips or run.garments(run.garment_rows)).values()), [])
+
+
 def compared_costs(
     run: Run, frame: pd.DataFrame, scenes: Sequence[str], against: Iterable[str]
 ) -> tuple[list[Cost], list[Cost]]:

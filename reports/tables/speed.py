@@ -7,7 +7,14 @@ import itertools
 import pandas as pd
 
 from reports.run.finished_run import Run
-from reports.statistics.break_even import NETWORK, compared_costs, compared_scenes, crossing, rivals
+from reports.statistics.break_even import (
+    NETWORK,
+    compared_costs,
+    compared_scenes,
+    crossing,
+    reference_scenes,
+    rivals,
+)
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.pareto import (
     ERRORS,
@@ -108,9 +115,7 @@ def error_rivals(run: Run) -> list[Table]:
 def reference_uncertainty(run: Run) -> list[Table]:
     """Tabulate how far equally valid references, and smaller time steps, lie from the reference."""
     frame = run.cells("speed", "garments")
-    scenes = next(iter(compared_scenes(run, run.cells("speed")).values()), [])
-    if not scenes:  # all whole motions, timed or not
-        scenes = next(iter(run.garments(run.garment_rows).values()), [])
+    scenes = reference_scenes(run)
     rows = frame[frame["scene"].isin(scenes)]
     metrics = [run.metrics[name] for name in (*OF_STEPS, *UNCERTAIN) if name in run.metrics]
     ensemble = [

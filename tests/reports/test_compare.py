@@ -71,7 +71,7 @@ def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
 
 
 def test_cells_of_two_protocols_are_refused():
-    """As beside another reference, in scenes of one's own, though other rows are of one protocol."""
+    """A cell beside another reference is a user's own, though other rows of its run are of one protocol."""
     own = [dataclasses.replace(r, protocol="own" if r.scene == "tshirt/bow" else "1.0") for r in rows_of()]
     frozen = [dataclasses.replace(r, protocol="1.0") for r in rows_of()]
     with pytest.raises(ResultsError, match=r"tshirt/bow x simulation: of protocol 1\.0 in A, own in B"):

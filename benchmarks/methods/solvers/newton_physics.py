@@ -44,12 +44,13 @@ class NewtonSolver(Method):
         positions, seconds, status, reason = [x], [0.0], "ok", ""
         clock = time.perf_counter()
         for frame in range(1, scene.frames):
-            handles = x[pins]
+            held = x[pins]
+            target = held if scene.pin_positions is None else scene.pin_positions(frame)
             for j in range(1, self.substeps + 1):
                 if scene.pin_positions is not None:
                     share = j / self.substeps
                     x = x.copy()
-                    x[pins] = (1 - share) * handles + share * scene.pin_positions(frame)
+                    x[pins] = (1 - share) * held + share * target
                 x, v = self.newton.advance(x, v, scene.dt / self.substeps)
             if not (np.isfinite(x).all() and np.abs(x).max() < FAR):
                 status, reason = "diverged", f"frame {frame}: a vertex is nowhere, or 100 m away"

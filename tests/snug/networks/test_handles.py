@@ -95,7 +95,7 @@ def test_training_moves_the_numbers_and_leaves_the_shape_functions(trained):
 
 
 def test_a_seed_draws_the_perceptron_before_the_last_layer():
-    """As in the published trainings: another order gives other networks for the same seed."""
+    """Layers are drawn in the order of the published trainings: another gives a seed other networks."""
     network = make_network("handles-20", 141, 150, replace(HANDLES, initialisation="torch"), seed=7)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(7)
