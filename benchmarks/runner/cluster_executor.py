@@ -40,6 +40,7 @@ PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
 class _Batch:
     """Tasks done one after another, by one process of one worker if it lives: what is left of them.
 
+    A worker that is given a task of another batch in between forgets what this one had in its memo.
     worker: address of the one that did the last; allowed: where the next may be done, empty: anywhere.
     """
 
