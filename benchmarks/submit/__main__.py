@@ -21,8 +21,9 @@ EXAMPLES = """examples:
   python -m benchmarks.submit score submissions/mine --replace      after a change of the entry
   python -m reports.entries                                         the page of all entries
 
-DIR has entry.toml and one roll-out for each scene, or a program (docs/entries.md). A program is run: read it
-  before you score an entry of somebody else. Scores that are there are compared with those of now.
+DIR has entry.toml and one roll-out for each scene, or a program (docs/entries.md). Both check and score load
+  the program, and score runs it: read the program of somebody else first. Scores that are there are compared
+  with those of now.
 exit status: 0 fine; 1 faults, or scores that are not the recorded ones: a line each; 2 DIR is no entry."""
 
 
@@ -61,16 +62,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows, config = scores.scored(entry, page=options.page)
     if entry.scores.rows_path.is_file() and not options.replace:
         elsewhere = scores.scored_elsewhere(entry)
-        differing = scores.differences(
-            entry.scores.read_rows(), rows, energies_of=entry.name if elsewhere else "",
-            tolerance=scores.SAME_PROGRAM if elsewhere and entry.metadata.program else scores.SAME,
-        )  # fmt: skip
+        recorded = entry.scores.read_rows()
+        differing = (
+            scores.differences(recorded, rows, scores.tolerance_elsewhere(entry))
+            if elsewhere
+            else scores.differences(recorded, rows)
+        )
         for line in (lines := list(islice(differing, SHOWN))):
             print(line)
         if lines:
             print(f"{options.entry}: refused: its scores are not the recorded ones")
             return 1
-        what = "its energies as recorded, on another processor" if elsewhere else "as recorded"
+        what = "energies as recorded, on another processor" if elsewhere else "as recorded"
         print(f"{options.entry}: scored again, {len(rows)} rows, {what}")
         return 0
     scores.write(entry, rows, config)

@@ -97,14 +97,12 @@ class Entry:
 
     def digests(self) -> dict[str, str]:
         """Return file -> digest of all that is scored: roll-outs, or the program and what lies beside it."""
-        paths = sorted(path for path in self.path.rglob("*") if path.is_file())
-        names = {path.relative_to(self.path): path for path in paths}
+        scores = self.scores
+        written = {self.path / METADATA, scores.rows_path, scores.config_path, scores.page_path}
         return {
-            name.as_posix(): digest_of_file(path)
-            for name, path in names.items()
-            if name.parts[0] not in (METADATA, "scores")
-            and path.suffix != ".md"
-            and not any(part.startswith((".", "__")) for part in name.parts)
+            path.relative_to(self.path).as_posix(): digest_of_file(path)
+            for path in sorted(self.path.rglob("*"))
+            if path.is_file() and path not in written and "__pycache__" not in path.parts
         }
 
     def plan(self, folder: Path) -> Plan:

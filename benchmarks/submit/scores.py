@@ -6,7 +6,7 @@ import dataclasses
 import math
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,13 @@ from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.metrics import find_metric
 from benchmarks.provenance import processor_name
 from benchmarks.results.protocol import DIGEST, NUMBER
-from benchmarks.results.row import Row
+from benchmarks.results.row import USABLE, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from benchmarks.submit.entry import Entry, EntryError
 
 SAME = 1e-6  # relative difference of two scores that are one
-SAME_PROGRAM = 1e-3  # of the energies of a program's roll-outs on another processor, where float32 rounds
+SAME_ELSEWHERE = 1e-3  # on another processor: a program's energies, where float32 rounds, and what is beside
 SCORED_ON = "scored_on"  # entry of run.json: the processor
 ABSOLUTE = 1e-9  # in the unit of a score, where it is nearly 0
 DECLARED = "cost/frame"  # the one cost that an entry has: as its authors say
@@ -38,7 +38,8 @@ def scored(entry: Entry, *, page: bool = False) -> tuple[list[Row], dict[str, An
         Its rows and those of simulation and skinning, and what run.json says of them.
 
     Raises:
-        EntryError: the run could not be carried out, or the entry has no number in a scene.
+        EntryError: the run could not be carried out, or a roll-out did not come to its last frame: the mean over
+            the other scenes would be of easier ones.
     """
     with tempfile.TemporaryDirectory(prefix="scores-") as folder:
         plan = entry.plan(Path(folder) / "run")
@@ -50,11 +51,14 @@ def scored(entry: Entry, *, page: bool = False) -> tuple[list[Row], dict[str, An
             entry.scores.path.mkdir(exist_ok=True)
             shutil.copyfile(run.page_path, entry.scores.page_path)
     kept = [_bare(row) for row in rows if _is_score(row, entry.name)]
-    numbers = {row.scene for row in kept if row.method == entry.name and row.value is not None}
+    mine = [row for row in kept if row.method == entry.name]
     for scene in entry.scenes:
-        if scene not in numbers:
+        if not any(row.scene == scene and row.value is not None for row in mine):
             why = next((row.reason for row in rows if (row.scene, row.method) == (scene, entry.name)), "")
             raise EntryError(f"{entry.path}: no number in {scene}: {why or 'it did not run'}")
+    for row in mine:
+        if row.status not in USABLE:
+            raise EntryError(f"{entry.path}: {row.scene}, seed {row.seed}: {row.status}: {row.reason}")
     return kept, {name: config.get(name) for name in KEPT}
 
 
@@ -73,17 +77,30 @@ def scored_elsewhere(entry: Entry) -> bool:
     return entry.scores.read_config().get(SCORED_ON) != processor_name()
 
 
+def tolerance_elsewhere(entry: Entry) -> Callable[[Row], float]:
+    """Return the tolerances of `differences` where the scores are of another kind of processor.
+
+    There the simulation parts from the recorded one, and with it all that hangs on it. Compared are the energies
+    of the entry, and the total energies of simulation and skinning, of which its relative excess is made.
+    """
+
+    def tolerance(row: Row) -> float:
+        if row.method == entry.name and row.metric.startswith("energy/"):
+            return SAME_ELSEWHERE if entry.metadata.program else SAME
+        return SAME_ELSEWHERE if row.metric == "energy/total" else math.inf
+
+    return tolerance
+
+
 def differences(
-    recorded: Sequence[Row], now: Sequence[Row], *, energies_of: str = "", tolerance: float = SAME
+    recorded: Sequence[Row], now: Sequence[Row], tolerance: Callable[[Row], float] = lambda row: SAME
 ) -> Iterator[str]:
     """Yield a line for each score that is not the recorded one.
 
     Args:
         recorded: rows of the scores.
         now: rows of another scoring.
-        energies_of: method whose energies alone are compared by their values; empty: all rows are. On another
-            kind of processor the simulation parts from the recorded one, and with it all that hangs on it.
-        tolerance: relative difference up to which two values are one.
+        tolerance: row -> relative difference up to which two values are one; inf: any two values are.
 
     >>> row = Row("garments", "tshirt/kick", "mine", 0, "energy/strain", "J", value=0.5)
     >>> list(differences([row], [dataclasses.replace(row, value=0.6)]))
@@ -94,8 +111,7 @@ def differences(
         one, other = before.get(key), after.get(key)
         named = one or other
         assert named is not None
-        by_value = not energies_of or (key[2] == energies_of and str(key[4]).startswith("energy/"))
-        if one is None or other is None or not _same(one, other, tolerance if by_value else math.inf):
+        if one is None or other is None or not _same(one, other, tolerance(named)):
             values = [("none" if row is None else _shown(row)) for row in (other, one)]
             yield f"{named.method} in {named.scene}, {named.metric}: {values[0]}, recorded is {values[1]}"
 
