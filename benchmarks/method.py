@@ -46,7 +46,7 @@ class Method:
         return None if scene.dressed is None else posed_body(scene.dressed)
 
     def quasi_static(self) -> Trajectory | None:
-        """Return the quasi-static solution of each frame; None for the simulator's. Not timed."""
+        """Return the method's own quasi-static solution of each frame, None where it has none. Not timed."""
         return None
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
@@ -116,7 +116,8 @@ class MethodEntry:
         declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance of a
             trajectory may say it as well.
         other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are compared.
-        static_known: whether its quasi-static solution is what quasi_static() returns.
+        static_known: False of a solver whose quasi-static solution is not the simulation's, and is not returned by
+            quasi_static() either.
         left_out: reason why it is not run; empty where it runs.
         role: its place in tables and plots: `solver`, `warm-started`, `network`, `ablation`, `baseline`,
             `external`, or another of benchmarks.results.row.ROLES.

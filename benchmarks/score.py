@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
     with contextlib.redirect_stdout(sys.stderr):
         status = carry_out(plan, program=PROGRAM, report=not options.no_report)
-    if status in (0, 1):
+    if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file():
         print(json.dumps(numbers(plan), indent=1) if options.json else summary(plan))
     return status
 

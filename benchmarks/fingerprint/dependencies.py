@@ -146,7 +146,7 @@ def _source(path: str) -> _Source:
         file
         for base, name in imports
         if (where := tops[base.split(".")[0]]) is not None
-        for file in _files_behind(base, name, path, where)
+        for file in (*_files_behind(base, name, path, where), *(_packages_above(base, where) if where else ()))
     )
     for node in (tree, *_statements(tree)):
         if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
@@ -169,10 +169,16 @@ def _parse(path: str) -> ast.Module:
 def _statements(node: ast.AST, *, running: bool = False) -> Iterator[ast.AST]:
     """Yield all statements below a node, in order; running: but for those for the type checker alone."""
     for block in BLOCKS:
+        if running and block == "body" and _for_type_checker(node):
+            continue
         for child in getattr(node, block, ()):
-            if not (running and isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
-                yield child
-                yield from _statements(child, running=running)
+            yield child
+            yield from _statements(child, running=running)
+
+
+def _for_type_checker(node: ast.AST) -> bool:
+    """Return whether the body of a node is never run: that of `if TYPE_CHECKING:`."""
+    return isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
 
 
 def _imported(node: ast.AST, package: list[str]) -> list[tuple[str, str]]:
@@ -204,6 +210,15 @@ def _top_of(root: str, top: str, package: list[str]) -> str | None:
         return ""
     installed = root in sys.stdlib_module_names or root in _distributions()
     return top if top and (root in package[:1] or not installed) else None
+
+
+def _packages_above(base: str, top: str) -> Iterator[str]:
+    """Yield the `__init__.py` of the packages that a module below the folder `top` is imported through."""
+    parts = base.split(".")
+    for depth in range(1, len(parts)):
+        path = f"{top}{'/'.join(parts[:depth])}/__init__.py"
+        if (ROOT / path).is_file():
+            yield path
 
 
 def _files_behind(base: str, name: str, importer: str, top: str) -> Iterator[str]:
@@ -252,7 +267,7 @@ def _names(path: str) -> _Names:
     todo: list[ast.stmt] = list(_parse(path).body)
     for node in todo:
         if isinstance(node, ast.If | ast.Try):
-            if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
+            if not _for_type_checker(node):
                 todo += node.body
         elif isinstance(node, ast.FunctionDef | ast.ClassDef):
             defined.add(node.name)

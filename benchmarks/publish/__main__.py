@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.merge import merge
+from benchmarks.merge import MergeError, merge
 from benchmarks.process.timing import one_thread
 from benchmarks.provenance import commit
 from benchmarks.publish.published_runs import RUNS, PublishedRun
@@ -73,7 +73,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise PublishError(f"{head}: commit the changes first, so that a commit says what was run")
     more = [word for name in ("workers", "scheduler") if (value := getattr(options, name))
             for word in (f"--{name}", value)]  # fmt: skip
-    return int(not all([publish(name, RUNS[name], options.out, options.into, head, more) for name in names]))
+    return int(not all([_published(name, options.out, options.into, head, more) for name in names]))
+
+
+def _published(name: str, out: Path, into: Path, head: str, more: Sequence[str]) -> bool:
+    """Return whether a run is published; where it is not, the next is done all the same."""
+    try:
+        return publish(name, RUNS[name], out, into, head, more)
+    except (PublishError, MergeError) as error:
+        print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
+        return False
 
 
 def commands(name: str, run: PublishedRun, out: Path, more: Sequence[str] = ()) -> dict[Path, list[str]]:
@@ -99,6 +108,10 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
 
     Returns:
         Whether it is published; the reason stands on standard error where it is not.
+
+    Raises:
+        PublishError: a picture or film that the documents show was not made.
+        MergeError: its parts are of two machines.
     """
     parts = commands(name, run, out, more)
     whole = next(iter(parts))

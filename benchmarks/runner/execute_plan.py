@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from benchmarks.external.roll_out_option import MODULE
+from benchmarks.external.roll_out_option import MODULE, RollOutFileError
 from benchmarks.plan.plan import Plan
 from benchmarks.process.errors import one_line
 from benchmarks.results.row import Row
@@ -95,7 +95,13 @@ def check_roll_outs(plan: Plan) -> Assets | None:
     except ValueError:
         return None  # the run says so itself, of all dressed scenes
     for cell in stored:
-        cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
+        try:
+            scene = cell.scene.build(assets)
+        except RollOutFileError:
+            raise
+        except ValueError:
+            continue  # of a scene that cannot be built the run says so itself, for all methods
+        cell.entry.make(models=plan.folder, seed=0).prepare(scene)
     forget_roll_outs()  # each task that takes one reads it in its own process
     return assets
 

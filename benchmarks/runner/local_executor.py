@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import multiprocessing
 import queue
+import threading
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any
@@ -48,12 +49,16 @@ class LocalExecutor:
         bar: is told of progress.
         """
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
+        stopped = threading.Event()
 
         def do(worker: TaskProcess, batch: Batch) -> None:
             worker.forget()
             tasks, needed = batch
             for task in tasks:
-                finished.put((task, worker.do(task, dict(needed))))
+                outcome = worker.do(task, dict(needed))
+                if stopped.is_set():  # the process was killed at it, and would be started for the next
+                    return
+                finished.put((task, outcome))
 
         at_work: dict[Future[None], TaskProcess] = {}
         with ThreadPoolExecutor(self.workers) as threads:  # one waits for each worker
@@ -72,9 +77,13 @@ class LocalExecutor:
                         future.result()
                     while not finished.empty():
                         yield finished.get()
-            except BaseException:
+            except BaseException as error:
+                stopped.set()
                 _end(set(at_work))
                 self._crew.clear()
+                if not isinstance(error, GeneratorExit):  # what was finished by then is kept
+                    while not finished.empty():
+                        yield finished.get()
                 raise
 
     def _idle(self, at_work: Collection[TaskProcess]) -> TaskProcess:

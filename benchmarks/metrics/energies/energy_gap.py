@@ -188,6 +188,8 @@ def optimality(
     from reference_sim.minimise.descent import mean_weight
     from reference_sim.minimise.lbfgs import LBFGS  # loads numba
 
+    if scale is not None and not scale > 0.0:  # of a reference that lies above the first guess, or has no energy
+        scale = None
     frames = _judged(scene, positions)
     numbers, potential = Optimality(judged=len(frames)), _potential(scene)
     values = numbers.values
@@ -214,7 +216,8 @@ def optimality(
         y = below.positions
         numbers.away[frame] = MM * np.linalg.norm(x - y, axis=1)
         values["step/distance"].append(float(np.sqrt((numbers.away[frame] ** 2).mean())))
-        values["step/curvature"].append(_curvature_error(x, y, scene.cloth.faces, inner))
+        if inner.any():
+            values["step/curvature"].append(_curvature_error(x, y, scene.cloth.faces, inner))
         if scene.obstacle is not None and len(values["gap/refrozen"]) < samples:
             freeze_step(scene, potential, positions, frame, guess=x)
             again = potential.value(x)
@@ -251,8 +254,6 @@ def spread_evenly(frames: range) -> Iterator[int]:
 
 def _curvature_error(x: Floats, y: Floats, faces: NDArray[np.int64], inner: NDArray[np.bool_]) -> float:
     """Return the mean of |H(x) - H(y)| [1/m] over inner vertices, by the areas of y (V,3) [m]."""
-    if not inner.any():
-        return 0.0
     ours, _ = mean_curvature(x, faces)
     theirs, areas = mean_curvature(y, faces)
     return float(np.average(np.abs(ours - theirs)[inner], weights=areas[inner]))

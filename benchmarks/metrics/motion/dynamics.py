@@ -12,6 +12,7 @@ from benchmarks.metrics.surface.penetration_and_distances import rms
 from snug.body.skeleton import rotation_matrices
 
 if TYPE_CHECKING:
+    from benchmarks.method import MethodEntry
     from benchmarks.metric import RollOut
 
 
@@ -56,7 +57,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     """Return dynamics by the method's own quasi-static solution and, as common_*, by the simulator's.
 
-    Without an own solution the numbers are left out that it enters.
+    Without a quasi-static solution of its own the numbers are left out that it enters.
     """
     hem, x, static = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
     if hem is None:
@@ -64,12 +65,21 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     values: dict[str, float] = {}
     common = hem.measure(x)
     if static is None:
-        known = roll_out.entry.static_known
-        values |= {n: v for n, v in common.items() if known or n.removeprefix("dynamics/") not in COMMON}
+        shared = shares_quasi_static(roll_out.entry)
+        values |= {n: v for n, v in common.items() if shared or n.removeprefix("dynamics/") not in COMMON}
     elif len(static) >= len(x) and np.isfinite(static).all():
         values |= hem.measure(x, static)
     return values | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
                     if f"dynamics/{name}" in common}  # fmt: skip
+
+
+def shares_quasi_static(entry: MethodEntry) -> bool:
+    """Return whether the simulation's quasi-static solution is the method's too, where it returns none.
+
+    It is of solvers that minimise the reference's potential from their last frame; not of another material, of
+    a network, or of a method that says nothing of itself.
+    """
+    return entry.static_known and entry.role in ("reference", "reference-variant", "solver")
 
 
 def series(roll_out: RollOut) -> dict[str, np.ndarray]:

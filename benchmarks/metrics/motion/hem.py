@@ -86,11 +86,11 @@ def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
     """Return g and l [frames] for which g static(t - l) fits moving(t), both (T,) less their means.
 
     Lags within MAX_LAG are tried in hundredths of a frame by linear interpolation; before its first frame a
-    signal rests.
+    signal rests. Where no lag has a gain above 0, as of a hem that does not move, the gain is 0 and the lag nan.
     """
     frames = np.arange(len(static), dtype=np.float64)
     moving = moving - moving.mean()
-    best = (np.inf, 0.0, 0.0)
+    best = (np.inf, 0.0, float("nan"))
     for lag in np.arange(-100 * MAX_LAG, 100 * MAX_LAG + 1) / 100:
         shifted = np.interp(frames - lag, frames, static)
         shifted = shifted - shifted.mean()

@@ -59,17 +59,24 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return the mean curvature and the change of wrinkles over the evaluated frames."""
+    """Return the mean curvature and the change of wrinkles over the evaluated frames; empty without interior."""
     judged = roll_out.kept(series_of).part(roll_out.judged)
+    if not judged.area.any():
+        return {}
     values = {"curvature/mean": float(judged.means().mean())}
     change = curvature_change(judged)
     return values if change is None else values | {"curvature/change": change}
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """Return error, histogram distance and difference of means against the reference [1/m]."""
+    """Return error, histogram distance and difference of means against the reference [1/m].
+
+    Empty where the mesh has no interior vertex.
+    """
     frames = roll_out.judged_beside(reference.positions)
     ours, theirs = roll_out.kept(series_of).part(frames), reference.kept(series_of).part(frames)
+    if not theirs.area.any():
+        return {}
     return {
         "curvature/error": float(curvature_error(ours, theirs).mean()),
         "curvature/histogram": float(histogram_distance(ours, theirs).mean()),

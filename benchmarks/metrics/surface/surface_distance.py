@@ -53,12 +53,17 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """Return Chamfer distance [mm] and angle of normals [degrees] to the reference; empty of a lost cloth."""
+    """Return Chamfer distance [mm] and angle of normals [degrees] to the reference.
+
+    Empty of a cloth that is lost, or has no area in some frame.
+    """
     common = roll_out.judged_beside(reference.positions)
     x, y = roll_out.positions[common], reference.positions[common]
     if not len(x) or np.abs(x).max() > LOST:
         return {}
     faces, others = roll_out.trajectory.faces, reference.trajectory.faces
+    if not all(_doubled_areas(frame, faces).any() for frame in x):
+        return {}
     sampled = np.unique(np.linspace(0, len(x) - 1, SAMPLED_FRAMES).round().astype(int))
     measures = [chamfer_and_angle(x[frame], faces, y[frame], others) for frame in sampled]
     distance, angle = np.mean(measures, axis=0)
@@ -96,11 +101,15 @@ def _one_way(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[flo
     of_nearest = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
     here = vertex_normals(np.ascontiguousarray(x), faces)
     angles = np.arctan2(np.linalg.norm(np.cross(here, of_nearest), axis=1), (here * of_nearest).sum(axis=1))
-    sides = x[faces[:, 1:]] - x[faces[:, :1]]
-    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    weights = np.bincount(faces.ravel(), np.repeat(doubled, 3), len(x))
+    weights = np.bincount(faces.ravel(), np.repeat(_doubled_areas(x, faces), 3), len(x))
     means = np.average(np.stack([np.sqrt(squared), angles]), axis=1, weights=weights)
     return float(means[0]), float(means[1])
+
+
+def _doubled_areas(x: Floats, faces: Indices) -> Floats:
+    """Return twice the area of each triangle (F,) [m^2] of vertices (V,3) [m]."""
+    sides = x[faces[:, 1:]] - x[faces[:, :1]]
+    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -89,6 +90,25 @@ def test_what_is_used_may_not(project, path):
     project(path, FILES[path] + "CHANGED = True\n")
     after = code_of("benchmarks.methods.one")
     assert [name for name in after if after[name] != before[name]] == [path]
+
+
+def test_what_runs_beside_the_type_checkers_imports_counts(tmp_path, project):
+    """The other branch is run, and so are the packages that a user's module is imported through."""
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import unused\nelse:\n    import fast\n"
+        "if not TYPE_CHECKING:\n    import faster\nimport helpers.inner.solver\n"
+    )
+    for name in ("unused", "fast", "faster", "helpers/__init__", "helpers/inner/__init__", "helpers/inner/solver"):
+        path = tmp_path / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    forget()
+    names = {Path(path).relative_to(tmp_path).as_posix() for path in code_of(str(file))}
+    assert names == {
+        "mine.py", "fast.py", "faster.py",
+        "helpers/__init__.py", "helpers/inner/__init__.py", "helpers/inner/solver.py",
+    }  # fmt: skip
 
 
 def test_words_and_blanks_do_not_count(project):

@@ -5,19 +5,25 @@ The suite `validation` holds it to spheres, tori and cylinders.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 from benchmarks.meshes import cylinder_patch, right_grid
+from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.surface.curvature import (
     CurvatureSeries,
     boundary_mask,
+    compare,
     curvature_change,
     curvature_error,
     curvature_series,
     mean_curvature,
+    measure,
 )
+from reference_sim import Trajectory
 
 
 def test_curvature_of_random_points_on_a_sphere_is_right_and_of_irregular_slivers_too_large():
@@ -36,6 +42,15 @@ def test_curvature_of_random_points_on_a_sphere_is_right_and_of_irregular_sliver
     inside = ((place > 0) & (place < 20)).all(axis=1)
     curvature, areas = mean_curvature(x, faces)
     assert 2.5 < np.average(curvature[inside], weights=areas[inside]) < 3.5
+
+
+def test_a_ribbon_without_interior_vertices_has_no_curvature():
+    x = np.array([[[0.1 * n, 0.0, 0.1 * side] for n in range(5) for side in (0, 1)]])
+    faces = np.array([t for n in range(0, 8, 2) for t in ((n, n + 1, n + 2), (n + 1, n + 3, n + 2))])
+    scene = SimpleNamespace(cloth=SimpleNamespace(faces=faces), warm_up=0)
+    group = SceneRollOuts(scene)
+    both = [RollOut(group, SimpleNamespace(), Trajectory(x, faces, np.zeros(1))) for _ in range(2)]
+    assert measure(both[0]) == {} and compare(*both) == {}
 
 
 def test_curvature_of_a_plane_is_zero_and_noise_gives_the_published_floor():

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import dynamics
@@ -64,6 +65,11 @@ def test_a_signal_that_starts_at_rest_is_fitted_to_the_last_digit():
     moving = 1.3 * np.interp(np.arange(FRAMES) - 2.0, np.arange(FRAMES), static)
     assert gain_and_lag(moving, static) == pytest.approx((1.3, 2.0), abs=1e-9)
     assert gain_and_lag(static, static)[1] == 0.0  # and not a round-off of it
+
+
+def test_a_hem_that_does_not_move_has_no_lag():
+    gain, lag = gain_and_lag(0.0 * TIME, np.sin(2 * np.pi * TIME))
+    assert gain == 0.0 and np.isnan(lag)
 
 
 def test_yaw_of_a_turning_hem_wherever_the_root_turns():
@@ -195,6 +201,14 @@ def test_half_of_the_dynamics_is_half_the_amplitude():
     metrics = measured(a_scene(dynamic=0.5)[2])
     assert metrics["dynamics/amplitude"] == pytest.approx(0.5, abs=0.02)
     assert metrics["dynamics/correlation"] > 0.99
+
+
+def test_solvers_of_the_references_potential_alone_share_its_quasi_static_solution():
+    shared = ("simulation", "simulation-1e-8", "simulation-dt/2", "newton-1", "fast-lbfgs-10", "xpbd-10")
+    own = ("simulation-springs", "simulation-self-contact", "snug+lbfgs-1", "handles-20-floor", "nearest-poses")
+    assert all(dynamics.shares_quasi_static(find_method(name)) for name in shared)
+    assert not any(dynamics.shares_quasi_static(find_method(name)) for name in own)
+    assert not dynamics.shares_quasi_static(MethodEntry(name="mine", description="of a user"))
 
 
 def test_a_dresser_without_memory_has_none():

@@ -205,6 +205,13 @@ def test_one_scale_serves_all_methods_of_a_scene():
     assert gap_scale(alone) is None
 
 
+@pytest.mark.parametrize("scale", [-0.5, float("nan"), 0.0])
+def test_a_reference_above_the_first_guess_has_no_scale_and_gaps_are_measured(scale):
+    scene = small_scene("hanging_sheet", cells=4)
+    x = np.array([scene.start + 0.02 * k**2 for k in range(4)])
+    assert optimality(scene, x, samples=1, scale=scale).metrics() == optimality(scene, x, samples=1).metrics()
+
+
 def test_every_judged_frame_counts_and_those_of_the_warm_up_do_not():
     scene = small_scene("hanging_sheet", cells=4)
     x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=9, start=scene.start).positions.copy()

@@ -85,6 +85,12 @@ def test_a_lost_cloth_has_no_surface():
     assert compare(roll_out(lost, COARSE[1], other_mesh=False), reference) == {}
 
 
+def test_a_cloth_that_collapsed_to_a_point_has_no_surface():
+    frames = np.repeat(in_space(COARSE[0])[None], 3, axis=0)
+    reference = roll_out(frames, COARSE[1], other_mesh=False)
+    assert compare(roll_out(0.0 * frames, COARSE[1], other_mesh=False), reference) == {}
+
+
 def test_penetration_is_measured_here_of_another_mesh_alone():
     slab = SimpleNamespace(signed_distance=lambda points, frame: points[:, 0] - 0.25)
     frames = np.repeat(in_space(COARSE[0])[None], 3, axis=0)  # x = 0, 1/4 ... 1 in equal numbers

@@ -110,6 +110,19 @@ def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, c
     assert all(f"{name}: {run.question}" in shown for name, run in RUNS.items())
 
 
+def test_a_run_that_lacks_a_picture_is_left_and_the_next_is_done(monkeypatch, capsys):
+    done = []
+
+    def without_picture(name, *_):
+        done.append(name)
+        raise PublishError(f"{name}/figures/none.png: not there, and the documents show it")
+
+    monkeypatch.setattr(command, "commit", lambda: "abc")
+    monkeypatch.setattr(command, "publish", without_picture)
+    assert command.main(["quick", "shapes"]) == 1 and done == ["quick", "shapes"]
+    assert "quick: quick/figures/none.png: not there" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_parts_are_merged_reported_and_kept(tmp_path):
     parts = {"one": FALL + "simulation,newton-1", "two": FALL + "newton-2"}

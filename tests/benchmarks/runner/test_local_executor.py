@@ -7,10 +7,12 @@ import os
 import signal
 import time
 
+import pytest
+
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import task_process
 from benchmarks.runner.local_executor import LocalExecutor
-from benchmarks.tasks.task import Outcome, Task
+from benchmarks.tasks.task import Outcome, RunStopped, Task
 from tests.benchmarks.runner.tasks_by_hand import Bar
 from tests.project.own_memory import needs_proc, own_memory
 
@@ -50,6 +52,8 @@ class Add(Task):
             os.kill(os.getpid(), signal.SIGKILL)
         if self.how == "hang":
             signal.pause()
+        if self.how == "stop":
+            raise RunStopped("the disk is full")
         if self.how == "fill":
             pieces: list = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
             HELD.append(bytearray(50_000))  # while it is there the heap does not shrink by itself
@@ -103,6 +107,15 @@ def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
     outcomes, _ = together(tmp_path, batch, [add("three")])
     assert outcomes["two"].result["memo"] == ["one", "two"] and outcomes["three"].result["memo"] == ["three"]
     assert outcomes["bad"].failed and outcomes["four"].result["memo"] == ["one", "two", "bad", "four"]
+
+
+def test_what_was_finished_is_kept_where_the_run_stops(tmp_path):
+    batches = [([add("one"), add("stops", how="stop"), add("after")], {})]
+    executor, kept = LocalExecutor(RunFolder(tmp_path), None, 1), []
+    with pytest.raises(RunStopped, match="the disk is full"):
+        for task, _ in executor.together(lambda: batches.pop() if batches else None, Bar()):
+            kept.append(task.name)
+    assert kept == ["one"]
 
 
 @needs_proc
