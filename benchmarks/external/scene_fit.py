@@ -30,7 +30,16 @@ SIZE_RATIO = 2.0  # times as large, or as small, as the cloth a first frame may 
 LONGEST_STRETCH = (
     3.0  # times as long as at rest, edges in the mean: then they join vertices that are no neighbours
 )
-RATE_TOLERANCE = 1e-6  # of a frame rate
+RATE_TOLERANCE = 1e-4  # of a frame rate: people write it with some digits
+TURNED = 0.1  # of the cloth's diagonal: nearer than that it is not asked whether other axes fit better
+# What a file's x and z may be where they are not the world's, with the matrix that mends them.
+MIRRORS = {
+    "mirrored in x": ((-1, 0), (0, 1)),
+    "mirrored in z": ((1, 0), (0, -1)),
+    "turned by 180 degrees about y": ((-1, 0), (0, -1)),
+    "turned by 90 degrees about y": ((0, 1), (-1, 0)),
+    "turned by -90 degrees about y": ((0, -1), (1, 0)),
+}
 
 
 def fit_to_scene(
@@ -68,6 +77,7 @@ def fit_to_scene(
     if stored.quasi_static is not None:
         held = to_metres_y_up(stored.quasi_static, units=stated.units, up=stated.up)
         in_metres = replace(in_metres, quasi_static=held)
+    order = None
     if stated.other_mesh:
         changes.append(f"another mesh of {count} vertices: surfaces are compared alone")
     else:
@@ -78,6 +88,12 @@ def fit_to_scene(
     timed, change = _retimed(in_metres, scene, stated)
     if change:
         changes.append(change)
+    if order is None and not stated.other_mesh:
+        _check_sides(timed.positions[0], expected[0], "its first frame")
+    frames = min(len(timed.positions), len(expected))
+    if frames > 1:
+        centres = [each[:frames].mean(axis=1) for each in (timed.positions, expected)]
+        _check_sides(*centres, "its way")
     _check_place(timed.positions, expected)
     return timed, tuple(changes)
 
@@ -148,6 +164,33 @@ def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: FileConvent
         raise RollOutFileError(
             f"its first frame lies {here:.3g} m from where the scene's cloth starts: write world coordinates "
             "(not relative to the pelvis), from the scene's first frame on"
+        )
+
+
+def _check_sides(points: np.ndarray, expected: np.ndarray, what: str) -> None:
+    """Raise RollOutFileError where points (N,3) lie nearer to the expected ones mirrored, or turned about y.
+
+    Garments are alike on the left and on the right: only single points, or the way of the whole, show it.
+    """
+    whole = np.isfinite(points).all(axis=1)
+    points, expected = points[whole], expected[whole]
+
+    def apart(mended: np.ndarray) -> float:
+        return float(np.median(np.linalg.norm(mended - expected, axis=1)))
+
+    def mend(factors: tuple[tuple[int, int], tuple[int, int]]) -> np.ndarray:
+        mended = points.copy()
+        mended[:, [0, 2]] = points[:, [0, 2]] @ np.array(factors, dtype=float).T
+        return mended
+
+    here = apart(points)
+    if not len(points) or here < TURNED * _diagonal(expected):
+        return
+    there, name = min((apart(mend(factors)), name) for name, factors in MIRRORS.items())
+    if there < BETTER_FIT * here:
+        raise RollOutFileError(
+            f"{what} lies {here:.2g} m from where the scene has it, and {there:.2g} m if it is {name}: write "
+            "the world's x, y, z of the scene's files (right-handed, y up)"
         )
 
 

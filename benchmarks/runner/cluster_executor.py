@@ -63,7 +63,7 @@ class ClusterExecutor(LocalExecutor):
         self._client = connect(address, seconds=PATIENCE)
         self._path = str(folder.path.resolve())
         self._assets_file = folder.path / f".assets-{uuid.uuid4().hex}.part"  # see RunFolder.remove_parts
-        self._threads: dict[str, int] = {}
+        self._threads: dict[str, int] = dict(self._client.nthreads())
         self._unfit: dict[str, str] = {}  # address -> why the worker can do no task
         self._at_work: dict[Future, _Batch] = {}
         self._waiting: deque[_Batch] = deque()
@@ -94,6 +94,11 @@ class ClusterExecutor(LocalExecutor):
         super().close()
         self._client.close()
         self._assets_file.unlink(missing_ok=True)
+
+    @property
+    def side_by_side(self) -> int:
+        """As many untimed tasks as the cluster has threads."""
+        return max(1, sum(self._threads.values()))
 
     def _open(self) -> None:
         """Let workers begin with the run, and end what a command that was killed has left in its folder."""

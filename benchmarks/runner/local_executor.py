@@ -1,6 +1,6 @@
 """Executor of tasks on this machine. cluster_executor extends it.
 
-A task that raises, hangs, or whose process dies is an outcome, not an end of the run.
+A task that raises, exceeds its deadline if it has one, or whose process dies is an outcome, not an end of the run.
 """
 
 from __future__ import annotations
@@ -41,6 +41,11 @@ class LocalExecutor:
         self._named: dict[str, IsolatedProcess] = {}
         self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
         self._crew: list[TaskProcess] = []
+
+    @property
+    def side_by_side(self) -> int:
+        """As many untimed tasks as are expected to be at work at once."""
+        return self.workers
 
     def together(self, ready: Ready, bar: tqdm) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work and none is ready.

@@ -78,7 +78,7 @@ class Runner:
             if self._is_ready([task]):
                 self.decide(task)
         expected = sum(task.expected_seconds for task in tasks if task.id not in self.outcomes)
-        with _bar(tasks, expected, executor.workers) as bar:
+        with _bar(tasks, expected, executor.side_by_side) as bar:
             waiting, left = [*_batches(tasks), *_batches(later)], deque(tasks)
 
             def ready() -> Batch | None:
@@ -90,7 +90,7 @@ class Runner:
                     if self._is_ready(batch):
                         waiting.remove(batch)
                         if wanted := [task for task in batch if self.decide(task)]:
-                            if executor.workers > 1 and len(wanted) > 1 and not waiting:
+                            if executor.side_by_side > 1 and len(wanted) > 1 and not waiting:
                                 half = (len(wanted) + 1) // 2  # of the last batch: the others would wait
                                 wanted, rest = wanted[:half], wanted[half:]
                                 waiting.append(rest)

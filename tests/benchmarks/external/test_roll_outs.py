@@ -15,6 +15,7 @@ from benchmarks.external.roll_out_option import (
     RollOutFileError,
     RollOutOption,
 )
+from benchmarks.external.scene_fit import MIRRORS, _check_sides
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
@@ -165,6 +166,8 @@ WRONG = {
     "twice the frames": (np.repeat(X, 2, axis=0)[1:], None, {}, "give --fps 60"),
     "feet": (X / 0.3048, FACES, {}, "write metres"),
     "elsewhere": (X + np.array([0.0, 1.0, 0.0]), FACES, {}, "world coordinates"),
+    "mirrored": (X * [-1.0, 1.0, 1.0], FACES, {}, "m if it is mirrored in x: write the world's x, y, z"),
+    "half a turn": (X * [-1.0, 1.0, -1.0], FACES, {}, "turned by 180 degrees about y"),
     "no start": (np.where(TIME == 0.0, np.nan, X), FACES, {}, "is not finite"),
 }
 
@@ -188,6 +191,19 @@ def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
         ours, theirs = ([*of[name][:2], *dict(of[name].moved).values()] if isinstance(of[name], Estimate)
                         else of[name] for of in (metrics, expected))  # fmt: skip
         np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", MIRRORS)
+def test_a_way_that_is_mirrored_or_turned_is_refused_and_one_that_lags_or_explodes_is_not(name):
+    time = np.linspace(0.0, 1.0, 40)[:, None]
+    expected = np.hstack([time, 0.9 + 0.0 * time, 0.3 + time**2])
+    turned = expected.copy()
+    turned[:, [0, 2]] = expected[:, [0, 2]] @ np.array(MIRRORS[name], dtype=float)
+    with pytest.raises(RollOutFileError, match=f"its way lies .* {name}"):
+        _check_sides(turned, expected, "its way")
+    late = np.roll(expected, 5, axis=0)
+    late[30:] *= [1e9, -1e9, np.inf]
+    _check_sides(late, expected, "its way")
 
 
 CENTRES, THIRDS = thirds(X, FACES)

@@ -68,7 +68,7 @@ class Bar:
 class InProcess:
     """An executor that does everything here: the seam behind which a cluster could stand."""
 
-    workers = 1
+    side_by_side = 1
 
     def __init__(self, folder: RunFolder, assets: Assets | None = None) -> None:
         self.folder, self.assets = folder, assets
