@@ -25,7 +25,7 @@ EXAMPLES = """examples:
   python -m benchmarks.check mine.py my_scene.py
   python -m benchmarks.check mine.py --seconds 300
   python -m benchmarks.check mine.py --scene tshirt/kick --preset smoke    methods in a scene of that size
-  python -m benchmarks.check mine.py --scene dress/kick --garment dress.obj
+  python -m benchmarks.check mine.py --scene shirt/kick --garment shirt.obj
 
 exit status: 0 when nothing is wrong; 1 when something is, a line for each; 2 when a file cannot be read."""
 

@@ -59,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         chosen = ["--scene", options.scene, *scene_arguments(options)]
         score = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
+        score = "" if plan.scenes[0].networks_only else score
         simulation = find_method("simulation").make(models=folder, seed=0) if options.reference else None
         write_scene(
             folder, plan.scenes[0], scene, preset=plan.preset.name, score=score, simulation=simulation
@@ -77,7 +78,8 @@ def scene_arguments(options: argparse.Namespace) -> list[str]:
             continue
         values = value if isinstance(value, list) else [value]
         for each in values:
-            arguments += [f"--{name.replace('_', '-')}", *([] if each is True else [str(each)])]
+            # With "=", a value that begins with a hyphen is not taken for another option.
+            arguments.append(f"--{name.replace('_', '-')}" + ("" if each is True else f"={each}"))
     return arguments
 
 

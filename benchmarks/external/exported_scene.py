@@ -26,7 +26,7 @@ def write_scene(
         declared: the entry of the scene.
         scene: the same scene, built.
         preset: the name of the preset whose sizes it has.
-        score: the command that scores a roll-out of it.
+        score: the command that scores a roll-out of it; empty: none does.
         simulation: the method whose trajectory is written too; None: none.
 
     Raises:
@@ -67,7 +67,8 @@ def readme(scene: BuiltScene, facts: dict[str, Any], files: FileList, score: str
     """Return the text of README.txt: content, units and order of each file, and how to be scored."""
     width = max(len(name) for name, _ in files)
     listed = [f"  {name:<{width}}  {content}" for name, content in files]
-    rate, warm = f"{facts['fps']:g}", facts["warm_up_frames"]
+    # All digits: a roll-out is held to the scene's rate.
+    rate, warm = np.format_float_positional(facts["fps"], trim="-"), facts["warm_up_frames"]
     lines = [
         f"Scene {scene.name}, preset {facts['preset']}: {facts['description']}.",
         "",
@@ -85,7 +86,8 @@ def readme(scene: BuiltScene, facts: dict[str, Any], files: FileList, score: str
     ]
     if facts["before"]:
         lines += [
-            f"The motion is a part: {facts['before']} frames came before it; the start has their velocities.",
+            f"The motion is a part: the {facts['before']} frames before it are poses_before and trans_before",
+            "of motion_smpl.npz; the start has the velocities with which a simulation of them ends.",
             "",
         ]
     if scene.dressed is not None:
@@ -97,6 +99,9 @@ def readme(scene: BuiltScene, facts: dict[str, Any], files: FileList, score: str
             f"those whose centroid at rest lies within {facts['contact_region_m']} m of the sample's.",
             "",
         ]
+    if not score:
+        lines.append("The scene is for networks of benchmarks.run alone: no roll-out of a file is scored.")
+        return "\n".join(lines) + "\n"
     lines += [
         "Write positions (T,V,3) of all frames, the start included, as mine.npz:",
         f"  numpy.savez('mine.npz', positions=positions, fps={rate})",

@@ -89,9 +89,14 @@ def parse_roll_out(text: str) -> RollOutOption:
         raise RollOutFileError(f"--rollout {text}: give NAME=FILE, with ,units=cm and the like behind it")
     fields: dict[str, Any] = {}
     for pair in pairs:
-        key, _, value = (part.strip() for part in pair.partition("="))
-        if key not in _WORDS:
-            raise RollOutFileError(f"--rollout {text}: unknown word '{key}'; there are {', '.join(_WORDS)}")
+        key, equals, value = (part.strip() for part in pair.partition("="))
+        if key not in (known := (*_WORDS, *_FLAGS)):
+            raise RollOutFileError(f"--rollout {text}: unknown word '{key}'; there are {', '.join(known)}")
+        if key in _FLAGS:
+            if equals:
+                raise RollOutFileError(f"--rollout {text}: {key} takes no value: say it, or leave it out")
+            fields[_FLAGS[key]] = True
+            continue
         field, convert = _WORDS[key]
         try:
             fields[field] = convert(value)
@@ -105,7 +110,6 @@ _WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {
     "units": ("units", str),
     "up": ("up", str),
     "fps": ("fps", float),
-    "match-vertices": ("match_vertices", lambda value: True),
-    "other-mesh": ("other_mesh", lambda value: True),
     "ms": ("declared_ms", float),
 }
+_FLAGS = {"match-vertices": "match_vertices", "other-mesh": "other_mesh"}  # words without a value

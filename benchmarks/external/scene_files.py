@@ -109,9 +109,13 @@ def write_motion(part: Path, worn: Dressed) -> FileList:
     joints = body.joints(worn.betas)
     betas = np.zeros(body.shape_count) if worn.betas is None else np.asarray(worn.betas)
     frames = motion.frames
+    earlier: dict[str, Any] = {}
+    if (before := worn.before) is not None:
+        earlier["poses_before"] = before.poses.reshape(before.frames, -1)
+        earlier["trans_before"] = before.translations
     np.savez(
         part / "motion_smpl.npz", poses=motion.poses.reshape(frames, -1), trans=motion.translations,
-        betas=betas, fps=motion.fps,
+        betas=betas, fps=motion.fps, **earlier,
     )  # fmt: skip
     from snug.body.skeleton import axis_angles, rotation_matrices
 
@@ -131,8 +135,10 @@ def write_motion(part: Path, worn: Dressed) -> FileList:
         transforms=body.transforms(motion.poses, motion.translations, worn.betas),
         **loops,
     )  # fmt: skip
+    content = "poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up"
+    content += "; poses_before, trans_before, the motion until then" * bool(earlier)
     return [
-        ("motion_smpl.npz", "poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up"),
+        ("motion_smpl.npz", content),
         ("motion_amass.npz", "the same as AMASS writes it: poses (T,156), z up, fingers at rest"),
         (
             "skinning.npz",

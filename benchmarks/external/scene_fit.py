@@ -92,8 +92,7 @@ def fit_to_scene(
         _check_sides(timed.positions[0], expected[0], "its first frame")
     frames = min(len(timed.positions), len(expected))
     if frames > 1:
-        centres = [each[:frames].mean(axis=1) for each in (timed.positions, expected)]
-        _check_sides(*centres, "its way")
+        _check_sides(timed.positions[:frames].mean(axis=1), expected[:frames].mean(axis=1), "its way")
     _check_place(timed.positions, expected)
     return timed, tuple(changes)
 

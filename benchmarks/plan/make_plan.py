@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -14,6 +15,7 @@ from benchmarks.method import installed
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.plan import user_files
 from benchmarks.plan.choose_cells import Selection, choose_cells, choose_suites, names_no_motion
+from benchmarks.plan.motion_files import list_motion_files
 from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Motions, Plan, PlanError
 from benchmarks.plan.request import Request
@@ -26,7 +28,9 @@ from reference_sim.files.atomic_files import demand_writable_folder
 from snug.garments.options import GarmentFile
 
 if TYPE_CHECKING:
+    from benchmarks.assets.inputs import UserBody
     from benchmarks.fabrics.fabric import Fabric
+    from benchmarks.scene import Scene
     from benchmarks.validation.case import Case
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
@@ -55,7 +59,8 @@ def make_plan(request: Request) -> Plan:
     user_scenes = [*request.further_scenes, *user_scenes]
     if request.garment:
         check_garment_name(request.garment)
-    inputs = read_inputs(request.body, request.garment, request.motions, request.motion_options)
+    motion_files, remarks = list_motion_files(request.motions)
+    inputs = read_inputs(request.body, request.garment, motion_files, request.motion_options)
     motions, named = Motions(), (request.motions, request.test_motions, request.validation_motions)
     if any(named) or not names_no_motion(scenes, user_scenes):
         motions = split_motions(
@@ -76,9 +81,10 @@ def make_plan(request: Request) -> Plan:
             one_scene=request.one_scene, **tests_of_fabrics(request, suites),
         )
     )  # fmt: skip
+    check_body_shapes(inputs.body, [cell.scene for cell in cells])
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
     asked |= {SUITE} if microbenchmarks else set()
-    return Plan(
+    plan = Plan(
         preset=request.preset,
         suites=tuple(suite for suite in suites if suite in asked),
         cells=cells,
@@ -94,9 +100,12 @@ def make_plan(request: Request) -> Plan:
         fresh=request.fresh,
         workers=workers,
         scheduler=request.scheduler,
-        trained=check_trained(request),
+        trained=check_trained(request, folder),
         command=request.command,
     )
+    for remark in remarks:
+        print(remark, file=sys.stderr)
+    return plan
 
 
 def tests_of_fabrics(request: Request, suites: Sequence[str]) -> dict[str, Any]:
@@ -148,6 +157,20 @@ def check_garment_name(file: GarmentFile) -> None:
         )
 
 
+def check_body_shapes(user_body: UserBody | None, scenes: Sequence[Scene]) -> None:
+    """Raise PlanError for a user's body with fewer shapes than a scene of the project sets."""
+    if user_body is None:
+        return
+    count = user_body.body.shape_count
+    for scene in scenes:
+        needed = 0 if scene.declared_in else len(scene.options.get("betas", ()))
+        if needed > count:
+            raise PlanError(
+                f"--body {user_body.path}: has {count} body shapes (array 'shapedirs'), scene {scene.name} "
+                f"needs {needed}: give a body with as many, or name other scenes by --scenes"
+            )
+
+
 def scenes_of_file(file: GarmentFile) -> GarmentScenes:
     """Return the scenes of a user's garment, which take the place of the T-shirt's."""
     return GarmentScenes(file.name, f"a garment of {file.path.name}")
@@ -189,12 +212,18 @@ def check_device(device: str) -> None:
         find_device(device)
 
 
-def check_trained(request: Request) -> Path | None:
-    """Return the folder of pretrained networks, None without one. Raises PlanError where it is no folder."""
+def check_trained(request: Request, folder: Path) -> Path | None:
+    """Return the folder of pretrained networks, None without one.
+
+    Raises:
+        PlanError: it is no folder, or the run's own, where networks of another training are removed.
+    """
     if request.trained is None:
         return None
     if not request.trained.is_dir():
         raise PlanError(f"--trained {request.trained}: no such folder; without DIR the package's are taken")
+    if request.trained.resolve() == folder.resolve():
+        raise PlanError(f"--trained {request.trained}: the folder of this run itself: give another by --out")
     if request.scheduler:
         raise PlanError("--trained: its files lie on this machine alone; leave out --scheduler")
     return request.trained

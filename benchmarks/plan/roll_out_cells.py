@@ -32,7 +32,10 @@ def roll_out_cells(roll_outs: Sequence[RollOutOption], cells: Sequence[Cell]) ->
     stored: list[Cell] = []
     for option in roll_outs:
         if option.name in taken:
-            raise PlanError(f"--rollout {option.name}: a method has that name; give another")
+            raise PlanError(
+                f"{option.path}: a method is called {option.name}: give another name, by --rollout NAME=FILE "
+                "or by --name of benchmarks.score"
+            )
         taken.add(option.name)
         if len(scenes) != 1 and not option.places:
             raise PlanError(

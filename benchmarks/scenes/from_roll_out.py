@@ -5,10 +5,13 @@ So the pickles of HOOD and ContourCraft are judged, which name neither a motion 
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
 from benchmarks.external.roll_out_files import read_rest_mesh, read_roll_out
 from benchmarks.external.roll_out_option import RollOutFileError, RollOutOption
+from benchmarks.external.scene_fit import LONGEST_STRETCH
 from benchmarks.fingerprint.digest import digest
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth, MeshError
@@ -17,17 +20,25 @@ from reference_sim.energies.contact_penalty.definition import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
-from reference_sim.files.mesh_files import METRES, to_metres_y_up
+from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
+UPRIGHT = 1.5  # times its height a body that stands or sits is wide at most, with its arms out
 MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 
 def declared(option: RollOutOption, rest_mesh: str) -> Scene:
-    """Declare the scene of that roll-out. Raises RollOutFileError for an unreadable file, or half a body."""
+    """Declare the scene of that roll-out.
+
+    A line on standard error names an obstacle that is longer than high. It is not refused: a body that lies
+    has the extents of one that stands in a file with another up axis.
+
+    Raises:
+        RollOutFileError: an unreadable file, or half a body.
+    """
     stated, stored = option.stated, read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
     gone = [name for name, half in halves.items() if half is None]
@@ -36,6 +47,16 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
             f"{option.path}: holds half a body: {gone[0]} is absent; give obstacle (T,B,3) and "
             "obstacle_faces (G,3), or neither"
         )
+    if stored.obstacle is not None:
+        extents = np.ptp(to_metres_y_up(stored.obstacle, up=stated.up), axis=1).mean(axis=0)
+        height, length = extents[1], extents.max()
+        if length > UPRIGHT * height:
+            (other,) = {*UP_AXES} - {stated.up}
+            print(
+                f"{option.path}: with --up {stated.up} the obstacle is {height:.3g} {stated.units} high and "
+                f"{length:.3g} {stated.units} long: if it is a body that stands, give --up {other}",
+                file=sys.stderr,
+            )
     return Scene(
         name=f"file/{option.name}",
         description=f"the cloth and the body of {option.name}'s own roll-out",
@@ -65,6 +86,12 @@ def build(
                 "mesh that the roll-out was made with"
             )
         cloth = Cloth(to_metres_y_up(rest.positions, units=units, up=up), rest.faces, Material())
+        stretch = _mean_edge(cloth, positions[0]) / _mean_edge(cloth, cloth.rest_positions)
+        if stretch > LONGEST_STRETCH or stretch < 1.0 / LONGEST_STRETCH:
+            raise RollOutFileError(
+                f"{rest_mesh}: in the first frame of {path} its edges have {stretch:.3g} times their length: "
+                "write both in one unit and order of vertices"
+            )
         _demand_a_size(cloth.rest_positions, rest_mesh, units)
         obstacle = None
         if stored.obstacle is not None and stored.obstacle_faces is not None:  # cloth may touch all of it
@@ -81,6 +108,12 @@ def build(
         settle=lambda: np.ascontiguousarray(positions[0]),
         obstacle=obstacle,
     )
+
+
+def _mean_edge(cloth: Cloth, positions: np.ndarray) -> float:
+    """Return the mean length of the cloth's edges at positions (V,3)."""
+    ends = positions[cloth.edges]
+    return float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean())
 
 
 def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> None:

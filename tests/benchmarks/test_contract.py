@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,11 +17,13 @@ from benchmarks.contract.check_method import CheckMethod
 from benchmarks.contract.check_scene import check_derivatives
 from benchmarks.contract.findings import Findings
 from benchmarks.method import Method, MethodEntry
+from benchmarks.plan.make_plan import check_garment_name
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.task import Context
 from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring
+from snug.garments.options import GarmentFile
 from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
 
@@ -226,8 +230,10 @@ def judge(roll_out, values):
 
 BOUND_FILE = """import numpy as np
 from benchmarks.method import Method, MethodEntry
+from benchmarks.plan.make_plan import check_garment_name
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring
+from snug.garments.options import GarmentFile
 
 METHODS = (MethodEntry(name="bound", label="Bound", description="", role="solver"),)
 
@@ -318,3 +324,10 @@ def test_the_command_refuses_in_one_line(word, message, tmp_path, monkeypatch, r
     (tmp_path / "empty.py").write_text("")
     monkeypatch.chdir(tmp_path)
     refused(message, check.main, [word])
+
+
+def test_garments_of_the_examples_have_names_that_a_file_can_have():
+    named = re.findall(r"--scene (\w+)/\S+ --garment (\S+)", check.EXAMPLES)
+    assert [scene for scene, _ in named] == [Path(file).stem for _, file in named] != []
+    for _, file in named:
+        check_garment_name(GarmentFile(path=Path(file)))

@@ -62,7 +62,7 @@ SECTIONS = sections(EXTEND.read_text(encoding="utf-8"))
 @pytest.fixture(scope="module")
 def user(tmp_path_factory) -> Path:
     """A user's folder with every file of the document and every example."""
-    folder = tmp_path_factory.mktemp("user")
+    folder = tmp_path_factory.mktemp("a user")  # paths may have spaces
     for path in EXAMPLES.glob("*.py"):
         (folder / path.name).write_bytes(path.read_bytes())
     for section in SECTIONS.values():

@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from benchmarks import export
-from benchmarks.external.exported_scene import write_scene
+from benchmarks import export, score
+from benchmarks.external.exported_scene import readme, write_scene
 from benchmarks.external.roll_out_option import FileConventions, RollOutOption
-from benchmarks.external.scene_files import write_obj
+from benchmarks.external.scene_files import facts_of, write_motion, write_obj
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.energies.energy import energy_series
 from benchmarks.metrics.surface.curvature import curvature_series
+from benchmarks.scene import Dressed
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from snug.motion.files import read_motion
 from snug.motion.options import MotionFileOptions
 from snug.networks.dressed_body import DressedBody
-from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene
+from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, small_scene
 from tests.snug.training.dressing import swaying, tube_dress
 
 
@@ -204,3 +206,43 @@ def test_scenes_without_a_body_are_exported_too(tmp_path, capsys):
     assert export.main(["flags", "--preset", "smoke", "-o", str(tmp_path / "other")]) == 2
     assert [path.name for path in tmp_path.iterdir()] == ["flag"]
     assert capsys.readouterr().err.count("\n") == 2
+
+
+def test_the_command_that_scores_it_takes_back_every_option():
+    options = ["--garment=b.obj", "--garment-shift=-0.1,0,0", "--garment-up", "z", "--self-contact"]
+    options += ["--motions", "clips", "--motions=-c", "--test-motions", "a", "--frames", "40"]
+    given = export.make_export_parser().parse_args(["b/a", "-o", "out", *options])
+    words = ["mine.npz", "--scene", given.scene, *export.scene_arguments(given)]
+    taken = vars(score.make_parser().parse_args(words))
+    kept = {name: value for name, value in vars(given).items() if name not in ("out", "reference")}
+    assert given.garment_shift == "-0.1,0,0" and kept.items() <= taken.items()
+
+
+@pytest.mark.parametrize("step", [1.0 / 30.0, 0.006])
+def test_the_rate_that_the_readme_names_is_that_of_the_scene(step, tmp_path):
+    scene = dataclasses.replace(small_scene("hanging_sheet", cells=2, frames=3), dt=step)
+    facts = facts_of(scene) | {"preset": "smoke", "description": "a sheet"}
+    text = readme(scene, facts, [("cloth.npz", "arrays")], "python -m benchmarks.score mine.npz")
+    stated = re.search(r"numpy\.savez\(.* fps=(\S+)\)", text)[1]
+    assert float(stated) == 1.0 / step and (step == 0.006 or stated == "30")
+
+
+def test_of_a_scene_for_networks_alone_nothing_is_said_to_be_scored(tmp_path, capsys):
+    options = ["--preset", "smoke", "-o", str(tmp_path / "long")]
+    assert export.main(["out_of_distribution/long", *options]) == 0
+    text = (tmp_path / "long" / "README.txt").read_text()
+    assert "benchmarks.score" not in text and "for networks of benchmarks.run alone" in text
+    assert (tmp_path / "long" / "motion_smpl.npz").is_file()
+
+
+def test_of_a_part_of_a_motion_the_frames_before_it_are_exported(tmp_path):
+    tube, motion = tube_dress(), swaying(20)
+    part, before = motion.cut(8, 20), motion.cut(0, 8)
+    write_motion(tmp_path, Dressed(tube.body, tube.garment, part, before=before))
+    held = arrays(tmp_path / "motion_smpl.npz")
+    whole = np.concatenate([held["poses_before"], held["poses"]])
+    assert np.array_equal(whole, motion.poses.reshape(20, -1))
+    assert np.array_equal(np.concatenate([held["trans_before"], held["trans"]]), motion.translations)
+    listed = dict(write_motion(tmp_path, Dressed(tube.body, tube.garment, motion)))
+    assert "poses_before" not in arrays(tmp_path / "motion_smpl.npz")
+    assert "poses_before" not in listed["motion_smpl.npz"]

@@ -25,7 +25,9 @@ def test_an_option_says_everything_of_a_roll_out():
     ("text", "hint"),
     [("mine", "NAME=FILE"), ("=a.npz", "NAME=FILE"), ("a b=a.npz", "letters"), ("m=a.npz,x", "unknown word"),
      ("m=a.npz,units=inch", "choose from m, cm, mm"), ("m=a.npz,fps=fast", "no number"),
-     ("m=a.npz,fps=-1", "positive"), ("m=a.npz,ms=0", "positive")],
+     ("m=a.npz,fps=-1", "positive"), ("m=a.npz,ms=0", "positive"),
+     ("m=a.npz,match-vertices=false", "match-vertices takes no value"),
+     ("m=a.npz,other-mesh=", "other-mesh takes no value")],
 )  # fmt: skip
 def test_a_wrong_option_is_one_line(text, hint):
     with pytest.raises(RollOutFileError, match=hint) as refused:

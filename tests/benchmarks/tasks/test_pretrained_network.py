@@ -172,9 +172,11 @@ def test_the_option_takes_the_package_or_a_folder(tmp_path):
     assert folder() is None and folder("--trained") == trained.FOLDER
     assert folder("--trained", str(tmp_path)) == tmp_path
     with pytest.raises(PlanError, match="no such folder"):
-        check_trained(Request(trained=tmp_path / "none"))
+        check_trained(Request(trained=tmp_path / "none"), tmp_path / "run")
     with pytest.raises(PlanError, match="leave out --scheduler"):
-        check_trained(Request(trained=tmp_path, scheduler="tcp://there"))
+        check_trained(Request(trained=tmp_path, scheduler="tcp://there"), tmp_path / "run")
+    with pytest.raises(PlanError, match="the folder of this run itself: give another by --out"):
+        check_trained(Request(trained=tmp_path), tmp_path / "deeper" / "..")
 
 
 def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp_path, monkeypatch, capsys):
