@@ -284,8 +284,11 @@ def faults_of_scores(entry: Entry) -> Iterator[str]:
         return
     if (number := (config.get("protocol") or {}).get("number")) != NUMBER:
         yield f"{entry.scores.path}: scores of protocol {number}, this is {NUMBER}: score with --replace"
-    for name in entry.scores.changed(config):
+    changed = list(entry.scores.changed(config))
+    for name in changed:
         yield f"{entry.scores.path / name}: is not as it was written: score with --replace"
+    if not changed and entry.name not in {row.method for row in entry.scores.read_rows()}:
+        yield f"{entry.scores.path}: no scores of '{entry.name}': give the folder its name, or score with --replace"
     metadata, before = json.loads(json.dumps(asdict(entry.metadata))), config.get("metadata") or {}
     for name in metadata:
         if metadata[name] != before.get(name):

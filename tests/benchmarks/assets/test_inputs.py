@@ -30,15 +30,18 @@ class Openings:
             self.count[Path(str(arguments[0])).name] += 1
 
 
-OPENINGS = Openings()
+@pytest.fixture(scope="module")
+def hook():
+    """One for these tests: it is asked at every opening of the process from here on."""
+    return Openings()
 
 
 @pytest.fixture
-def openings(tmp_path):
-    OPENINGS.folder = str(tmp_path / "mine")
-    OPENINGS.count.clear()
-    yield OPENINGS.count
-    OPENINGS.folder = ""
+def openings(hook, tmp_path):
+    hook.folder = str(tmp_path / "mine")
+    hook.count.clear()
+    yield hook.count
+    hook.folder = ""
 
 
 def write_motions(folder: Path, *names: str, frames: int = 12) -> str:
@@ -74,10 +77,7 @@ def test_each_file_of_a_run_is_opened_once_before_its_tasks(tmp_path, openings):
     motions = write_motions(mine / "clips", "sway")
     scenes = ["--scenes", "top/sway", "--methods", "skinning", "--suite", "garments", "--preset", "smoke"]
     options = [*scenes, "--body", body, "--garment", garment, "--motions", motions, "--test-motions", "sway"]
-    empty = planned(*options, "-o", str(tmp_path / "run"))
-    scene = empty.scenes[0].build(empty.open_assets())
-    positions = np.zeros((scene.frames, scene.cloth.vertex_count, 3))
-    np.savez(mine / "out.npz", positions=positions, faces=scene.cloth.faces)
+    np.savez(mine / "out.npz", positions=np.zeros((12, 3, 3)), faces=[[0, 1, 2]])
     openings.clear()
     options += ["--rollout", f"out={mine}/out.npz", "-o", str(tmp_path / "run")]
     plan = planned(*options)

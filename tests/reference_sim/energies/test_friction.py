@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -84,10 +85,15 @@ def simulated(scene: BuiltScene) -> Trajectory:
 SCENES = {"belt": on_a_belt, "sphere": on_a_sphere, "barrier": lambda: on_a_belt(barrier=True)}
 
 
+@functools.cache
+def scene_and_simulation(kind: str) -> tuple[BuiltScene, Trajectory]:
+    scene = SCENES[kind]()
+    return scene, simulated(scene)
+
+
 @pytest.fixture(scope="module", params=SCENES)
 def judged(request) -> tuple[BuiltScene, Trajectory]:
-    scene = SCENES[request.param]()
-    return scene, simulated(scene)
+    return scene_and_simulation(request.param)
 
 
 def another(x: np.ndarray) -> np.ndarray:
@@ -124,8 +130,7 @@ def test_energies_beside_others_are_those_of_the_trajectory_alone(judged):
 @pytest.mark.parametrize("kind", ["belt", "barrier"])
 def test_energies_on_a_plane_are_those_that_were_minimised(kind):
     """A plane is the same wherever it was searched."""
-    scene = SCENES[kind]()
-    trajectory = simulated(scene)
+    scene, trajectory = scene_and_simulation(kind)
     x = trajectory.positions
     _, series = energy_series(scene, [another(x), x])
     for term in set(scene.terms) - {"inertia"}:
