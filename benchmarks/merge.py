@@ -20,6 +20,7 @@ from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results import frame_energies
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.row import BEFORE_FRAMES, Row
+from benchmarks.results.run_config import OF_SCENES
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import read_entry
 from benchmarks.tasks.training import TrainNetwork
@@ -37,7 +38,7 @@ skipped row. Runs go on in their own folders, not in the merged one.
 exit status: 0 written; 2 the runs differ in what has to be the same, or a file is damaged: one line says
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
-SAME = ("format", "protocol", "preset", "preset_values", "split", "body", "garment")  # entries of run.json
+SAME = ("format", "protocol", "split", *OF_SCENES)  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
 # Columns that other cells of the run decide.
@@ -206,7 +207,8 @@ def joined_rows(runs: Mapping[str, Sequence[Row]], timed: frozenset[str]) -> lis
             if earlier := kept.get(key):
                 _compare(earlier, (row, where), of_a_machine=row.metric in timed)
             kind = row.metric if row.metric in BEFORE_FRAMES else row.suite
-            measured = row.metric in timed and row.value is not None
+            # A time that its author declared is of no machine.
+            measured = row.metric in timed and row.value is not None and not row.declared
             if measured and (first := machine.setdefault(kind, row.hardware)) != row.hardware:
                 reason = f"{row.value:.4g} {row.unit} on {row.hardware}; other times are of {first}"
                 row = replace(row, value=None, uncertainty=None, moved=(), status="skipped", reason=reason)

@@ -116,8 +116,8 @@ class MethodEntry:
         declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance of a
             trajectory may say it as well.
         other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are compared.
-        static_known: False of a solver whose quasi-static solution is not the simulation's, and is not returned by
-            quasi_static() either.
+        static_known: False of a solver whose quasi-static solution is not the simulation's, and that does not
+            return it either.
         left_out: reason why it is not run; empty where it runs.
         role: its place in tables and plots: `solver`, `warm-started`, `network`, `ablation`, `baseline`,
             `external`, or another of benchmarks.results.row.ROLES.

@@ -35,7 +35,8 @@ What counts as a change:
   a loss   methods, motions, seeds and metrics that A has and B has not.
 A network with one seed in common is not judged: how far another seed moves it is unknown. A metric's
 declaration says which side is worse; a metric without a better side is at most changed.
-exit status: 0 nothing is worse or gone; 1 something is; 2 a folder is no run, or the two share nothing."""
+exit status: 0 nothing is worse or gone; 1 something is; 2 a folder is no run, or the two share nothing or
+  differ in preset, sizes, body or garment."""
 
 
 @command("reports.compare")

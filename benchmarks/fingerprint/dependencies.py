@@ -146,7 +146,7 @@ def _source(path: str) -> _Source:
         file
         for base, name in imports
         if (where := tops[base.split(".")[0]]) is not None
-        for file in (*_files_behind(base, name, path, where), *(_packages_above(base, where) if where else ()))
+        for file in (*_files_behind(base, name, path, where), *_packages_above(base, where))
     )
     for node in (tree, *_statements(tree)):
         if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
@@ -213,8 +213,11 @@ def _top_of(root: str, top: str, package: list[str]) -> str | None:
 
 
 def _packages_above(base: str, top: str) -> Iterator[str]:
-    """Yield the `__init__.py` of the packages that a module below the folder `top` is imported through."""
-    parts = base.split(".")
+    """Yield the `__init__.py` of a user's packages that a module below the folder `top` is imported through.
+
+    Those of the project have names and imports on first use alone.
+    """
+    parts = base.split(".") if top else []
     for depth in range(1, len(parts)):
         path = f"{top}{'/'.join(parts[:depth])}/__init__.py"
         if (ROOT / path).is_file():

@@ -10,6 +10,8 @@ from benchmarks.results.json_file import ResultsError
 
 FORMAT = 4  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
+# Entries of run.json that make the scenes what they are: with others, two runs have no number in common.
+OF_SCENES = ("preset", "preset_values", "body", "garment")
 MOST_SECONDS = 1e12  # that a stage may say it took
 
 

@@ -1,6 +1,6 @@
 """Executor of tasks on this machine. cluster_executor extends it.
 
-A task that raises, exceeds its deadline if it has one, or whose process dies is an outcome, not an end of the run.
+A task that raises, exceeds a deadline of its own, or whose process dies is an outcome, not an end of the run.
 """
 
 from __future__ import annotations

@@ -288,7 +288,8 @@ def faults_of_scores(entry: Entry) -> Iterator[str]:
     for name in changed:
         yield f"{entry.scores.path / name}: is not as it was written: score with --replace"
     if not changed and entry.name not in {row.method for row in entry.scores.read_rows()}:
-        yield f"{entry.scores.path}: no scores of '{entry.name}': give the folder its name, or score with --replace"
+        remedy = "give the folder its old name, or score with --replace"
+        yield f"{entry.scores.path}: no scores of '{entry.name}': {remedy}"
     metadata, before = json.loads(json.dumps(asdict(entry.metadata))), config.get("metadata") or {}
     for name in metadata:
         if metadata[name] != before.get(name):

@@ -38,8 +38,8 @@ def scored(entry: Entry, *, page: bool = False) -> tuple[list[Row], dict[str, An
         Its rows and those of simulation and skinning, and what run.json says of them.
 
     Raises:
-        EntryError: the run could not be carried out, or a roll-out did not come to its last frame: the mean over
-            the other scenes would be of easier ones.
+        EntryError: the run could not be carried out, or a roll-out did not come to its last frame: the mean
+            over the other scenes would be of easier ones.
     """
     with tempfile.TemporaryDirectory(prefix="scores-") as folder:
         plan = entry.plan(Path(folder) / "run")
@@ -80,8 +80,8 @@ def scored_elsewhere(entry: Entry) -> bool:
 def tolerance_elsewhere(entry: Entry) -> Callable[[Row], float]:
     """Return the tolerances of `differences` where the scores are of another kind of processor.
 
-    There the simulation parts from the recorded one, and with it all that hangs on it. Compared are the energies
-    of the entry, and the total energies of simulation and skinning, of which its relative excess is made.
+    There the simulation parts from the recorded one, and with it all that hangs on it. Compared are the
+    energies of the entry, and the total energies of simulation and skinning, which give its relative excess.
     """
 
     def tolerance(row: Row) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import pandas as pd
 
@@ -10,7 +10,13 @@ from reports.run.finished_run import Run
 from reports.statistics.effects import RECORDING, Effect, recording_of
 from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads
 from reports.statistics.published import published_beside
-from reports.statistics.relative_excess import TOTAL, Excess, excess_of, with_relative_excess
+from reports.statistics.relative_excess import (
+    RELATIVE_EXCESS,
+    TOTAL,
+    Excess,
+    excess_of,
+    with_relative_excess,
+)
 from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, standing
 from reports.tables.number_texts import listed, number
 
@@ -28,7 +34,9 @@ def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
     excess = known[first]
     kind = "validation " if run.config.get("split") == "validation" else "unseen "
     unseen = "" if set(worn["scene"]) <= set(run.trained_on) else kind
-    count = len(excess.by_motion)
+    # Those in which skinning has an excess: a network that failed in one has a remark on it.
+    scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
+    count = len(scenes)
     beside = published_beside(run, first)
     motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
     paired = [f"; {says}" for says in _paired(run, worn, first, others)]
@@ -39,21 +47,23 @@ def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
     scale = "where the reference has 0 % and skinning alone 100 %"
     sentences = [f"On {motions} {listed(shares)}, {scale}{''.join(paired)}"]
     if count > 1:
-        means = listed([f"{run.label(name)} {number(of.mean, 2)} %" for name, of in known.items()])
-        worst = listed([f"{run.label(name)} {number(of.worst[1], 2)} %" for name, of in known.items()])
+        means = listed([f"{run.label(name)} {number(of.mean, 2)} %{of.fewer}" for name, of in known.items()])
+        worst = listed(
+            [f"{run.label(name)} {number(of.worst[1], 2)} %{of.fewer}" for name, of in known.items()]
+        )
         sentences += [
-            f"These percentages are geometric means over {_repeated(run, excess)}. Arithmetic means: "
+            f"These percentages are geometric means over {_repeated(run, scenes)}. Arithmetic means: "
             f"{means}; worst motions: {worst}",
         ]
     return [*sentences, _against_reference(run.label(first), excess)]
 
 
-def _repeated(run: Run, excess: Excess) -> str:
+def _repeated(run: Run, scenes: Collection[str]) -> str:
     """Return what the means are taken over: "motions", or how many sources of which kinds."""
-    count = excess.effect.motions
-    if count == len(excess.by_motion):
+    sources = {recording_of(scene) for scene in scenes}
+    count = len(sources)
+    if count == len(scenes):
         return "motions"
-    sources = {recording_of(scene) for scene in excess.by_motion}
     recordings = {name for name in sources if RECORDING.search(name)}
     others = sources - recordings
     origins = run.config.get("motion_sources", {})
@@ -66,9 +76,9 @@ def _repeated(run: Run, excess: Excess) -> str:
 
 
 def _share(excess: Excess) -> str:
-    """Return a relative excess as "6.1 % (95 % interval 2.3 to 14)"."""
+    """Return a relative excess as "6.1 % (95 % interval 2.3 to 14)", and of how many roll-outs if not all."""
     interval = _interval(excess.effect)
-    return f"{number(excess.typical, 2)} %{f' ({interval})' if interval else ''}"
+    return f"{number(excess.typical, 2)} %{f' ({interval})' if interval else ''}{excess.fewer}"
 
 
 def _interval(effect: Effect) -> str:
@@ -91,10 +101,12 @@ def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> li
     """Say which of these have more total energy than a method, paired by motion, and which less."""
     standings: dict[str, list[str]] = {}
     for other in others:
-        if effect := compare_methods(run, rows, run.metrics[TOTAL], one, other).effect:
+        compared = compare_methods(run, rows, run.metrics[TOTAL], one, other)
+        if (effect := compared.effect) and compared.one and compared.other:
             p = effect.p_value()
             stands = standing(effect, p)
             shown = _tested(effect, p) if stands in (LESS, MORE) and p is not None else ""
+            shown += compared.one.fewer or compared.other.fewer
             standings.setdefault(stands, []).append(f"{run.label(other)}{shown}")
     first = run.label(one)
     says = {

@@ -14,7 +14,7 @@ from reports.run.finished_run import Run
 from reports.statistics import paper_claims
 from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
 from reports.statistics.break_even import NETWORK, compared_scenes, reference_scenes
-from reports.statistics.means_and_spreads import pair, value_of
+from reports.statistics.means_and_spreads import mean_of, pair, value_of
 from reports.statistics.page_one_methods import subjects
 from reports.statistics.pareto import (
     SMALLER_STEPS,
@@ -62,10 +62,11 @@ def _distances(run: Run, rows: pd.DataFrame) -> list[str]:
     """Say how far the subjects are from the reference, for a run without skinning."""
     parts = []
     for method in subjects(run, set(rows[rows["usable"]]["method"])):
-        distance, gap = (value_of(rows, method, name) for name in (DISTANCE, GAP))
+        distance, gap = (mean_of(rows, method, name) for name in (DISTANCE, GAP))
         if distance is not None:
-            above = "" if gap is None else f", with an energy gap of {number(gap)} J"
-            parts.append(f"{run.label(method)} lies {number(distance)} mm from the reference{above}")
+            above = "" if gap is None else f", with an energy gap of {number(gap.value)} J{gap.fewer}"
+            far = f"{number(distance.value)} mm from the reference{distance.fewer}"
+            parts.append(f"{run.label(method)} lies {far}{above}")
     return ["; ".join(parts)]
 
 
@@ -79,20 +80,22 @@ def _moves(run: Run, worn: pd.DataFrame) -> list[str]:
     sentences: list[str] = []
     reference = value_of(worn, run.reference, INSIDE)
     for method in subjects(run, set(worn[worn["usable"]]["method"])):
-        swing, alike, inside = (value_of(worn, method, name) for name in (SWING, ALIKE, INSIDE))
+        swing, alike, inside = (mean_of(worn, method, name) for name in (SWING, ALIKE, INSIDE))
         if swing is not None:
+            amplitude = f"{number(100.0 * swing.value, 2)} % of the simulation's{swing.fewer}"
             sentence = (
-                f"{run.label(method)} has {_secondary_motion(swing)} secondary motion: its hem amplitude is "
-                f"{number(100.0 * swing, 2)} % of the simulation's"
+                f"{run.label(method)} has {_secondary_motion(swing.value)} secondary motion: its hem "
+                f"amplitude is {amplitude}"
             )
             scale = " (1: the same motion up to its size)" if not sentences else ""
-            correlated = "" if alike is None else f", with a correlation of {number(alike, 2)}{scale}"
+            correlated = ""
+            if alike is not None:
+                correlated = f", with a correlation of {number(alike.value, 2)}{alike.fewer}{scale}"
             sentences.append(f"{sentence}{correlated}")
         if inside is not None:
             beside = "" if reference is None else f", against {number(reference, 2)} % of the simulation's"
-            sentences.append(
-                f"{number(inside, 2)} % of the surface of {run.label(method)} lies inside the body{beside}"
-            )
+            surface = f"the surface of {run.label(method)}{inside.fewer}"
+            sentences.append(f"{number(inside.value, 2)} % of {surface} lies inside the body{beside}")
     return sentences
 
 

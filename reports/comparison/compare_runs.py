@@ -6,11 +6,13 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import Any
 
 import pandas as pd
 
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import LEVEL, one_protocol
+from benchmarks.results.run_config import OF_SCENES
 from reports.comparison.change import (
     BETTER,
     GONE,
@@ -34,6 +36,7 @@ from reports.statistics.relative_excess import relative_metric, with_relative_ex
 from reports.statistics.verdicts import effect_of, holm
 
 GROUP = ["place", "method", "metric"]
+NOT_OF_SCENES = ("name", "description", "steps")  # values of a preset that change no scene
 
 
 @dataclass(frozen=True)
@@ -69,13 +72,13 @@ def compare(
         shared: leave out what the later run lacks; otherwise it is a change for the worse.
 
     Raises:
-        ResultsError: where presets or protocols differ, of the runs or of a cell, or nothing is shared.
+        ResultsError: where protocols differ, of the runs or of a cell, or presets, sizes, body or garment, or
+            nothing is shared.
     """
     one_protocol((one.protocol, other.protocol), "A and B")
-    presets = [run.config.get("preset") for run in (one, other)]
-    if presets[0] != presets[1]:
-        raise ResultsError(f"A is of preset {presets[0]}, B of {presets[1]}: their numbers differ by design")
-    frames = [_chosen(run, methods) for run in (one, other)]
+    _demand_same_scenes(one, other)
+    cells = [_cells(run) for run in (one, other)]
+    frames = [frame[_matching(frame["method"], methods)] for frame in cells]
     ended = endings(*frames)
     of_metrics = [frame[_matching(frame["metric"], metrics)] for frame in frames]
     if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
@@ -95,17 +98,33 @@ def compare(
         raise ResultsError(
             f"{place}: of protocol {differ.iloc[0]} in A, {now} in B: another reference or scene"
         )
-    judged, compared, one_seed, once = _means(one, *kept)
+    judged, compared, one_seed, once = _means(one, *kept, basis=cells[0])
     order = (GONE, WORSE, BETTER, OTHER)
     changes = sorted([*lost, *ended, *judged], key=lambda change: order.index(change.verdict))
     return Comparison(tuple(changes), compared, one_seed, once, added)
 
 
-def _chosen(run: Run, methods: str) -> pd.DataFrame:
+def _demand_same_scenes(one: Run, other: Run) -> None:
+    """Raise ResultsError where the runs differ in what makes their scenes, of entries that both have."""
+    before, after = (_entries_of_scenes(run) for run in (one, other))
+    for name in before:
+        if name in after and before[name] != after[name]:
+            values = f"{name.replace('_', ' ')} {before[name]} in A, {after[name]} in B"
+            raise ResultsError(f"{values}: their numbers differ by design")
+
+
+def _entries_of_scenes(run: Run) -> dict[str, Any]:
+    """Return the entries OF_SCENES of a run, and the values of its preset each by its own name."""
+    entries = {name: value for name in OF_SCENES if (value := run.config.get(name)) is not None}
+    values = entries.pop("preset_values", {})
+    return entries | {name: value for name, value in values.items() if name not in NOT_OF_SCENES}
+
+
+def _cells(run: Run) -> pd.DataFrame:
     """Return each cell once, with its garment or scene, and the range of repeats as a time's uncertainty."""
     cases = run.frame[run.frame["case"] != ""].drop_duplicates(CELL)
     frame = pd.concat([run.cells(*SUITES), cases], ignore_index=True)
-    frame = frame[(frame["status"] != "skipped") & _matching(frame["method"], methods)]
+    frame = frame[frame["status"] != "skipped"]
     worn = (frame["suite"] == "garments") & (frame["garment"] != "")
     frame = frame.assign(place=frame["garment"].where(worn, frame["scene"]))
     cell = ["scene", "method", "seed"]
@@ -122,9 +141,14 @@ def _matching(names: pd.Series, patterns: str) -> pd.Series:
     return names.isin(chosen)
 
 
-def _means(run: Run, one: pd.DataFrame, other: pd.DataFrame) -> tuple[list[Change], int, int, dict[str, int]]:
-    """Return changes, number of means, of those of one seed that differ, and times taken once by method."""
-    rows = _over_the_same(*_with_known_zero(run, one, other))
+def _means(
+    run: Run, one: pd.DataFrame, other: pd.DataFrame, *, basis: pd.DataFrame
+) -> tuple[list[Change], int, int, dict[str, int]]:
+    """Return changes, number of means, of those of one seed that differ, and times taken once by method.
+
+    basis: all rows of the earlier run, whatever methods and metrics are compared.
+    """
+    rows = _over_the_same(*_with_known_zero(run, one, other, basis=basis))
     first, second = (means(frame, *GROUP).to_dict() for frame in rows)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
     known = _metrics(run)
@@ -158,15 +182,15 @@ def _means(run: Run, one: pd.DataFrame, other: pd.DataFrame) -> tuple[list[Chang
     return changes, len(first), len(differ) - len(judged), dict(once)
 
 
-def _with_known_zero(run: Run, *frames: pd.DataFrame) -> list[pd.DataFrame]:
-    """Return the frames with relative excesses by the first one's references in place of energies.
+def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> list[pd.DataFrame]:
+    """Return the frames with relative excesses by the references of the basis in place of energies.
 
-    Of energies whose zero is a choice, in scenes whose reference and skinning the first frame has.
+    Of energies whose zero is a choice, in scenes whose reference and skinning the basis has.
     """
     made = []
     for frame in frames:
         for metric in (metric for metric in run.metrics.values() if metric.arbitrary_zero):
-            frame = with_relative_excess(run, frame, metric.name, basis=frames[0])
+            frame = with_relative_excess(run, frame, metric.name, basis=basis)
             excess = frame[frame["metric"] == relative_metric(metric.name).name]
             covered = frame.set_index(CELL[:3]).index.isin(excess.set_index(CELL[:3]).index)
             frame = frame[~(covered & (frame["metric"] == metric.name))]

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.results.ensemble import spread
+from benchmarks.results.ensemble import LEAST_MEMBERS, spread
 from benchmarks.results.protocol import DRAWS, LEVEL, SEED, SOFTENING, TIE
 from reports.statistics.means_and_spreads import Mean
 
@@ -66,6 +66,8 @@ class Effect:
         unit: of a plain difference, what 1 is of: TIE of it is no difference; 0 where that is unknown.
         complete: neither mean lacks a scene or a seed.
         one_seed: whether a mean is of one seed, and nobody knows how far another would move it.
+        exact: whether no clock gave the two, so that one value each is all there is, such as the size of a
+            network.
     """
 
     value: float
@@ -82,6 +84,7 @@ class Effect:
     unit: float = 0.0
     complete: bool = True
     one_seed: bool = False
+    exact: bool = False
 
     @property
     def shown(self) -> float:
@@ -90,7 +93,10 @@ class Effect:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Interval of 95 % of this comparison alone, or the range of a cost; None where nothing repeats."""
+        """Interval of 95 % of this comparison alone, or the range of a cost; None where nothing repeats.
+
+        Of points it is `ends` with the mean nearer to 0 held, though that mean is uncertain too.
+        """
         ends = self.ends
         return None if ends is None else (self._shown(ends[0]), self._shown(ends[1]))
 
@@ -197,10 +203,11 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
     )
 
 
-def cost_effect(one: Mean, other: Mean) -> Effect:
+def cost_effect(one: Mean, other: Mean, *, exact: bool = False) -> Effect:
     """Compute the effect between two costs: the ratio, and its range over motions and seeds, no interval.
 
     A run time depends on the machine and on the motion, not on chance that another draw would repeat.
+    exact: see Effect.
     """
     scale = RATIO if _positive(one) and _positive(other) else DIFFERENCE
     apart = [
@@ -211,7 +218,7 @@ def cost_effect(one: Mean, other: Mean) -> Effect:
     ]
     far = effect(one, other, scale)
     limits = (min(apart), max(apart)) if min(apart) < max(apart) else None
-    return replace(far, error=None, limits=limits, covers=RANGE)
+    return replace(far, error=None, limits=limits, covers=RANGE, exact=exact)
 
 
 def _positive(mean: Mean) -> bool:
@@ -226,14 +233,17 @@ def _one_seed(mean: Mean, beside: Mean) -> bool:
 def _over_ensemble(one: Mean, other: Mean, scale: str) -> float:
     """Return the standard deviation of the effect's value over the reference and its ensemble, on the scale.
 
-    Each member takes the reference's place in every scene at once. Where single changes are unknown, as
-    between two runs with ensembles of their own, both uncertainties add up as independent ones.
+    Each member takes the reference's place in every scene at once, so only members that converged in all of
+    them count. Where fewer than LEAST_MEMBERS did, or single changes are unknown, as between two runs with
+    ensembles of their own, both uncertainties add up as independent ones.
     """
-    parts = [mean.moved and mean.moved.keys() >= mean.cells.keys() for mean in (one, other)]
-    if not any(parts):
+    in_scenes = [
+        mean.moved.get(cell, {}).keys() for mean in (one, other) if mean.moved for cell in mean.cells
+    ]
+    names = set.intersection(*map(set, in_scenes)) if in_scenes else set()
+    if len(names) < LEAST_MEMBERS:
         slopes = [_slope(mean, scale) for mean in (one, other)]
         return math.hypot(*(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other))))
-    names = {name for mean in (one, other) for changes in mean.moved.values() for name in changes}
     changes = [_moved_by(one, name, scale) - _moved_by(other, name, scale) for name in sorted(names)]
     return spread(changes) or 0.0
 

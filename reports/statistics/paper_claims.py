@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
+from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import BEFORE_FRAMES
 from reports.run.finished_run import Metric, Run
-from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
+from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect, recording_of
 from reports.statistics.frame_shares import HALF, half_of, share_of_frames, with_shares
 from reports.statistics.means_and_spreads import pair
 from reports.statistics.verdicts import (
@@ -172,7 +173,7 @@ class Judged:
 
     Attributes:
         claim: the claim.
-        compared: the two means (None where all of one diverged) and their effect.
+        compared: the two means (None where no roll-out of one finished) and their effect.
         p: corrected for the primary family, as it is of an exploratory claim; None for costs.
         verdict: HOLDS, FAILS, TIED or OPEN.
         remark: on what is missing.
@@ -215,7 +216,6 @@ def judged(run: Run) -> list[Judged]:
     corrected = holm([p for k in places if (p := p_values[k]) is not None], family=len(tested))
     for place, p in zip(places, corrected):
         p_values[place] = p
-    diverged = set(frame[frame["status"] == "diverged"]["method"])
     lines = []
     for claim, comparison, p in zip(asked, compared, p_values):
         if comparison.effect is not None and comparison.one is not None and comparison.other is not None:
@@ -223,7 +223,7 @@ def judged(run: Run) -> list[Judged]:
             remark = untested(comparison.effect) if outcome == OPEN else ""
             remark += comparison.one.fewer or comparison.other.fewer
         else:
-            outcome, remark = verdict_of_diverged(claim, comparison, diverged)
+            outcome, remark = verdict_of_failed(claim, comparison, frame)
         if outcome:
             lines.append(Judged(claim, comparison, p, outcome, remark))
     return lines
@@ -258,18 +258,27 @@ def verdict(claim: Claim, far: Effect, p: float | None) -> str:
     return {LESS: HOLDS, MORE: FAILS}.get(stands, stands)
 
 
-def verdict_of_diverged(claim: Claim, compared: Comparison, diverged: set[str]) -> tuple[str, str]:
-    """Return verdict and remark where all roll-outs of a method diverged.
+def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -> tuple[str, str]:
+    """Return verdict and remark where no roll-out of one method finished; both empty elsewhere.
 
-    It has more of an answer of which less is better. Its cost stays open: no time of it is usable.
+    One whose roll-outs all diverged has more of an answer of which less is better, with as many motions and
+    seeds as a test asks for. Its cost has no verdict: no time of it is usable.
     """
-    metric = compared.metric
-    if metric.lower_is_better and metric.of == "answer":
-        if compared.one is not None and claim.higher in diverged:
-            return HOLDS, ": the second diverged"
-        if compared.other is not None and claim.lower in diverged:
-            return FAILS, ": the first diverged"
-    return "", ""
+    finished, name, which = compared.one, claim.higher, "second"
+    if finished is None:
+        finished, name, which = compared.other, claim.lower, "first"
+    failed = frame[(frame["method"] == name) & (frame["status"] != "skipped")]
+    answer = compared.metric.lower_is_better and compared.metric.of == "answer"
+    if not answer or finished is None or failed.empty or failed["usable"].any():
+        return "", ""
+    motions = {recording_of(scene) for scene, _ in finished.cells} & set(map(recording_of, failed["scene"]))
+    if set(failed["status"]) != {"diverged"}:
+        return OPEN, f": no roll-out of the {which} finished"
+    if len(motions) < LEAST_MOTIONS:
+        return OPEN, f": the {which} diverged in fewer than {LEAST_MOTIONS} motions"
+    if failed["seeded"].any() and failed["seed"].nunique() == 1:
+        return OPEN, f": the {which} diverged with one seed"
+    return FAILS if which == "first" else HOLDS, f": the {which} diverged"
 
 
 def with_before(frame: pd.DataFrame) -> pd.DataFrame:

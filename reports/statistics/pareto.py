@@ -9,6 +9,7 @@ import pandas as pd
 
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import means
+from reports.statistics.spreads import ensemble_spread
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
@@ -119,14 +120,15 @@ def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
 def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     """Return the error [unit of the metric] below which a method cannot be told from the reference.
 
-    It is the root mean square over the reference's ensemble, the mean of scenes; of the energy gap what the
-    reference leaves on contact planes searched at its end. 0 where none is known.
+    It is the spread of the reference's ensemble, the mean of scenes; of the energy gap what the reference
+    leaves on contact planes searched at its end. 0 where none is known.
     """
-    ensemble = [run.reference] if metric in PLANES else run.reference_ensemble
-    of_ensemble = (rows["metric"] == PLANES.get(metric, metric)) & rows["method"].isin(ensemble)
-    kept = rows[rows["usable"] & of_ensemble]
-    squares = (kept["value"] ** 2).groupby(kept["scene"]).mean()
-    return float((squares**0.5).mean()) if len(kept) else 0.0
+    if metric in PLANES:
+        kept = rows[rows["usable"] & (rows["metric"] == PLANES[metric]) & (rows["method"] == run.reference)]
+        of_scene = kept.groupby("scene", observed=True)["value"].mean().abs()
+    else:
+        of_scene = ensemble_spread(run, rows, metric)
+    return float(of_scene.mean()) if len(of_scene) else 0.0
 
 
 def beaten_by(points: Sequence[Point], point: Point) -> Point | None:

@@ -118,10 +118,12 @@ class Excess:
     Attributes:
         effect: against the reference, from which the verdict comes; its interval is that of `typical`.
         by_motion: scene -> mean over seeds.
+        fewer: remark on roll-outs that are missing, empty where none is.
     """
 
     effect: Effect
     by_motion: Mapping[str, float]
+    fewer: str = ""
 
     @property
     def typical(self) -> float:
@@ -166,7 +168,7 @@ def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
     if one is None or zero is None:
         return None
     by_motion = pd.Series(dict(one.cells)).groupby(level=0, sort=False).mean()
-    return Excess(effect(one, zero, EXCESS), by_motion.to_dict())
+    return Excess(effect(one, zero, EXCESS), by_motion.to_dict(), one.fewer)
 
 
 def compared_excess(

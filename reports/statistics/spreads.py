@@ -14,19 +14,28 @@ AT_REFERENCE = {
 }  # fmt: skip
 
 
+def ensemble_spread(run: Run, rows: pd.DataFrame, metric: str) -> pd.Series:
+    """Return scene -> root mean square error against the reference over the members of its ensemble.
+
+    Of members that converged; scenes with fewer than LEAST_MEMBERS of these are left out.
+    """
+    kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["status"] == "ok")]
+    members = kept[kept["method"].isin(run.reference_ensemble)]
+    squares = (members["value"] - AT_REFERENCE.get(metric, 0.0)) ** 2
+    of_scene = squares.groupby(members["scene"], observed=True)
+    return of_scene.mean()[of_scene.size() >= LEAST_MEMBERS] ** 0.5
+
+
 def in_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
     """Return how many spreads of the reference's ensemble a method is away from the reference.
 
-    In each scene the spread is the root mean square over the members of the ensemble, and the method's error
-    that over its seeds. The result is the mean error of the scenes over their mean spread; None where fewer
-    than LEAST_MEMBERS members converged.
+    In each scene the spread is `ensemble_spread`, and the method's error the root mean square over its seeds.
+    The result is the mean error of the scenes over their mean spread; None where no scene has a spread.
     """
-    kept = rows[(rows["metric"] == metric) & rows["usable"]]
-    away = kept.assign(square=(kept["value"] - AT_REFERENCE[metric]) ** 2)
-    members = away[away["method"].isin(run.reference_ensemble) & (away["status"] == "ok")]
-    of_scene = members.groupby("scene")["square"]
-    spread = of_scene.mean()[of_scene.size() >= LEAST_MEMBERS] ** 0.5
-    error = away[away["method"] == method].groupby("scene")["square"].mean() ** 0.5
+    kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["method"] == method)]
+    squares = (kept["value"] - AT_REFERENCE[metric]) ** 2
+    spread = ensemble_spread(run, rows, metric)
+    error = squares.groupby(kept["scene"], observed=True).mean() ** 0.5
     both = spread.index.intersection(error.index)
     total = float(spread[both].sum())
     return float(error[both].sum()) / total if total > 0.0 else None

@@ -7,7 +7,8 @@ The rule looks at an effect (reports.statistics.effects) and, of an answer, at i
     less, more     p is below 0.05, and the difference exceeds the reference's uncertainty
     inconclusive   anything else; fewer than LEAST_MOTIONS motions; a network of one seed
 
-Costs are not tested: their range over motions and seeds lies on one side, within the margin, or on both.
+Costs are not tested: their range over motions and seeds lies on one side, within the margin, or on both. A
+time without a range, read from the clock once, is inconclusive.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def measure_of(compared: Comparison) -> Metric:
 def effect_of(metric: Metric, one: Mean, other: Mean) -> Effect:
     """Compute the effect between two means of a metric, on the metric's scale."""
     if metric.of != "answer":
-        return cost_effect(one, other)
+        return cost_effect(one, other, exact=metric.of == "method")
     return effect(one, other, EXCESS if metric.arbitrary_zero else "")
 
 
@@ -81,10 +82,10 @@ def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:
     >>> standing(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3), p=0.001)
     'inconclusive'
     """
-    if far.covers == RANGE:
-        return _standing_of_range(far, factor)
     if untested(far):
         return OPEN
+    if far.covers == RANGE:
+        return _standing_of_range(far, factor)
     if far.equal(factor):
         return TIED
     if p is None or p >= LEVEL or abs(far.above(factor)) <= far.uncertainty:
@@ -93,13 +94,13 @@ def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:
 
 
 def untested(far: Effect) -> str:
-    """Return why an effect is not tested, as a remark behind the verdict; empty where it is.
+    """Return why an effect has no verdict, as a remark behind it; empty where it has one.
 
     >>> untested(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3))
     ': fewer than 4 motions'
     """
     if far.covers == RANGE:
-        return ""
+        return "" if far.limits or far.exact else ": no range"
     if far.one_seed:
         return ": one seed"
     return f": fewer than {LEAST_MOTIONS} motions" if far.motions < LEAST_MOTIONS else ""

@@ -12,11 +12,13 @@ from reports.tables.table import GARMENT, METHOD, SCENE, Cell, Column, Table, ta
 CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero "
     "is a choice, points of relative excess between the two; of frames, the first's share less half. Below "
-    "it the 95 % interval over motions and seeds, of costs the range. p: of a primary claim by Holm for "
+    "it the 95 % interval over motions and seeds, of costs the range; of points it is the interval on the "
+    "scale of the test, with the mean nearer to 0 held. p: of a primary claim by Holm for "
     "the whole primary family, of an exploratory one as it is. Tie: all of the interval lies within 5 % "
     "of equality, or within the spread of the reference's ensemble if that is wider. A claim holds, or does "
     "not hold, where p is below 0.05 and the difference exceeds that spread; a cost, where its range lies on "
-    "one side. Inconclusive: anything else, fewer than four motions, or a network of one seed."
+    "one side. Inconclusive: anything else, fewer than four motions, a network of one seed, or a time "
+    "without a range."
 )
 
 
@@ -77,8 +79,8 @@ def relative_excess(run: Run) -> list[Table]:
         Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
     caption = (
-        "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E, over all "
-        "motions and seeds; typical: geometric mean over independent sources, with its interval."
+        "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E. Typical "
+        "(geometric, with its interval) and mean: over independent sources and seeds."
     )
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
 

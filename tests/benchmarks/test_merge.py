@@ -11,7 +11,7 @@ import torch
 from benchmarks import merge as command
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.merge import MergeError, joined_rows
-from benchmarks.results.row import Row
+from benchmarks.results.row import DECLARED, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.tasks.task import Outcome, Task
@@ -260,3 +260,10 @@ def test_times_are_of_the_first_machine_that_measured_them():
     assert joined_rows({"a": [a], "c": [twin]}, TIMED) == [a, twin]
     clip = dataclasses.replace(b, suite="speed")  # a suite that one machine alone has timed
     assert joined_rows({"a": [a], "b": [clip]}, TIMED) == [a, clip]
+
+
+def test_a_declared_time_is_of_no_machine():
+    declared = row("cost/frame", 2.2, "ms", method="mine", reason=DECLARED)
+    measured = row("cost/frame", 3.0, "ms", hardware="B")
+    assert joined_rows({"a": [declared], "b": [measured]}, TIMED) == [declared, measured]
+    assert joined_rows({"b": [measured], "a": [declared]}, TIMED) == [measured, declared]

@@ -146,7 +146,7 @@ def test_one_vertex_moved_and_its_digest_written_anew_is_refused(copy, capsys):
 
 def test_scores_of_another_name_are_refused(copy, capsys):
     assert main(["check", str(copy.rename(copy.with_name("other")))]) == 1
-    assert "no scores of 'other': give the folder its name" in capsys.readouterr().out
+    assert "no scores of 'other': give the folder its old name" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", [".weights", "__weights__/net.pt", "notes.md", "scores/weights.npz"])

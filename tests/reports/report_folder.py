@@ -32,6 +32,10 @@ DECLARED: dict[str, dict[str, Any]] = {
         "label": "Simulation, start moved", "role": "reference-variant",
         "family": "simulation-perturbed", "level": 1e-4,
     },
+    "simulation-1e-8": {
+        "label": "Simulation, to 1e-8", "role": "reference-variant",
+        "family": "simulation-tolerance", "level": 1e-8,
+    },
     "direct-optimisation": {"label": "Vertices optimised directly", "role": "bound"},
     "skinning": {"label": "Skinning alone", "role": "baseline"},
     "untrained": {"label": "SNUG, untrained", "role": "baseline", "seeded": True},

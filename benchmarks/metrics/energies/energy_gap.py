@@ -188,7 +188,7 @@ def optimality(
     from reference_sim.minimise.descent import mean_weight
     from reference_sim.minimise.lbfgs import LBFGS  # loads numba
 
-    if scale is not None and not scale > 0.0:  # of a reference that lies above the first guess, or has no energy
+    if scale is not None and not scale > 0.0:  # the reference lies above the first guess, or has no energy
         scale = None
     frames = _judged(scene, positions)
     numbers, potential = Optimality(judged=len(frames)), _potential(scene)

@@ -76,8 +76,8 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 def shares_quasi_static(entry: MethodEntry) -> bool:
     """Return whether the simulation's quasi-static solution is the method's too, where it returns none.
 
-    It is of solvers that minimise the reference's potential from their last frame; not of another material, of
-    a network, or of a method that says nothing of itself.
+    It is that of solvers that minimise the reference's potential from their last frame; not of another
+    material, of a network, or of a method that says nothing of itself.
     """
     return entry.static_known and entry.role in ("reference", "reference-variant", "solver")
 

@@ -86,7 +86,7 @@ def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
     """Return g and l [frames] for which g static(t - l) fits moving(t), both (T,) less their means.
 
     Lags within MAX_LAG are tried in hundredths of a frame by linear interpolation; before its first frame a
-    signal rests. Where no lag has a gain above 0, as of a hem that does not move, the gain is 0 and the lag nan.
+    signal rests. Where no lag has a gain above 0, as of a hem that rests, the gain is 0 and the lag nan.
     """
     frames = np.arange(len(static), dtype=np.float64)
     moving = moving - moving.mean()

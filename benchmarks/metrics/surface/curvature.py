@@ -59,7 +59,7 @@ METRICS = (
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return the mean curvature and the change of wrinkles over the evaluated frames; empty without interior."""
+    """Return mean curvature and change of wrinkles over the evaluated frames; empty without an interior."""
     judged = roll_out.kept(series_of).part(roll_out.judged)
     if not judged.area.any():
         return {}

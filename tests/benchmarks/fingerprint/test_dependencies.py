@@ -99,7 +99,8 @@ def test_what_runs_beside_the_type_checkers_imports_counts(tmp_path, project):
         "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import unused\nelse:\n    import fast\n"
         "if not TYPE_CHECKING:\n    import faster\nimport helpers.inner.solver\n"
     )
-    for name in ("unused", "fast", "faster", "helpers/__init__", "helpers/inner/__init__", "helpers/inner/solver"):
+    inner = ("helpers/__init__", "helpers/inner/__init__", "helpers/inner/solver")
+    for name in ("unused", "fast", "faster", *inner):
         path = tmp_path / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("")

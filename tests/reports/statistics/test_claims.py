@@ -197,24 +197,56 @@ def test_without_a_network_there_is_no_table():
     assert counts(judged(run_of([row(method="simulation")]))).total() == 0
 
 
+# The one row of a network's cell without numbers.
+GONE = {"metric": "cost/frame", "status": "diverged", "reason": "nan", "seeded": True}
+NOTHING = (None, None)  # values of two seeds
+
+
 def test_what_diverged_is_the_worse_one_and_not_a_dash():
-    full = [row(metric="curvature/error", unit="1/m")]
+    full = seeds("snug", (1.0, 1.1), "curvature/error", unit="1/m")
     asked = ("curvature/error", "snug", "snug-no-strain")
     assert findings(run_of(full)) == []
-    gone = {"metric": "cost/frame", "value": None, "status": "diverged", "reason": "nan"}
-    line = told([*full, row(method="snug-no-strain", **gone)])[asked]
+    line = told([*full, *seeds("snug-no-strain", NOTHING, **GONE)])[asked]
     assert (line.compared.other, line.compared.effect, line.p) == (None, None, None)
     assert (line.verdict, line.remark) == ("holds", ": the second diverged")
-    broken = [row(method="pbns"), row(method="snug", **gone)]
+    broken = [*seeds("pbns", (1.0, 1.1)), *seeds("snug", NOTHING, **GONE)]
     line = told(broken)[STRAIN]
     assert (line.verdict, line.remark) == ("does not hold", ": the first diverged")
     assert counts(judged(run_of(broken))) == {"does not hold": 1}
     # What a network cost that diverged, nobody knows: it did not cost more for that.
-    cost = {"metric": "cost/train", "unit": "s"}
-    assert told([row(**cost), row(method="tailornet", **gone)]) == {}
+    cost = seeds("snug", (1.0, 1.1), "cost/train", unit="s")
+    assert told([*cost, *seeds("tailornet", NOTHING, **GONE)]) == {}
     # Mean curvature is no error: having none is no verdict.
-    smooth = [row(method="supervised", metric="curvature/mean", unit="1/m"), row(method="snug", **gone)]
+    smooth = [*seeds("supervised", (1.0, 1.1), "curvature/mean"), *seeds("snug", NOTHING, **GONE)]
     assert findings(run_of(smooth)) == []
+
+
+@pytest.mark.parametrize(
+    ("motions", "of_seeds", "ends", "remark"),
+    [
+        (3, NOTHING, ("diverged", "diverged"), ": the second diverged in fewer than 4 motions"),
+        (4, (None,), ("diverged",), ": the second diverged with one seed"),
+        (4, NOTHING, ("diverged", "timeout"), ": no roll-out of the second finished"),
+        (4, NOTHING, ("timeout", "timeout"), ": no roll-out of the second finished"),
+    ],
+)
+def test_one_seed_few_motions_or_another_failure_do_not_make_a_method_worse(motions, of_seeds, ends, remark):
+    gone = [replace(r, status=ends[r.seed]) for r in seeds("pbns", of_seeds, **GONE)]
+    rows = [r for r in [*seeds("snug", (1.0, 1.1)), *gone] if r.scene in MOTIONS[:motions]]
+    line = told(rows)[STRAIN]
+    assert (line.verdict, line.remark) == ("inconclusive", remark)
+    # One that was left out has not failed, and a roll-out that came to its end shows that not every one does.
+    skipped = seeds("pbns", NOTHING, status="skipped", reason="not asked for")
+    assert told([*seeds("snug", (1.0, 1.1)), *skipped]) == {}
+    ended = row(MOTIONS[0], "pbns", "cost/frame", 1.0)
+    assert told([*rows, ended]) == {}
+
+
+def test_a_method_without_seeds_diverges_with_none():
+    metric = {"metric": "curvature/error", "unit": "1/m"}
+    gone = seeds("snug-no-strain", (None,), **GONE | {"seeded": False})
+    line = told([*seeds("snug", (1.0, 1.1), **metric), *gone])["curvature/error", "snug", "snug-no-strain"]
+    assert (line.verdict, line.remark) == ("holds", ": the second diverged")
 
 
 def test_noise_is_judged_beside_zeros_and_not_as_an_ablation():

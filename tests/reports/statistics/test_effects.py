@@ -299,6 +299,25 @@ def moved_means(changes):
     return pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
 
 
+def replace_moved(means, member, change):
+    """The means with a change by a further member of the ensemble in the first motion alone."""
+    return [
+        replace(mean, moved=mean.moved | {first: {**mean.moved[first], member: change}})
+        for mean in means
+        for first in [next(iter(mean.moved))]
+    ]
+
+
+def test_where_two_members_are_missing_in_different_motions_the_uncertainties_of_motions_decide():
+    means = moved_means({"snug": ((0.2, -0.1), (0.4, 0.3)), "pbns": ((0.0, 0.0), (0.0, 0.0))})
+    means = [
+        replace(mean, uncertainty=0.15, moved={cell: dict([pair]) for cell, pair in zip(mean.moved, pairs)})
+        for mean in means
+        for pairs in [[(TWINS[0], 0.2), (TWINS[1], 0.3)]]
+    ]
+    assert effect(*means, DIFFERENCE).uncertainty == pytest.approx(math.hypot(0.15, 0.15))
+
+
 def test_the_uncertainty_is_the_standard_deviation_of_the_effect_over_the_ensemble():
     """Each member takes the reference's place in all motions at once."""
     none = ((0.0, 0.0), (0.0, 0.0))
@@ -312,6 +331,9 @@ def test_the_uncertainty_is_the_standard_deviation_of_the_effect_over_the_ensemb
     assert effect(*moved_means({"snug": snug, "pbns": none})).uncertainty == pytest.approx(
         np.std([0.0, *logs], ddof=1)
     )
+    # A member that is missing in one motion did not leave that motion as it was: it takes no part.
+    third = replace_moved(moved_means({"snug": snug, "pbns": none}), "simulation-1e-8", 5.0)
+    assert effect(*third, DIFFERENCE).uncertainty == comparison.uncertainty
     # Of one member nobody knows the spread.
     assert effect(*moved_means({"snug": ((0.2,), (0.4,)), "pbns": ((), ())})).uncertainty == 0.0
 

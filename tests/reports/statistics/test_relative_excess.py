@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
+from reports.tables.findings import relative_excess
 from tests.reports.report_folder import row, run_of
 
 ENSEMBLE = "simulation-perturbed-1e-4"
@@ -40,3 +41,16 @@ def test_a_member_of_the_ensemble_that_stalled_takes_no_part(status, members):
         of("snug", 1.5),
     )
     assert [name for name, _ in made.loc["snug", "moved"]] == members
+
+
+def test_the_mean_is_over_independent_sources_and_the_caption_says_so():
+    energies = {"01_01_a": 10.0, "01_01_b": 20.0, "kick": 60.0}
+    rows = [
+        row(f"tshirt/{motion}", method, "energy/total", value)
+        for motion, energy in energies.items()
+        for method, value in (("simulation", 0.0), ("skinning", 100.0), ("snug", energy))
+    ]
+    (made,) = relative_excess(run_of(rows))
+    mean = made.rows[0][[column.name for column in made.columns].index("mean")]
+    assert mean == pytest.approx((15.0 + 60.0) / 2.0)
+    assert made.caption.endswith("and mean: over independent sources and seeds.")

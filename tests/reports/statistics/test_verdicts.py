@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from reports.run.finished_run import Metric
 from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
-from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, holm, standing
+from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, holm, standing, untested
+from tests.reports.report_folder import row, run_of
 
 FOUR = {"scale": RATIO, "freedom": 10.0, "motions": 4}
 
@@ -49,11 +51,26 @@ def test_a_corrected_p_value_above_the_level_is_inconclusive():
 
 @pytest.mark.parametrize(
     ("limits", "expected"),
-    [((-0.5, -0.3), LESS), ((0.1, 0.9), MORE), ((-0.1, 0.2), OPEN), ((-0.01, 0.02), TIED), (None, LESS)],
+    [((-0.5, -0.3), LESS), ((0.1, 0.9), MORE), ((-0.1, 0.2), OPEN), ((-0.01, 0.02), TIED), (None, OPEN)],
 )
 def test_a_cost_is_judged_by_its_range(limits, expected):
     far = Effect(-0.4, RATIO, covers=RANGE, limits=limits)
     assert standing(far, far.p_value()) == expected
+
+
+def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
+    rows = [
+        row("tshirt/walk", method, metric, value)
+        for method, value in (("snug", 1.0), ("pbns", 1.06))
+        for metric in ("cost/frame", "cost/memory")
+    ]
+    run = run_of(rows)
+    time, size = (
+        compare_methods(run, run.frame, Metric(name, of=of), "snug", "pbns").effect
+        for name, of in (("cost/frame", "machine"), ("cost/memory", "method"))
+    )
+    assert (standing(time, None), untested(time)) == (OPEN, ": no range")
+    assert (standing(size, None), untested(size)) == (LESS, "")
 
 
 def test_a_claimed_factor_moves_the_effect():
