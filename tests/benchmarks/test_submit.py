@@ -217,9 +217,9 @@ def test_a_roll_out_that_does_not_fit_is_named(entry, capsys):
 
 def test_a_program_of_another_name_is_refused(entry, capsys):
     (entry / "entry.toml").write_text(
-        TEXT.replace("roll_outs", "program").replace("{scene}.npz", "theirs.py")
+        TEXT.replace("roll_outs", "program").replace("{scene}.npz", "named_otherwise.py")
     )
-    (entry / "theirs.py").write_text(
+    (entry / "named_otherwise.py").write_text(
         "from benchmarks import MethodEntry\n"
         "METHODS = (MethodEntry(name='theirs', description='a method'),)\n"
         "def make(*, models, seed): ...\n"

@@ -263,6 +263,7 @@ def test_modules_beside_a_file_and_in_its_package_count_and_those_installed_do_n
     code = code_of(str(package / "deep" / "methods.py"))
     assert {Path(path).relative_to(tmp_path).as_posix() for path in code} == {
         "cloth_package/deep/methods.py", "cloth_package/helper.py", "cloth_package/deep/more.py",
+        "cloth_package/__init__.py", "cloth_package/deep/__init__.py",
     }  # fmt: skip
 
 

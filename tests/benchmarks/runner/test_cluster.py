@@ -95,13 +95,13 @@ def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path
     here = tmp_path / "here"
     here.mkdir()
     finish(here, LocalExecutor(RunFolder(here), None, 2))
-    executor = ClusterExecutor(folder, None, 1, two.address)
-    assert executor.side_by_side == 2  # of which the time left is made
-    runner = finish(folder.path, executor)
+    runner = finish(folder.path, ClusterExecutor(folder, None, 1, two.address))
     assert len(files(here)) == 12 and files(folder.path) == files(here)
     origins = [outcome.origin for outcome in runner.outcomes.values()]
     assert {o["commit"] for o in origins} == {"c"} and "h" not in {o["hardware"] for o in origins}
-    assert len(finish(folder.path, ClusterExecutor(folder, None, 1, two.address)).reused) == 12
+    again = ClusterExecutor(folder, None, 1, two.address)
+    assert again.side_by_side == 2  # of which the time left is made; both have come by now
+    assert len(finish(folder.path, again).reused) == 12
 
 
 def test_failures_are_values_and_a_batch_stays_together(two, folder):

@@ -61,7 +61,7 @@ def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
 class TwoAtOnce(InProcess):
     """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
 
-    workers = 2
+    side_by_side = 2
 
     def __init__(self, folder: RunFolder) -> None:
         super().__init__(folder)
@@ -110,7 +110,7 @@ def test_the_last_batch_is_shared_by_workers_that_would_wait(tmp_path):
     for workers in (1, 2):
         (tmp_path / str(workers)).mkdir()
         executor = TwoAtOnce(folder := RunFolder(tmp_path / str(workers)))
-        executor.workers = workers
+        executor.side_by_side = workers
         Runner(tasks, Cache(folder)).run(executor)
         at_work[workers] = executor.at_work
     assert at_work == {1: [["one", "two", "three"]], 2: [["one", "two", "three"], ["three"]]}
