@@ -170,7 +170,7 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
             # What has an answer to poses held still: networks, skinning, and the simulator on a body.
             still = network or (on_body and method in ("skinning", "simulation"))
             assert ("dynamics/quasi_static_difference" in values) == still
-            # Nobody knows what another material, or a solver that starts from a network, answers to held poses.
+            # Nobody knows how another material, or a solver started by a network, answers to held poses.
             assert ("dynamics/amplitude" in values) == (
                 on_body and (network or method == "skinning" or shares_quasi_static(entry))
             )
