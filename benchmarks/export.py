@@ -58,8 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from benchmarks.external.exported_scene import write_scene  # loads the simulator
 
         chosen = ["--scene", options.scene, *scene_arguments(options)]
-        score = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
-        score = "" if plan.scenes[0].networks_only else score
+        line = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
+        score = "" if plan.scenes[0].networks_only else line
         simulation = find_method("simulation").make(models=folder, seed=0) if options.reference else None
         write_scene(
             folder, plan.scenes[0], scene, preset=plan.preset.name, score=score, simulation=simulation

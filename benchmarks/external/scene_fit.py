@@ -19,6 +19,7 @@ from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 
 if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
+    from reference_sim.cloth import Cloth
 
 FARTHEST = (
     0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
@@ -249,7 +250,7 @@ def _order(
                 "the order: no vertex can be matched; export the scene's mesh and use that"
             )
         return order, "vertices matched by topology"
-    shuffled = _stretch(first, scene) > LONGEST_STRETCH
+    shuffled = mean_stretch(first, scene.cloth) > LONGEST_STRETCH
     if not stated.match_vertices:
         if shuffled:
             raise RollOutFileError(
@@ -257,7 +258,9 @@ def _order(
                 f"{remedy}"
             )
         return None, ""
-    order = nearest_order(first, scene.start, reach=0.5 * float(np.median(_lengths(scene.start, scene))))
+    order = nearest_order(
+        first, scene.start, reach=0.5 * float(np.median(_lengths(scene.start, scene.cloth)))
+    )
     if order is None:
         raise RollOutFileError(
             "has no triangles, and its first frame is not the scene's start to within half an edge: vertices "
@@ -271,14 +274,14 @@ def _reordered(stored: StoredRollOut, order: np.ndarray) -> StoredRollOut:
     return replace(stored, positions=stored.positions[:, order], quasi_static=held)
 
 
-def _lengths(positions: np.ndarray, scene: BuiltScene) -> np.ndarray:
-    edges = scene.cloth.edges
+def _lengths(positions: np.ndarray, cloth: Cloth) -> np.ndarray:
+    edges = cloth.edges
     return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
 
 
-def _stretch(positions: np.ndarray, scene: BuiltScene) -> float:
-    """Return the mean length of edges over that at rest."""
-    return float(_lengths(positions, scene).mean() / _lengths(scene.cloth.rest_positions, scene).mean())
+def mean_stretch(positions: np.ndarray, cloth: Cloth) -> float:
+    """Return the mean length of the cloth's edges at positions (V,3) over that at rest."""
+    return float(_lengths(positions, cloth).mean() / _lengths(cloth.rest_positions, cloth).mean())
 
 
 # --- frame rate --------------------------------------------------------------------------------------------

@@ -219,8 +219,7 @@ def _packages_above(base: str, top: str) -> Iterator[str]:
     """
     parts = base.split(".") if top else []
     for depth in range(1, len(parts)):
-        path = f"{top}{'/'.join(parts[:depth])}/__init__.py"
-        if (ROOT / path).is_file():
+        if path := _file_of(".".join(parts[:depth]), top):
             yield path
 
 

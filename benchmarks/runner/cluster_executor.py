@@ -97,7 +97,7 @@ class ClusterExecutor(LocalExecutor):
 
     @property
     def side_by_side(self) -> int:
-        """As many untimed tasks as the cluster has threads."""
+        """The number of the cluster's threads, each of which does one untimed task at a time."""
         return max(1, sum(self._threads.values()))
 
     def _open(self) -> None:

@@ -44,7 +44,7 @@ class LocalExecutor:
 
     @property
     def side_by_side(self) -> int:
-        """As many untimed tasks as are expected to be at work at once."""
+        """The number of untimed tasks that are expected to be at work at once."""
         return self.workers
 
     def together(self, ready: Ready, bar: tqdm) -> Iterator[Done]:

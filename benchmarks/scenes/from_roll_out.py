@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.external.roll_out_files import read_rest_mesh, read_roll_out
 from benchmarks.external.roll_out_option import RollOutFileError, RollOutOption
-from benchmarks.external.scene_fit import LONGEST_STRETCH
+from benchmarks.external.scene_fit import LONGEST_STRETCH, mean_stretch
 from benchmarks.fingerprint.digest import digest
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth, MeshError
@@ -86,7 +86,7 @@ def build(
                 "mesh that the roll-out was made with"
             )
         cloth = Cloth(to_metres_y_up(rest.positions, units=units, up=up), rest.faces, Material())
-        stretch = _mean_edge(cloth, positions[0]) / _mean_edge(cloth, cloth.rest_positions)
+        stretch = mean_stretch(positions[0], cloth)
         if stretch > LONGEST_STRETCH or stretch < 1.0 / LONGEST_STRETCH:
             raise RollOutFileError(
                 f"{rest_mesh}: in the first frame of {path} its edges have {stretch:.3g} times their length: "
@@ -108,12 +108,6 @@ def build(
         settle=lambda: np.ascontiguousarray(positions[0]),
         obstacle=obstacle,
     )
-
-
-def _mean_edge(cloth: Cloth, positions: np.ndarray) -> float:
-    """Return the mean length of the cloth's edges at positions (V,3)."""
-    ends = positions[cloth.edges]
-    return float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean())
 
 
 def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> None:

@@ -62,12 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows, config = scores.scored(entry, page=options.page)
     if entry.scores.rows_path.is_file() and not options.replace:
         elsewhere = scores.scored_elsewhere(entry)
-        recorded = entry.scores.read_rows()
-        differing = (
-            scores.differences(recorded, rows, scores.tolerance_elsewhere(entry))
-            if elsewhere
-            else scores.differences(recorded, rows)
-        )
+        tolerance = scores.tolerance_of(entry, elsewhere=elsewhere)
+        differing = scores.differences(entry.scores.read_rows(), rows, tolerance)
         for line in (lines := list(islice(differing, SHOWN))):
             print(line)
         if lines:

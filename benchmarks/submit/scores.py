@@ -77,14 +77,17 @@ def scored_elsewhere(entry: Entry) -> bool:
     return entry.scores.read_config().get(SCORED_ON) != processor_name()
 
 
-def tolerance_elsewhere(entry: Entry) -> Callable[[Row], float]:
-    """Return the tolerances of `differences` where the scores are of another kind of processor.
+def tolerance_of(entry: Entry, *, elsewhere: bool) -> Callable[[Row], float]:
+    """Return the tolerances of `differences` for an entry; elsewhere: see scored_elsewhere.
 
-    There the simulation parts from the recorded one, and with it all that hangs on it. Compared are the
-    energies of the entry, and the total energies of simulation and skinning, which give its relative excess.
+    On another kind of processor the simulation parts from the recorded one, and with it all that hangs on it.
+    Compared are then the energies of the entry, and the total energies of simulation and skinning, which give
+    its relative excess.
     """
 
     def tolerance(row: Row) -> float:
+        if not elsewhere:
+            return SAME
         if row.method == entry.name and row.metric.startswith("energy/"):
             return SAME_ELSEWHERE if entry.metadata.program else SAME
         return SAME_ELSEWHERE if row.metric == "energy/total" else math.inf

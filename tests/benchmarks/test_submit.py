@@ -215,14 +215,19 @@ def test_a_roll_out_that_does_not_fit_is_named(entry, capsys):
     assert f"{path}: no such file: add it" in capsys.readouterr().out
 
 
+def hand_in_program(entry: Path, name: str, text: str) -> None:
+    """Let a program take the place of the roll-outs. name: of its file, which Python has not met."""
+    (entry / "entry.toml").write_text(TEXT.replace("roll_outs", "program").replace("{scene}.npz", name))
+    (entry / name).write_text(text)
+
+
 def test_a_program_of_another_name_is_refused(entry, capsys):
-    (entry / "entry.toml").write_text(
-        TEXT.replace("roll_outs", "program").replace("{scene}.npz", "named_otherwise.py")
-    )
-    (entry / "named_otherwise.py").write_text(
+    hand_in_program(
+        entry,
+        "named_otherwise.py",
         "from benchmarks import MethodEntry\n"
         "METHODS = (MethodEntry(name='theirs', description='a method'),)\n"
-        "def make(*, models, seed): ...\n"
+        "def make(*, models, seed): ...\n",
     )
     assert main(["check", str(entry)]) == 1
     assert (
@@ -232,10 +237,9 @@ def test_a_program_of_another_name_is_refused(entry, capsys):
 
 def test_a_program_that_fails_within_a_scene_is_not_scored(entry, capsys):
     """Its mean over the frames, or scenes, that are left would be of the easier ones."""
-    (entry / "entry.toml").write_text(
-        TEXT.replace("roll_outs", "program").replace("{scene}.npz", "waving_badly.py")
-    )
-    (entry / "waving_badly.py").write_text(
+    hand_in_program(
+        entry,
+        "waving_badly.py",
         "import numpy as np\n"
         "from benchmarks import Method, MethodEntry\n"
         "from reference_sim import Trajectory\n"
@@ -249,7 +253,7 @@ def test_a_program_that_fails_within_a_scene_is_not_scored(entry, capsys):
         "    def prepare(self, scene):\n"
         "        self.scene = scene\n"
         "def make(*, models, seed):\n"
-        "    return Waving()\n"
+        "    return Waving()\n",
     )
     assert main(["score", str(entry)]) == 2
     assert f"{SCENE}, seed 0: diverged" in capsys.readouterr().err and not (entry / "scores").exists()

@@ -103,7 +103,7 @@ METRIC_FAULTS = {
     ),
     "benchmarks/metrics/test_surface_distance": (
         Fault("one way", SURFACES, "(forth[0] + back[0]) / 2.0", "forth[0]"),
-        Fault("every vertex alike", SURFACES, "np.repeat(_doubled_areas(x, faces), 3), len(x))",
+        Fault("every vertex alike", SURFACES, "np.repeat(triangle_areas(x, faces), 3), len(x))",
               "minlength=len(x))"),
         Fault("squared distances", SURFACES, "np.stack([np.sqrt(squared), angles])",
               "np.stack([squared, angles])"),

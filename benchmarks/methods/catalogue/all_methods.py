@@ -30,7 +30,6 @@ FURTHER_METHODS = (
         module="benchmarks.methods.networks.direct_optimisation",
         needs_body=True,
         gives_first_frame=True,
-        static_known=False,
         role="bound",
     ),
 )  # fmt: skip

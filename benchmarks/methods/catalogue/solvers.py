@@ -68,7 +68,6 @@ def warm_started(
             seeded=trained is not None,
             truncated=True,
             conserving=solver == "fast-lbfgs",
-            static_known=False,  # a pose held still leads back to the guess, and not to the simulator's drape
             role="warm-started",
             reporting=Reporting(
                 family=f"{base}+{solver}", level=count, base=base, pairing_group=pairing_group

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from benchmarks.metric import Metric
 from benchmarks.metrics.surface.penetration_and_distances import MM, penetration, penetration_values
+from reference_sim.geometry.topology import triangle_areas
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
@@ -62,7 +63,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     if not len(x) or np.abs(x).max() > LOST:
         return {}
     faces, others = roll_out.trajectory.faces, reference.trajectory.faces
-    if not all(_doubled_areas(frame, faces).any() for frame in x):
+    if not all(triangle_areas(frame, faces).any() for frame in x):
         return {}
     sampled = np.unique(np.linspace(0, len(x) - 1, SAMPLED_FRAMES).round().astype(int))
     measures = [chamfer_and_angle(x[frame], faces, y[frame], others) for frame in sampled]
@@ -101,15 +102,9 @@ def _one_way(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[flo
     of_nearest = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
     here = vertex_normals(np.ascontiguousarray(x), faces)
     angles = np.arctan2(np.linalg.norm(np.cross(here, of_nearest), axis=1), (here * of_nearest).sum(axis=1))
-    weights = np.bincount(faces.ravel(), np.repeat(_doubled_areas(x, faces), 3), len(x))
+    weights = np.bincount(faces.ravel(), np.repeat(triangle_areas(x, faces), 3), len(x))
     means = np.average(np.stack([np.sqrt(squared), angles]), axis=1, weights=weights)
     return float(means[0]), float(means[1])
-
-
-def _doubled_areas(x: Floats, faces: Indices) -> Floats:
-    """Return twice the area of each triangle (F,) [m^2] of vertices (V,3) [m]."""
-    sides = x[faces[:, 1:]] - x[faces[:, :1]]
-    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:

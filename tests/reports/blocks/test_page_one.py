@@ -52,7 +52,7 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
 
 
 def test_page_one_says_how_many_roll_outs_its_numbers_are_over():
-    """Of four motions the network diverges in one: in every number of it, and in the paired one."""
+    """A network that diverges in one of four motions has a remark at every number, and at the paired one."""
     scenes = [f"tshirt/{name}" for name in ("kick", "walk", "jump", "bow")]
     energies = {"simulation": (0.0, 0.0, 0.0, 0.0), "skinning": (9.0, 10.0, 11.0, 12.0)}
     energies |= {"snug": (0.1, 0.11, 0.12, None), "pbns": (4.0, 5.0, 6.0, 7.0)}
