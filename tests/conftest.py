@@ -1,4 +1,4 @@
-"""Garbage: what is loaded when the tests begin is none. What a refusal by a command is; narrow networks."""
+"""One thread and no garbage for all tests. What a refusal by a command is; narrow networks."""
 
 import gc
 from collections.abc import Callable
@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from benchmarks.process.timing import one_thread
+
+one_thread()  # before any library reads it: the processes of the tests would fight over the cores
 
 
 def pytest_collection_finish() -> None:

@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
-from statistics import fmean, stdev
+from statistics import fmean
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -121,10 +121,14 @@ def _mean(lines: Sequence[_Line], scenes: int, failed: Set[int]) -> Mean:
     for line in lines:
         by_seed.setdefault(line.seed, []).append(line.value)
     of_seeds = [fmean(values) for values in by_seed.values()]
+    value = fmean(of_seeds)
     uncertainties = [line.uncertainty for line in lines if not math.isnan(line.uncertainty)]
     return Mean(
-        value=fmean(of_seeds),
-        spread=stdev(of_seeds) if len(of_seeds) > 1 else None,
+        value=value,
+        # statistics.stdev sums fractions, which takes half of the time of all tables
+        spread=math.dist(of_seeds, [value] * len(of_seeds)) / math.sqrt(len(of_seeds) - 1)
+        if len(of_seeds) > 1
+        else None,
         seeds=len(of_seeds),
         asked=scenes * len(by_seed.keys() | failed),
         stalled=any(line.status == "stalled" for line in lines),

@@ -75,15 +75,16 @@ def with_relative_excess(
     totals = _values(sound, TOTAL, [run.reference, *run.reference_ensemble, SKINNING])
     lines = rows[(rows["metric"] == metric) & rows["usable"]]
     parts = []
-    for place, row in lines.iterrows():
-        zero, total = zeros.get(row["scene"], {}), totals.get(row["scene"], {})
-        shares = _shares(row["value"], zero, total)
+    columns = (lines[name].tolist() for name in ("scene", "method", "value", "uncertainty"))
+    for place, scene, method, energy, uncertainty in zip(lines.index, *columns):
+        zero, total = zeros.get(scene, {}), totals.get(scene, {})
+        shares = _shares(energy, zero, total)
         if run.reference in shares:
             value = shares.pop(run.reference)
             # The reference is zero by definition, whichever simulation it is.
-            moved = () if row["method"] == run.reference else tuple((k, v - value) for k, v in shares.items())
+            moved = () if method == run.reference else tuple((k, v - value) for k, v in shares.items())
             share = 100.0 / (total[SKINNING] - total[run.reference])
-            parts.append((place, value, share * row["uncertainty"], moved))
+            parts.append((place, value, share * uncertainty, moved))
     if not parts:
         return rows
     made = lines.loc[[place for place, *_ in parts]].assign(

@@ -22,6 +22,7 @@ from benchmarks.results.run_folder import RunFolder
 from reports.blocks.page_one_sentences import headline, topics
 from reports.statistics.published import PUBLISHED, read_published
 from reports.tables import TABLES
+from reports.tables.pivot import declared_pivots
 from reports.tables.table import Table
 from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
 from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows
@@ -125,6 +126,8 @@ def _of_methods(table: Table, methods: Sequence[str]) -> Table:
 
 def _table(folder: Path, name: str) -> Table:
     """Return a table of a run, having made no more tables than it takes to meet it."""
+    if name in (tables := _metric_tables(folder, name.removesuffix("_by_scene"))):
+        return tables[name]
     names: list[str] = []
     # Most tables have the name of the function that makes them.
     for place in sorted(range(len(TABLES)), key=lambda place: getattr(TABLES[place], "__name__", "") != name):
@@ -133,6 +136,15 @@ def _table(folder: Path, name: str) -> Table:
             return made[name]
         names += made
     raise ValueError(f"run {folder.name} has no table {name}; it has {', '.join(names)}")
+
+
+@cache
+def _metric_tables(folder: Path, name: str) -> dict[str, Table]:
+    """Return the tables of a name that metrics declare, for a run has many of them; empty where none does."""
+    run = read_published(folder)
+    if not any(metric.table == name for metric in run.metrics.values()):
+        return {}
+    return {table.name: table for declared in declared_pivots(name) for table in declared(run)}
 
 
 @cache
