@@ -20,7 +20,7 @@ class Potential:
         energies: the terms, all of one cloth.
 
     Raises:
-        ValueError: no energies, or energies of different cloths.
+        ValueError: no energies, energies of different cloths, or two of the same name.
 
     Example: the weight of a triangle pulls its corners down.
 
@@ -46,6 +46,10 @@ class Potential:
         for energy in self.energies:
             if energy.cloth is not self.cloth:
                 raise ValueError(f"energy {energy.name!r} was built on another cloth: use one for all")
+        names = [energy.name for energy in self.energies]
+        for name in names:
+            if names.count(name) > 1:  # one would hide the other in tables and files
+                raise ValueError(f"two energies are named {name!r}: give each a name of its own")
         self._patterns: dict[tuple[bytes, int], HessianPattern] = {}
 
     @property

@@ -62,11 +62,12 @@ def simulate(
         pin_positions: frame -> (P, 3) [m], for handles that move.
         guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
             along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated").
-        quasi_static: forget the velocity at every frame; for settling.
+        quasi_static: set the velocity to zero after every step, sub-steps included; for settling.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
         refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
-            ended, and the step solved again from there. Such a run cannot be resumed.
+            ended, and the step solved again from there. A step in which a barrier stopped the obstacle on its
+            way is not solved again. Such a run cannot be resumed.
         path: write the VTKHDF file there, frame by frame.
         resume: go on after the last whole frame of `path`, where a run with the same arguments left it (more
             frames may be asked for); without such a file start at the beginning. The same bits come out as
@@ -75,8 +76,10 @@ def simulate(
             Newton's method sums in another order.
         progress: label of a progress bar with time left; None for silence.
         options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
-            that makes one of a potential and the other options), tolerance, max_iterations, ... The default
-            method is "lbfgs", or "newton" with a term whose pairs change with x, as a barrier's do.
+            that makes one of a potential and the other options), tolerance, max_iterations, timeout [s] of
+            one minimisation, ... The default method is "lbfgs", or "newton" with a term whose pairs change
+            with x, as a barrier's do. Where such a term joins a step late (self-contact alone), the method is
+            that of the minimisation without the term, by default "lbfgs", and Newton's method ends the step.
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the worst of the others:

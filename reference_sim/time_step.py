@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.inertia import Inertia
 from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise.minimisers import Minimiser, Restartable, make_minimiser
-from reference_sim.minimise.result import Result
+from reference_sim.minimise.result import Result, severity
 from reference_sim.potential import Potential
 from reference_sim.trajectory.resume import PartialRun
 from reference_sim.trajectory.trajectory import TrajectoryError
@@ -59,8 +60,9 @@ class TimeStepper:
         substeps: steps per frame.
         obstacle: the moving body, one mesh per frame.
         guess: one of GUESSES, see `simulate`.
-        quasi_static: whether the velocity is forgotten at every frame.
-        refreeze: times that what a step freezes is searched again at its end, and the step solved again.
+        quasi_static: whether the velocity is set to zero after every step, sub-steps included.
+        refreeze: times that what a step freezes is searched again at its end, and the step solved again. A
+            step in which a barrier stopped the obstacle is not.
         options: of the minimiser, see `simulate`.
 
     Raises:
@@ -103,6 +105,7 @@ class TimeStepper:
         self.quasi_static, self.options = quasi_static, {"method": method} | options
         self.late = [energy for energy in energies if energy.joins_late]
         early = Potential([energy for energy in self.potential.energies if not energy.joins_late])
+        self.body_may_stop, self.obstacle_stopped = obstacle is not None and early.impassable, False
         self.opening: Minimiser | None = None
         self.ending = self.options
         if self.late and not early.impassable:
@@ -111,7 +114,8 @@ class TimeStepper:
                     f"simulate: Newton's method, not a function, ends steps that {self.late[0].name!r} joins:"
                     " choose method 'lbfgs' or 'newton', or leave the term out"
                 )
-            self.opening = make_minimiser(early, **{"method": "lbfgs"} | options)
+            self.opening_method: str = options.get("method", "lbfgs")
+            self.opening = make_minimiser(early, **options | {"method": self.opening_method})
             self.ending = ENDING | {name: options[name] for name in LIMITS if name in options}
         self.minimiser = make_minimiser(self.potential, **self.ending)
 
@@ -151,9 +155,11 @@ class TimeStepper:
                 handles = (1 - share) * handles + share * pins
             step = (frame - 1) * self.substeps + j
             guess = self.prepare(step, x, v, handles)
+            self.obstacle_stopped = False
             results.append(self.open(x, guess) if self.opening else self.reach(x, guess))
             for _ in range(self.refreeze):
-                if not np.isfinite(results[-1].positions).all():
+                # To freeze the step again would put an obstacle that stopped on its way at the end of it.
+                if self.obstacle_stopped or not np.isfinite(results[-1].positions).all():
                     break
                 self.freeze(step, x, v, results[-1].positions)
                 results.append(self.minimiser.minimise(results[-1].positions))
@@ -241,11 +247,13 @@ class TimeStepper:
         guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
         minimisation gains distance, and all move on. So the last minimisation starts without an intersection,
         pins and obstacle at the end of their way. Without such a term it starts at the guess.
+
+        The rough minimisations share one timeout, and the last one has its own.
         """
         potential, pins = self.potential, self.cloth.pins
         motion, goal, progress = guess - x, guess, 0.0
-        reached = [0.0]
-        while len(reached) <= MAX_APPROACHES:
+        reached, begun, late = [0.0], time.perf_counter(), False
+        while len(reached) <= MAX_APPROACHES and not late:
             shares: list[float] = []
             for free_too in (True, False):
                 if not free_too:
@@ -264,13 +272,17 @@ class TimeStepper:
             goal = x + (1 - progress) * motion
             goal[pins] = guess[pins]
             reached.append(progress)
+            late = time.perf_counter() - begun > self.options.get("timeout", float("inf"))
             if progress - reached[max(len(reached) - 4, 0)] < LEAST_APPROACH and len(reached) > 3:
                 break
+        self.obstacle_stopped = self.body_may_stop
         result = self.minimiser.minimise(x)
         if result.status == "diverged":
             return result
-        reason = f"no way without intersection: pins and obstacle came {progress:.1%} of theirs"
-        return replace(result, status="stalled", reason=reason)
+        status = max("stalled", "timeout" if late else result.status, key=severity)
+        problem = "no way without intersection" if status == "stalled" else "gave up after the timeout"
+        reason = f"{problem}: pins and obstacle came {progress:.1%} of theirs"
+        return replace(result, status=status, reason=reason)
 
     @cached_property
     def rough_minimiser(self) -> Minimiser:
@@ -281,6 +293,9 @@ class TimeStepper:
     def provenance(self) -> dict[str, Any]:
         """Return JSON values of everything that decides the result: a resumed run must have the same."""
         cloth, obstacle = self.cloth, self.obstacle
+        # The options have "newton" by default as well as by request, but L-BFGS opens a step by default. Runs
+        # without an opening have no such key: they can go on with the files of earlier versions.
+        opening = {"opening": self.opening_method} if self.opening else {}
         return {
             "method": "backward Euler",
             "dt_s": self.frame_dt,
@@ -289,6 +304,7 @@ class TimeStepper:
             "quasi_static": self.quasi_static,
             "refreeze": self.refreeze,
             "options": {name: getattr(value, "__name__", value) for name, value in self.options.items()},
+            **opening,
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
             "material": asdict(cloth.material),
             "cloth": fingerprint(cloth.rest_positions, cloth.faces, np.asarray(cloth.pins), cloth.rest_uv),

@@ -15,6 +15,7 @@ from reference_sim.files.atomic_files import replacing
 from snug.body.skinning import skin
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import RollOutError, demand_fit
 from snug.networks.trained_model import TrainedModel
 
 TOLERANCE = 1e-5  # [m] between a vertex by torch and by the file: float32, summed in another order
@@ -83,8 +84,10 @@ def write_onnx(
         importlib.import_module("onnxscript")
     except ImportError:
         raise OnnxError(f"{path}: needs pip install 'neural-garment-benchmark[onnx]'") from None
-    if model.vertices != dressed.vertices:
-        raise OnnxError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
+    try:
+        demand_fit(model, dressed, motion)
+    except RollOutError as error:
+        raise OnnxError(str(error)) from None
     features = dressed.features(motion, model.recipe, betas, feature_set=model.network.feature_set)
     transforms = dressed.transforms(motion.poses, betas)
     frame = _Frame(model, dressed, betas).eval()

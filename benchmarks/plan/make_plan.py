@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -15,7 +14,6 @@ from benchmarks.method import installed
 from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.plan import user_files
 from benchmarks.plan.choose_cells import Selection, choose_cells, choose_suites, names_no_motion
-from benchmarks.plan.motion_files import list_motion_files
 from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Motions, Plan, PlanError
 from benchmarks.plan.request import Request
@@ -59,8 +57,7 @@ def make_plan(request: Request) -> Plan:
     user_scenes = [*request.further_scenes, *user_scenes]
     if request.garment:
         check_garment_name(request.garment)
-    motion_files, remarks = list_motion_files(request.motions)
-    inputs = read_inputs(request.body, request.garment, motion_files, request.motion_options)
+    inputs = read_inputs(request.body, request.garment, request.motions, request.motion_options)
     motions, named = Motions(), (request.motions, request.test_motions, request.validation_motions)
     if any(named) or not names_no_motion(scenes, user_scenes):
         motions = split_motions(
@@ -84,7 +81,7 @@ def make_plan(request: Request) -> Plan:
     check_body_shapes(inputs.body, [cell.scene for cell in cells])
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
     asked |= {SUITE} if microbenchmarks else set()
-    plan = Plan(
+    return Plan(
         preset=request.preset,
         suites=tuple(suite for suite in suites if suite in asked),
         cells=cells,
@@ -103,9 +100,6 @@ def make_plan(request: Request) -> Plan:
         trained=check_trained(request, folder),
         command=request.command,
     )
-    for remark in remarks:
-        print(remark, file=sys.stderr)
-    return plan
 
 
 def tests_of_fabrics(request: Request, suites: Sequence[str]) -> dict[str, Any]:

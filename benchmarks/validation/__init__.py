@@ -8,7 +8,7 @@
 | curvature | the curvature metric on known surfaces |
 | fabric | textile tests: the master curve, bending lengths and drape, of suite fabric |
 | engines | laws that any engine owes, and its distance from its own limit, of suite engines |
-| solvers | derivatives of all terms, properties of the minimisers |
+| solvers | derivatives of all terms but friction and IPC's barrier, properties of the minimisers |
 | stress | single steps that converge truly or fail and say so |
 
 >>> from benchmarks.validation import CASES

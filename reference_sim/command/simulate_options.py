@@ -87,7 +87,9 @@ def make_parser() -> argparse.ArgumentParser:
     add("--contact-samples", choices=("all", "vertices"),
         help="all: vertices, edge midpoints and centroids (default)",
     )  # fmt: skip
-    add("--friction", type=_not_negative, default=0.0, metavar="MU", help="coefficient (default 0)")
+    add("--friction", type=_not_negative, default=0.0, metavar="MU",
+        help="coefficient (default 0); with --self-contact beside the penalty, of the obstacle alone",
+    )  # fmt: skip
     add("--barrier", action="store_true",
         help="IPC's barrier in place of the penalty: nothing passes, twelve times the time (needs ipctk)",
     )  # fmt: skip

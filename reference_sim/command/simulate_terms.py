@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -88,6 +89,9 @@ def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
         raise ValueError(str(error)) from None
     rubs = options.friction and not beside_penalty  # the penalty's friction is that on the body
     friction = [BarrierFriction(contact, coefficient=options.friction)] if rubs else []
+    if options.friction and beside_penalty:
+        note = "is that of the obstacle; cloth slides on cloth without friction"
+        print(f"note: --friction {options.friction:g} {note}", file=sys.stderr, flush=True)
     return [contact, *friction]
 
 

@@ -30,7 +30,7 @@ def summarise(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int)
             f"round-off  {relaxed} frames within tolerance up to round-off alone, first {trajectory.reason}"
         )
     if trajectory.status != "converged":
-        lines.append(f"first not  {trajectory.status}: {trajectory.reason}")
+        lines.append(f"worst      {trajectory.status}: {trajectory.reason}")
     if trajectory.frames > 1:
         energies = [f"{name[7:]} {fields[name][-1]:.3g}" for name in fields if name.startswith("energy/")]
         lines.append(f"energies   {', '.join(energies)} J at the last frame")

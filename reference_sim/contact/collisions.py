@@ -2,8 +2,8 @@
 
 The geometry is that of the package ipctk (IPC Toolkit, MIT licence): broad phase, closest pairs, continuous
 collision detection, intersection test. What is kept here saves time between its calls: only those faces of
-the obstacle take part that reach into a box around the cloth, and candidate pairs serve as long as nothing
-has moved further than they were searched for.
+the obstacle take part that come within the distance of a box around the cloth, and candidate pairs serve as
+long as nothing has moved further than they were searched for.
 """
 
 from __future__ import annotations
@@ -111,7 +111,9 @@ class Collisions:
         cloth, ipctk = self.cloth, self.package
         faces = self._obstacle_faces
         corners = np.concatenate([self._before[faces], self._after[faces]], axis=1)
-        near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
+        # A line search may end at a side of the box, so faces that are close behind it belong to the mesh.
+        reach = self.distance + self._slack
+        near = ((corners.max(axis=1) >= low - reach) & (corners.min(axis=1) <= high + reach)).all(axis=1)
         kept, local = np.unique(faces[near], return_inverse=True)
         count = cloth.vertex_count
         rest = np.asfortranarray(np.concatenate([cloth.rest_positions, self._before[kept]]))

@@ -112,7 +112,7 @@ class ContactBarrier(Energy):
         """Put the obstacle at its end of the step.
 
         Its start is where the step before left it, if that was the frame before: an obstacle that found no
-        way to its place goes on from where it stopped.
+        way to its place goes on from where it stopped. A step that is prepared again keeps its start.
         """
         last, self.step = self.step, step
         if step.obstacle is None or not self.obstacle:
@@ -120,8 +120,11 @@ class ContactBarrier(Energy):
             return
         after = step.obstacle.at(step.frame)
         before = step.obstacle.at(max(step.frame - 1, 0))
-        if last and last.obstacle is step.obstacle and last.frame == step.frame - 1:
-            before = self.collisions.obstacle_at(self.collisions.progress)
+        if last and last.obstacle is step.obstacle:
+            if last.frame == step.frame - 1:
+                before = self.collisions.obstacle_at(self.collisions.progress)
+            elif last.frame == step.frame:
+                before = self.collisions.obstacle_at(0.0)
         self.collisions.begin(step.obstacle.faces, before, after)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:

@@ -44,7 +44,7 @@ class Energy:
     """One physical term on one stencil.
 
     Attributes:
-        name: the term's name in tables.
+        name: the term's name in tables; a potential has no two terms of one name.
         cloth: the rest state that the term was built on.
         stencils: (N, k) vertex indices of each element.
         dynamic: True where the vertices that the term couples change with x, as the pairs of a contact do.

@@ -52,6 +52,11 @@ class Result:
     relaxed: bool = False
 
 
+def severity(status: str) -> int:
+    """Return how bad the status of a minimisation is: 0 is good."""
+    return {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}[status]
+
+
 def check_tolerance(tolerance: float) -> None:
     """Raise ValueError for a tolerance that is no finite number above zero."""
     if not 0.0 < tolerance < float("inf"):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.minimise.result import Result
+from reference_sim.minimise.result import Result, severity
 from reference_sim.trajectory.resume import PartialRun
 from reference_sim.trajectory.trajectory import Trajectory
 from reference_sim.trajectory.writer import TrajectoryWriter
@@ -76,7 +76,7 @@ class Recorder:
         that converged within round-off alone.
         """
         for result in results:
-            worse = _severity(result.status) > _severity(self.status)
+            worse = severity(result.status) > severity(self.status)
             if worse or (result.relaxed and not self.reason):
                 self._tell(result.status, f"frame {frame}: {result.reason}")
 
@@ -113,8 +113,3 @@ class Recorder:
             provenance=self._provenance,
             frame_fields={k: np.array([f[k] for f in self._fields]) for k in self._fields[0]},
         )
-
-
-def _severity(status: str) -> int:
-    """Return how bad the status of a minimisation is: 0 is good."""
-    return {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}[status]

@@ -38,9 +38,9 @@ class Trajectory:
         faces: (F, 3).
         times: (T,) [s].
         frame_seconds: (T,) time on the clock for each frame [s]; nan where none was taken, as by default.
-        status: "converged", or the first failure among the frames (stalled, max_iterations, diverged,
-            timeout); "ok" for a method that does not minimise.
-        reason: one line in words.
+        status: "converged", or the worst failure among the frames ("diverged", then "timeout", then "stalled"
+            or "max_iterations"); "ok" for a method that does not minimise.
+        reason: one line in words, on the first frame with that status.
         provenance: what made it (JSON values).
         frame_fields: further numbers per frame, each (T,).
 

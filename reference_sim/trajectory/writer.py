@@ -184,7 +184,7 @@ class TrajectoryWriter:
         self._put_in_place()
 
     def first_failure(self, status: str, reason: str) -> None:
-        """Note how the frame failed that is appended next, for a run that resumes this one."""
+        """Note how the frame that is appended next failed, the worst so far, for a run that resumes this."""
         self._file["benchmark"].attrs[FIRST_FAILURE] = json.dumps([status, reason])
 
     def finish(self, status: str, reason: str) -> None:

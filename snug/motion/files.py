@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
 
+from reference_sim.files.array_file import ArrayFileError, array_names
 from snug.body.skeleton import JOINT
 from snug.motion.formats import READERS
 from snug.motion.motion import Motion, MotionError, clear_arms, place, resample, spread_arms
 from snug.motion.options import MotionFileOptions
 from snug.motion.recording_errors import remove_recording_errors
+from snug.motion.smpl_arrays import ARRAY_NAMES
 from snug.motion.vertical_axis import turn_y_up
 
 # As the authors of SNUG did: recorded hands are noisy and drive nothing.
@@ -19,6 +22,7 @@ HAND_DAMPING = 0.1
 HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand")]
 
 MAX_NAME_BYTES = 100  # bytes of a motion's name
+SHAPE_FILES = ("shape.npz", "*_stagei.npz")  # of a subject: AMASS keeps them beside its clips
 FORMULA = ("=", "+", "-", "@")  # what begins with one of these is a formula to programs that open CSV files
 
 
@@ -31,7 +35,8 @@ def load_motions(
     """Read motions from a file, or from every motion file of a folder, in the order of their names.
 
     Each comes back whole, at 30 frames per second, placed on the floor at the origin facing +z, with the arms
-    spread and the hands' rotations at a tenth. CMU files (.amc) need their skeleton (.asf) beside them.
+    spread and the hands' rotations at a tenth. CMU files (.amc) need their skeleton (.asf) beside them. Of a
+    folder of AMASS, files of a subject's shape (SHAPE_FILES) are left out where they hold no motion.
 
     Args:
         path: a file of a kind in `snug.motion.formats.READERS`, or a folder of them.
@@ -55,7 +60,8 @@ def load_motions(
         raise MotionError(f"{path}: no such file or folder; give a motion file ({known}) or a folder")
     files = [path]
     if path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
+        clips = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
+        files = [clip for clip in clips if not holds_shape_alone(clip)] or clips
     if not files:
         raise MotionError(f"{path}: holds no motion file ({known}); give a folder of motion capture clips")
     clips = [resample(place(read_motion(file, options or MotionFileOptions()))) for file in files]
@@ -67,10 +73,13 @@ def load_motions(
 def read_motion(file: Path, options: MotionFileOptions) -> Motion:
     """Read one clip as recorded, at its rate, y up and without recording errors. Raises MotionError."""
     printable = file.stem.isprintable() and not file.stem.startswith(FORMULA)
-    if not printable or len(file.stem.encode(errors="replace")) > MAX_NAME_BYTES:
+    # Options list names with commas between, and rows write spaces side by side as one.
+    listed = "," not in file.stem and file.stem == " ".join(file.stem.split())
+    if not (printable and listed) or len(file.stem.encode(errors="replace")) > MAX_NAME_BYTES:
         raise MotionError(
             f"{str(file)[:200]!a}: files are named after a motion; give this one a name of at most "
-            f"{MAX_NAME_BYTES} printable bytes that begins with none of {' '.join(FORMULA)}"
+            f"{MAX_NAME_BYTES} printable bytes without a comma, without spaces side by side or at the ends, "
+            f"that begins with none of {' '.join(FORMULA)}"
         )
     reader = READERS.get(file.suffix.lower())
     if reader is None:
@@ -86,3 +95,13 @@ def read_motion(file: Path, options: MotionFileOptions) -> Motion:
         raw = remove_recording_errors(replace(raw, poses=damped), repair=options.repair)
     raw = turn_y_up(raw, options.up)
     return Motion(file.stem, raw.poses, raw.translations, raw.fps, "recorded", raw.source)
+
+
+def holds_shape_alone(file: Path) -> bool:
+    """Return whether a file is what AMASS keeps beside a subject's clips: a body's shape, and no motion."""
+    if not any(fnmatch(file.name, pattern) for pattern in SHAPE_FILES):  # others are opened once, to be read
+        return False
+    try:
+        return not set(array_names(file)) & set(ARRAY_NAMES)
+    except ArrayFileError:  # a damaged file is refused where it is read
+        return False

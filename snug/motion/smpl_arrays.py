@@ -42,7 +42,7 @@ ROOT_ROTATIONS = ("root_orient", "global_orient")
 PATHS = ("trans", "transl", "translations")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
 ARRAY_NAMES = (*ROTATIONS, *BODY_ROTATIONS, *ROOT_ROTATIONS, *PATHS, *RATES)
-PLAIN = (np.ndarray, int, float)
+PLAIN = (np.ndarray, int, float, list, tuple)
 UNIT = 0.02  # a quaternion's length, and a matrix's entries, may be off by as much
 
 
@@ -76,7 +76,11 @@ def read_pkl(path: Path, options: MotionFileOptions) -> RawMotion:
         raise MotionError(str(error)) from None
     if not isinstance(content, dict):
         raise MotionError(f"{path}: holds no dict of arrays; write an .npz motion file")
-    arrays = {name: np.asarray(content[name]) for name in ARRAY_NAMES if isinstance(content.get(name), PLAIN)}
+    given = {name: content[name] for name in ARRAY_NAMES if isinstance(content.get(name), PLAIN)}
+    try:
+        arrays = {name: np.asarray(values) for name, values in given.items()}
+    except ValueError:
+        raise MotionError(f"{path}: a list of rows of several lengths; give arrays, a row a frame") from None
     if not arrays:
         names = ", ".join(map(str, list(content)[:12]))[:200] or "nothing"
         raise MotionError(f"{path}: no array of a motion (found {names}); give 'poses', 'trans', 'fps'")

@@ -20,7 +20,9 @@ _GENERATOR = threading.Lock()  # torch's generator is one for all threads
 
 @contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """Draw from torch's global generator as from a seed, and give it back as it was; threads take turns.
+    """Draw from torch's generators as from a seed, and give them back as they were; threads take turns.
+
+    Those of GPUs are left alone until something is on a GPU.
 
     >>> with seeded(0):
     ...     first = torch.rand(1)
@@ -28,8 +30,12 @@ def seeded(seed: int) -> Iterator[None]:
     ...     bool(torch.rand(1) == first)
     True
     """
-    with _GENERATOR, torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+    on_gpus = torch.cuda.is_initialized()
+    with _GENERATOR, torch.random.fork_rng(devices=range(torch.cuda.device_count()) if on_gpus else ()):
+        if on_gpus:
+            torch.manual_seed(seed)
+        else:  # manual_seed would seed GPUs for when they are begun with
+            torch.default_generator.manual_seed(seed)
         yield
 
 

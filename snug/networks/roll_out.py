@@ -19,14 +19,15 @@ from snug.body.skinning import skin
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import FEATURE_SETS, DressedBody
 from snug.networks.frame_layout import CompiledFrame
-from snug.networks.trained_model import TrainedModel
+from snug.networks.trained_model import TrainedModel, digest_of_triangles
 
 WARM_UP = 10  # frames computed and thrown away, before the caller starts a clock
+RATE_TOLERANCE = 1e-4  # of a frame rate
 QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
 class RollOutError(ValueError):
-    """A model that does not fit the garment or the motion; the message names both numbers."""
+    """A model that does not fit the garment or the motion; the message says in what."""
 
 
 def roll_out(
@@ -239,6 +240,23 @@ def _joined(earlier: Motion | None, motion: Motion) -> Motion:
     return motion if earlier is None else earlier.followed_by(motion)
 
 
+def demand_fit(model: TrainedModel, dressed: DressedBody, motion: Motion) -> None:
+    """Raise RollOutError for another garment's model, or one that has learned motions of another rate."""
+    if model.vertices != dressed.vertices:
+        raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
+    if model.triangles and model.triangles != digest_of_triangles(np.asarray(dressed.garment.faces)):
+        raise RollOutError(
+            "the model is of a garment with as many vertices and other triangles: tailor the garment that it "
+            "was trained for, or train one for this"
+        )
+    timeless = not (model.network.sequential or FEATURE_SETS[model.network.feature_set])
+    if model.fps and not timeless and abs(model.fps - motion.fps) > RATE_TOLERANCE * model.fps:
+        raise RollOutError(
+            f"the model has learned from {model.fps:g} frames a second, motion {motion.name} has "
+            f"{motion.fps:g}: resample it (snug.motion.motion.resample)"
+        )
+
+
 def _features(
     model: TrainedModel,
     dressed: DressedBody,
@@ -248,8 +266,7 @@ def _features(
     still: bool = False,
 ) -> Tensor:
     """Return the network's inputs (T, D). Raises RollOutError if the model does not fit."""
-    if model.vertices != dressed.vertices:
-        raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
+    demand_fit(model, dressed, motion)
     features = dressed.features(
         motion, model.recipe, betas, feature_set=model.network.feature_set, still=still
     )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from torch import Tensor
 
 from snug.networks.architectures import make_network
@@ -20,6 +22,7 @@ _TYPES: dict[str, Any] = {
     "kind": str, "unit": str, "recipe": dict, "inputs": int, "vertices": int, "pins": list, "seed": int,
     "steps": int, "seconds": int | float, "setup_seconds": int | float, "history": list, "summary": dict,
 }  # fmt: skip
+_OPTIONAL = {"fps": int | float, "triangles": str, "origin": dict}  # files of before have not all of them
 _COPIED = ("unit", "seed", "steps", "seconds", "setup_seconds", "history", "summary")
 
 
@@ -43,6 +46,8 @@ class TrainedModel:
             frames], and as `seconds/<part>` the mean time of the parts of a step.
         summary: numbers and names of high windows, of updates left out, of returns to good weights.
         unit: of the loss: joules, or a distance from the simulated vertices.
+        fps: frame rate of the training motions [1/s]; 0 where it is not known.
+        triangles: digest of the garment's triangles, see digest_of_triangles; empty where it is not known.
         origin: what is known of its training: data, commit, versions, processor, and digests of all that it
             depends on, see benchmarks.tasks.training; empty where nobody noted it.
 
@@ -65,6 +70,8 @@ class TrainedModel:
     history: list[dict[str, float]] = field(default_factory=list)
     summary: dict[str, Any] = field(default_factory=dict)
     unit: str = "J"
+    fps: float = 0.0
+    triangles: str = ""
     origin: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -86,8 +93,7 @@ class TrainedModel:
             "inputs": int(self.network.input_mean.shape[0]),
             "vertices": self.vertices,
             "pins": [int(pin) for pin in self.network.pins],
-            **{name: getattr(self, name) for name in _COPIED},
-            "origin": self.origin,
+            **{name: getattr(self, name) for name in (*_COPIED, *_OPTIONAL)},
         }
         return write_tensors(Path(path), self.network.state_dict(), metadata)
 
@@ -124,7 +130,8 @@ package: pbns-tshirt, snug-tshirt, supervised-tshirt
             if network.state_dict().keys() != tensors.keys():
                 raise ModelFileError(f"{path}: not the weights of this version's {data['kind']}: train again")
             network.load_state_dict(tensors)
-            copied = {name: data[name] for name in _COPIED} | {"origin": data.get("origin", {})}
+            copied = {name: data[name] for name in _COPIED}
+            copied |= {name: data[name] for name in _OPTIONAL if name in data}
         except ModelFileError:
             raise
         except (KeyError, ValueError, RuntimeError, TypeError) as error:
@@ -132,6 +139,15 @@ package: pbns-tshirt, snug-tshirt, supervised-tshirt
                 f"{path}: broken model file ({' '.join(str(error).split())[:200]})"
             ) from error
         return cls(data["kind"], network.eval(), recipe, **copied)
+
+
+def digest_of_triangles(faces: np.ndarray) -> str:
+    """Return a digest of triangles (F, 3), which name vertices in their order: a network gives one for each.
+
+    >>> digest_of_triangles(np.array([[0, 1, 2]])) == digest_of_triangles(np.array([[1, 0, 2]]))
+    False
+    """
+    return hashlib.sha256(np.ascontiguousarray(faces, dtype="<i8").tobytes()).hexdigest()[:16]
 
 
 def _find_file(path: str | Path) -> Path:
@@ -154,8 +170,9 @@ def _check(tensors: Mapping[str, Tensor], data: Mapping[str, Any]) -> None:
     for name, size, factors in (("inputs", data["inputs"], (1,)), ("vertices", data["vertices"], (1, 3))):
         if size <= 0 or not any(factor * size in sizes for factor in factors):
             raise ValueError(f"no tensor in it has the size of {name}, {size}")
-    if not isinstance(data.get("origin", {}), dict):
-        raise ValueError("its origin is no mapping")
+    for name, kind in _OPTIONAL.items():
+        if name in data and not isinstance(data[name], kind):
+            raise ValueError(f"{name} is {str(data[name])[:40]!r}")
     if not all(type(pin) is int and 0 <= pin < data["vertices"] for pin in data["pins"]):
         raise ValueError(f"pins name no vertices 0..{data['vertices'] - 1}")
     if not 0 <= data["seed"] < 1 << 63:

@@ -5,7 +5,8 @@ windows. Gradients are averaged by DistributedDataParallel; the energies of all 
 every process evaluates the same batch; contact anchors that one process moved or found anew, and states that
 it caches, are sent to the others. So the run is that of a single process with the same batch up to the
 rounding of float32 sums, which are taken in another order, and up to the anchors of a frame that comes twice
-in a step: it repeats bit for bit with the same number of processes, and not across numbers.
+in a step: it repeats bit for bit with the same number of processes, and not across numbers. Kind `ncs`
+differs by more: each process exchanges codes among its own windows alone.
 """
 
 from __future__ import annotations

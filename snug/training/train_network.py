@@ -13,8 +13,9 @@ from snug.body.skinning import skin, unskin_damped
 from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
-from snug.networks.trained_model import TrainedModel
-from snug.recipes.recipe import DEFAULT, Recipe
+from snug.networks.trained_model import TrainedModel, digest_of_triangles
+from snug.recipes.named import RECIPE_OF_KIND
+from snug.recipes.recipe import Recipe
 from snug.training.checkpoint import Checkpoint
 from snug.training.device import find_device
 from snug.training.kinds import find_kind
@@ -37,7 +38,7 @@ def train_network(
     steps: int,
     seed: int,
     trajectories: Mapping[str, Targets] | None = None,
-    recipe: Recipe = DEFAULT,
+    recipe: Recipe | None = None,
     log: Callable[[dict[str, float]], None] | None = None,
     progress: bool = True,
     every: int = 50,
@@ -62,7 +63,7 @@ def train_network(
         seed: of everything random.
         trajectories: for kinds that learn from a simulation, motion name -> simulated world vertices
             (T, V, 3) [m], or where they are stored.
-        recipe: options of network and training.
+        recipe: options of network and training; None: those of the kind (snug.recipes.named.RECIPE_OF_KIND).
         log: called with each row of the history, every `every` steps.
         progress: whether a bar is shown on standard error.
         every: steps between two rows of the history.
@@ -88,7 +89,8 @@ def train_network(
     """
     start = time.perf_counter()
     gc.collect()  # an earlier training refers to itself, and holds gigabytes
-    if find_kind(model_kind).network.fitted:
+    fitted, recipe = find_kind(model_kind).network.fitted, recipe or RECIPE_OF_KIND[model_kind]
+    if fitted:
         return _fitted_model(model_kind, dressed, motions, trajectories, seed=seed, recipe=recipe)
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
@@ -131,21 +133,27 @@ def _fitted_model(
     return TrainedModel(
         model_kind, network.eval(), recipe, seed=seed, steps=1, seconds=seconds, setup_seconds=ready - begun,
         history=[{"step": 1, "seconds": seconds, "loss": loss}],
-        summary={"training_frames": data.frames}, unit=kind.unit,
+        summary={"training_frames": data.frames}, unit=kind.unit, fps=1.0 / data.dt,
+        triangles=digest_of_triangles(dressed.garment.faces),
     )  # fmt: skip
 
 
 def untrained_model(
-    model_kind: str, dressed: DressedBody, motions: Sequence[Motion], *, seed: int, recipe: Recipe = DEFAULT
+    model_kind: str,
+    dressed: DressedBody,
+    motions: Sequence[Motion],
+    *,
+    seed: int,
+    recipe: Recipe | None = None,
 ) -> TrainedModel:
     """Return a network before any step, a row of the benchmark's tables.
 
     The default recipe starts at a zero last layer, where the untrained network is skinning alone. So this one
     keeps the random last layer of the recipe's rules: the answer of a network that has learned nothing. Input
-    statistics are those of the training motions.
+    statistics are those of the training motions. Without a recipe it is the kind's.
     """
     kind = find_kind(model_kind)
-    recipe = replace(recipe, zero_last_layer=False)
+    recipe = replace(recipe or RECIPE_OF_KIND[model_kind], zero_last_layer=False)
     data = TrainingSet(
         dressed, motions, recipe, features=kind.network.feature_set, sequences=kind.network.sequential
     )
@@ -153,4 +161,7 @@ def untrained_model(
     network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
     network.wear(dressed.garment)
     network.normalise_by(*data.input_statistics())
-    return TrainedModel(model_kind, network.eval(), recipe, seed=seed, unit=kind.unit)
+    return TrainedModel(
+        model_kind, network.eval(), recipe, seed=seed, unit=kind.unit, fps=1.0 / data.dt,
+        triangles=digest_of_triangles(dressed.garment.faces),
+    )  # fmt: skip

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from reference_sim.progress import progress_bar
 from snug.networks.tensor_file import TensorFileError, select_tensors
-from snug.networks.trained_model import TrainedModel
+from snug.networks.trained_model import TrainedModel, digest_of_triangles
 from snug.training.checkpoint import Checkpoint, describe_run
 from snug.training.optimisation_step import Trainer
 from snug.training.validation import Validation, Validator
@@ -189,4 +189,6 @@ class TrainingLoop:
             history=self.history,
             summary=summary,
             unit=trainer.how.unit,
+            fps=1.0 / trainer.data.dt,
+            triangles=digest_of_triangles(trainer.dressed.garment.faces),
         )

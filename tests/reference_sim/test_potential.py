@@ -150,6 +150,14 @@ def test_energies_of_different_cloths_are_refused():
         Potential([StretchStVK(bent_cloth()), Gravity(bent_cloth())])
 
 
+def test_terms_of_equal_names_are_refused():
+    """In tables and files, where terms are found by name, one would hide the other."""
+    cloth = bent_cloth()
+    terms = [StretchStVK(cloth), Gravity(cloth), Gravity(cloth, acceleration=1.6)]
+    with pytest.raises(ValueError, match="two energies are named 'gravity': give each a name of its own"):
+        Potential(terms)
+
+
 def test_second_derivatives_of_another_shape_are_refused():
     class Flat(Gravity):
         def active_hessian_blocks(self, x, convexity=0.0):

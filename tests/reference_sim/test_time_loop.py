@@ -167,6 +167,7 @@ def test_the_status_of_a_run_is_its_worst_and_the_reason_the_first_with_it():
 
     result = simulate(cloth, terms_of(cloth), frames=5, method=stopping)
     assert result.status == "timeout" and result.reason.startswith("frame 3: ")
+    assert "\nworst      timeout: frame 3: " in summarise(result, None, frames=5)
 
 
 def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():

@@ -164,13 +164,15 @@ def test_a_barrier_takes_the_place_of_the_penalty_and_nothing_passes(folder):
     assert Trajectory.load("b.vtkhdf").provenance["terms"]["barrier"]["self_contact"]
 
 
-def test_self_contact_stands_beside_the_penalty_and_its_friction(folder):
+def test_self_contact_stands_beside_the_penalty_and_its_friction(folder, capsys):
     pytest.importorskip("ipctk")
     arguments = ["sheet.obj", "--self-contact", "--friction", "0.3", "--contact-margin", "0.003"]
     assert main([*arguments, "--obstacle", "ball", "--quiet", "-o", "a.vtkhdf"]) == 0
     terms = Trajectory.load("a.vtkhdf").provenance["terms"]
     assert (terms["barrier"]["self_contact"], terms["barrier"]["obstacle"]) == (True, False)
     assert terms["collision"] and terms["friction"]["coefficient"] == 0.3
+    note = "note: --friction 0.3 is that of the obstacle; cloth slides on cloth without friction\n"
+    assert note in capsys.readouterr().err
 
 
 def test_a_missing_package_is_said_with_its_remedy(folder, capsys, monkeypatch):
@@ -183,7 +185,7 @@ def test_not_converged_is_status_1(folder, capsys):
     assert main(["sheet.obj", "--pins", "0", "--frames", "4", "--max-iterations", "1", "-o", "a.vtkhdf"]) == 1
     out = capsys.readouterr().out
     assert re.search(
-        r"frames     4 of 4; 0 of 3 steps converged.*\nfirst not  max_iterations: frame 1: ", out
+        r"frames     4 of 4; 0 of 3 steps converged.*\nworst      max_iterations: frame 1: ", out
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
@@ -19,6 +20,9 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.material import GRAVITY
+from reference_sim.minimise import Newton
+from reference_sim.minimise.result import Result
+from reference_sim.time_step import State, TimeStepper
 from tests.reference_sim.energies.barriers import cuts, folded, sheet, still
 from tests.reference_sim.meshes import box, grid, patch, sphere
 
@@ -120,6 +124,20 @@ def test_the_way_of_a_line_search_ends_before_the_first_touch():
     assert "cuts" in barrier.infeasibility(x - np.array([0, 0.004, 0]))
 
 
+def test_a_line_search_that_ends_at_the_side_of_the_box_finds_what_is_behind_it():
+    """The longest step ends at the side of the box, half a millimetre above a floor that lies outside of it."""
+    cloth = sheet(3, 0.1, (0.0, 0.0, 0.0))
+    floor = Obstacle(*box((-1, -0.2, -1), (1, -0.0505, 1)))
+    barrier, anew = ContactBarrier(cloth), ContactBarrier(cloth)
+    x, direction = cloth.rest_positions, np.tile([0.0, -0.098, 0.0], (cloth.vertex_count, 1))
+    for energy in (barrier, anew):
+        energy.prepare(still(x, floor))
+    y = x + barrier.largest_step(x, direction) * direction
+    assert y[:, 1] == pytest.approx(-0.05, abs=1e-12)
+    assert barrier.value_and_gradient(y)[0] == pytest.approx(anew.value_and_gradient(y)[0], rel=1e-9)
+    assert anew.value_and_gradient(y)[0] > 1e-3
+
+
 def test_a_start_that_intersects_is_refused_by_name():
     cloth = sheet(2, 0.1, (-0.05, 0.0, -0.05))
     ball, faces = sphere(1, radius=0.02)
@@ -169,6 +187,55 @@ def test_a_body_that_leaves_no_room_stops_and_says_so():
     assert "frame 2" in pressed.reason
     assert list(pressed.frame_fields["converged"][[1, 2, 4]]) == [1, 0, 1]
     assert not cuts(pressed.positions[4], cloth.edges, press.at(4), press.faces).any()
+
+
+def test_a_body_that_stopped_stays_there_when_the_step_is_frozen_again():
+    """Frozen again at the end of its way, it would cut the cloth that it had stopped before."""
+    cloth, press = a_press()
+    barrier = ContactBarrier(cloth)
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), barrier]
+    pressed = simulate(cloth, terms, obstacle=press, frames=3, refreeze=1)
+    assert pressed.status == "stalled" and not pressed.frame_fields["converged"][2]
+    assert barrier.collisions.progress < 1
+    assert not barrier.infeasibility(pressed.positions[2])
+
+
+def test_a_step_that_is_prepared_again_begins_where_the_body_had_stopped():
+    cloth, press = a_press()
+    barrier, x = ContactBarrier(cloth), cloth.rest_positions
+    steps = [Step(x, 0 * x, x, 1 / 30, press, frame) for frame in (2, 3, 3)]
+    barrier.prepare(steps[0])
+    barrier.set_progress(0.4)
+    stopped = barrier.collisions.obstacle_at(0.4)
+    for step in steps[1:]:
+        barrier.prepare(step)
+        assert np.array_equal(barrier.collisions.obstacle_at(0.0), stopped)
+        assert np.array_equal(barrier.collisions.obstacle_at(1.0), press.at(3))
+
+
+class Clocked:
+    """Newton's method that says "timeout"; `rough` counts its minimisations on the way of the obstacle."""
+
+    rough = 0
+
+    def __init__(self, potential: Potential, **options) -> None:
+        self.newton, self.options = Newton(potential, **options | {"timeout": np.inf}), options
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        Clocked.rough += self.options.get("max_iterations") == 8
+        return dataclasses.replace(self.newton.minimise(x0), status="timeout", reason="gave up")
+
+
+@pytest.mark.parametrize("timeout", [np.inf, 1e-9])
+def test_a_timeout_is_not_hidden_by_a_body_that_stopped_and_ends_its_approach(timeout):
+    cloth, press = a_press()
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
+    stepper = TimeStepper(cloth, terms, dt=1 / 30, obstacle=press, method=Clocked, timeout=timeout)
+    state, _ = stepper.advance(1, State(cloth.rest_positions, 0 * cloth.rest_positions), None)
+    Clocked.rough = 0
+    _, (result,) = stepper.advance(2, state, None)
+    assert result.status == "timeout" and "pins and obstacle came" in result.reason
+    assert Clocked.rough == 1 if timeout < 1 else Clocked.rough >= 3
 
 
 def test_a_run_cut_off_where_a_body_had_stopped_is_not_gone_on_with(tmp_path):

@@ -46,7 +46,7 @@ class TestForms:
         expected = place(KICK)
         expected.poses[:, HANDS] *= HAND_DAMPING
         files = write_forms(tmp_path, KICK, turn)
-        assert len(files) == 15
+        assert len(files) == 16
         for file in files:
             (motion,) = load_motions(file, spread_degrees=0.0)
             exact = 1e-9 if file.suffix != ".bvh" else 1e-7

@@ -134,3 +134,19 @@ def test_misfits_are_named():
     network = make_network("snug", 85, dressed.vertices, PAPER, seed=0)
     with pytest.raises(RollOutError, match="reads 85 numbers"):
         roll_out(TrainedModel("snug", network, DEFAULT), dressed, motion)
+
+
+def test_a_model_knows_the_rate_of_its_motions_and_the_triangles_of_its_garment(tmp_path):
+    dressed, motion, fast = tube_dress(), swaying(), swaying(fps=60.0)
+    models = {kind: untrained_model(kind, dressed, [motion], seed=0) for kind in ("snug", "pbns")}
+    loaded = TrainedModel.load(models["snug"].save(tmp_path / "snug.safetensors"))
+    assert loaded.fps == pytest.approx(30.0) and loaded.triangles == models["pbns"].triangles != ""
+    with pytest.raises(RollOutError, match=r"learned from 30 frames a second, motion .* has 60: resample"):
+        roll_out(loaded, dressed, fast)
+    roll_out(models["pbns"], dressed, fast)  # a pose has no rate
+    for model in models.values():
+        model.triangles = "another"
+        with pytest.raises(RollOutError, match="as many vertices and other triangles"):
+            roll_out(model, dressed, motion)
+        model.triangles, model.fps = "", 0.0  # of a file of before
+        roll_out(model, dressed, fast)

@@ -16,7 +16,7 @@ from snug.networks.architectures import ARCHITECTURES
 from snug.networks.roll_out import roll_out
 from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
-from snug.recipes.named import PAPER, SUPERVISED
+from snug.recipes.named import PAPER, RECIPE_OF_KIND, SUPERVISED
 from snug.recipes.recipe import DEFAULT, RecipeError
 from snug.training.augmentation.mixed_clips import augment
 from snug.training.losses.vertex_targets import TargetError, vertex_loss
@@ -276,3 +276,11 @@ def test_untrained_is_not_skinning_alone():
 def test_mixed_motions_join_the_training_set():
     model = short(recipe=replace(DEFAULT, mixed=2.0), steps=2)
     assert model.summary["training_frames"] == 30 + 60
+
+
+@pytest.mark.parametrize("kind", ["snug", "pbns", "ncs-static"])
+def test_without_a_recipe_the_kinds_own_is_taken(kind):
+    model = train_network(kind, tube_dress(), [swaying(30)], steps=1, seed=0, progress=False)
+    assert model.recipe == RECIPE_OF_KIND[kind]
+    untrained = untrained_model(kind, tube_dress(), [swaying(30)], seed=0)
+    assert untrained.recipe == replace(RECIPE_OF_KIND[kind], zero_last_layer=False)
