@@ -125,17 +125,19 @@ def test_the_way_of_a_line_search_ends_before_the_first_touch():
 
 
 def test_a_line_search_that_ends_at_the_side_of_the_box_finds_what_is_behind_it():
-    """The longest step ends at the side of the box, half a millimetre above a floor that lies outside of it."""
+    """The second step ends at the side of the box, 0.8 mm above a floor that lies outside of it."""
     cloth = sheet(3, 0.1, (0.0, 0.0, 0.0))
-    floor = Obstacle(*box((-1, -0.2, -1), (1, -0.0505, 1)))
+    floor = Obstacle(*box((-1, -0.2, -1), (1, -0.0508, 1)))
     barrier, anew = ContactBarrier(cloth), ContactBarrier(cloth)
-    x, direction = cloth.rest_positions, np.tile([0.0, -0.098, 0.0], (cloth.vertex_count, 1))
+    y = cloth.rest_positions
     for energy in (barrier, anew):
-        energy.prepare(still(x, floor))
-    y = x + barrier.largest_step(x, direction) * direction
+        energy.prepare(still(y, floor))
+    for drop in (0.045, 0.005):
+        direction = np.tile([0.0, -drop, 0.0], (cloth.vertex_count, 1))
+        y = y + barrier.largest_step(y, direction) * direction
     assert y[:, 1] == pytest.approx(-0.05, abs=1e-12)
     assert barrier.value_and_gradient(y)[0] == pytest.approx(anew.value_and_gradient(y)[0], rel=1e-9)
-    assert anew.value_and_gradient(y)[0] > 1e-3
+    assert anew.value_and_gradient(y)[0] > 0.0
 
 
 def test_a_start_that_intersects_is_refused_by_name():

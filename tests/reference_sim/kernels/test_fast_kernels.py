@@ -87,6 +87,7 @@ def test_an_unknown_use_is_named(cloth):
 
 def test_weights_of_all_terms_add_up(cloth):
     two = [Gravity(cloth), Gravity(cloth, acceleration=1.0)]
+    two[1].name = "a second gravity"
     terms = step_terms(Potential([*two, Inertia(cloth, 0.1)]), "float32_lanes", "test")
     assert terms.weights == pytest.approx(10.81 * cloth.masses) and terms.elements == ()
 
