@@ -60,8 +60,8 @@ def load_motions(
         raise MotionError(f"{path}: no such file or folder; give a motion file ({known}) or a folder")
     files = [path]
     if path.is_dir():
-        clips = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
-        files = [clip for clip in clips if not holds_shape_alone(clip)] or clips
+        listed = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
+        files = [file for file in listed if not holds_shape_alone(file)] or listed
     if not files:
         raise MotionError(f"{path}: holds no motion file ({known}); give a folder of motion capture clips")
     clips = [resample(place(read_motion(file, options or MotionFileOptions()))) for file in files]
