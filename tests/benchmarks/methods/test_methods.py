@@ -1,4 +1,4 @@
-"""Every method on every scene (some on two), tiny: a trajectory or an explained skip; and its metrics."""
+"""Every method on every scene (sweeps on two), tiny: a trajectory or an explained skip; and its metrics."""
 
 from __future__ import annotations
 
@@ -58,15 +58,8 @@ FINER = [e for e in SMALL_METHODS if e.reporting.level is not None and e not in 
 ]
 FEWER_METHODS = [entry for entry in SMALL_METHODS if entry not in FINER]
 BODY = f"tshirt/{TEST}"
-# Tried in two scenes: sweeps, which are compiled for each set of terms, which takes longer than all else in a
-# scene, and simulations of another material or solved in another way.
-SWEEPS, IN_TWO = ("vbd", "xpbd"), ("hanging_sheet", BODY)
-OF_TWO = {
-    e.name
-    for e in SMALL_METHODS
-    if e.reporting.family in SWEEPS
-    or (e.name.startswith("simulation-") and e.reporting.family != "simulation-perturbed")
-}
+# Sweeps are compiled for each set of terms, which takes longer than all else in a scene.
+SWEEPS, SWEPT = ("vbd", "xpbd"), ("hanging_sheet", BODY)
 EXTERNAL = {entry.name for entry in METHODS if entry.package or entry.needs_no_obstacle}
 NAMES = [*(scene.name for scene in SCENES), BODY]
 
@@ -80,7 +73,7 @@ def run(tmp_path_factory):
         Cell(scene, entry, 0, ("garments", "speed"))
         for scene in scenes
         for entry in (SMALL_METHODS if scene is scenes[0] else FEWER_METHODS)
-        if entry.name not in OF_TWO or scene.name in IN_TWO
+        if entry.reporting.family not in SWEEPS or scene.name in SWEPT
     )
     plan = dataclasses.replace(
         plan_of(folder.path), preset=TINY, cells=cells, motions=Motions((TRAIN,), (TEST,))
