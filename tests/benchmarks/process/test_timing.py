@@ -46,12 +46,13 @@ def test_what_is_made_only_when_it_is_looked_at_is_made_on_the_clock():
 
 def test_short_work_is_done_again_until_enough_is_measured_and_long_work_once():
     def run():
-        work(0.02)
+        work(0.01)
         return np.zeros((2, 3, 3))
 
-    _, reading = clocked(run, of=positions_of, least=0.1)
+    # A busy machine takes the processor away for some 0.1 s: far less than what is asked for.
+    _, reading = clocked(run, of=positions_of, least=0.4)
     assert len(reading.runs) > 1 and reading.complaint == ""
-    assert sum(reading.runs[:-1]) < 0.1 <= sum(reading.runs)
+    assert sum(reading.runs[:-1]) < 0.4 <= sum(reading.runs)
     assert reading.seconds == sorted(reading.runs)[len(reading.runs) // 2] or len(reading.runs) % 2 == 0
     assert len(clocked(run, of=positions_of)[1].runs) == 1
     _, reading = clocked(lambda: np.zeros(1), of=positions_of, least=60.0)
