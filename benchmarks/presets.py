@@ -100,7 +100,7 @@ PRESETS = (
     ),
     Preset(
         name="quick",
-        description="garments of 1000 vertices, all training clips, eight test motions",
+        description="garments of 1000 vertices, all training clips, eight motions to measure",
         garment_vertices=1000,
         train_motions=None,
         test_motions=8,
