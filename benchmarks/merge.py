@@ -38,6 +38,7 @@ skipped row. Runs go on in their own folders, not in the merged one.
 exit status: 0 written; 2 the runs differ in what has to be the same, or a file is damaged: one line says
   which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
+CASE_TIMES = {"engine/time", "engine/reference_time"}  # cases declare no metric that says so
 SAME = ("format", "protocol", "split", *OF_SCENES)  # entries of run.json
 STRICT = ("motions", "motion_sources", "garments", "metrics", "methods", "scenes", "cases")  # where shared
 JOINED = (*STRICT, "tasks", "outdated")  # which hold times and remarks
@@ -191,7 +192,8 @@ def _equal_weights(one: Path, other: Path, names: Iterable[str]) -> bool:
 
 def of_machines(config: Mapping[str, Any]) -> frozenset[str]:
     """Return the metrics of a run that are numbers of the machine, as every time."""
-    return frozenset(name for name, entry in config["metrics"].items() if entry.get("of") == "machine")
+    declared = {name for name, entry in config["metrics"].items() if entry.get("of") == "machine"}
+    return frozenset(declared | CASE_TIMES)
 
 
 def joined_rows(runs: Mapping[str, Sequence[Row]], timed: frozenset[str]) -> list[Row]:

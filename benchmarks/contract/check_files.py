@@ -12,10 +12,11 @@ from benchmarks.cell import Cell
 from benchmarks.contract.check_method import CheckMethod
 from benchmarks.contract.check_metric import CheckMetrics
 from benchmarks.contract.check_scene import CheckScene
-from benchmarks.declarations import DeclarationError
+from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import MethodEntry
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import Metric
+from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.presets import find_preset
@@ -25,7 +26,7 @@ from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scene import Scene
-from benchmarks.scenes import SCENES, find_scene, of_garment
+from benchmarks.scenes import SCENES, all_scenes, find_scene, of_garment
 from benchmarks.tasks.task import Task
 
 SECONDS = 120.0
@@ -54,7 +55,7 @@ class Declarations:
 
 
 def read_files(paths: Sequence[str]) -> Declarations:
-    """Return what these files declare. Raises DeclarationError."""
+    """Return what these files declare. Raises DeclarationError where a run with one would."""
     declared = Declarations()
     for path in paths:
         if not path.endswith(".py"):
@@ -65,8 +66,14 @@ def read_files(paths: Sequence[str]) -> Declarations:
         if not kinds:
             names = ", ".join(kind.tuple_name for kind in user_files.KINDS)
             raise DeclarationError(f"{path}: declares none of {names}")
+        own = Declarations(**{kind.word: user_files.entries_of(kind, file) for kind in kinds})
+        user_files.check_networks(own.methods)
+        by_name("method", (*METHODS, *own.methods))
+        by_name("scene", (*all_scenes((), ()).values(), *own.scenes))
+        if own.metrics:
+            declared_metrics((file,))
         for kind in kinds:
-            getattr(declared, kind.word).extend(user_files.entries_of(kind, file))
+            getattr(declared, kind.word).extend(getattr(own, kind.word))
     return declared
 
 

@@ -43,7 +43,7 @@ class CheckMethod(CellTask):
         return outcome
 
     def _check(self, findings: Findings, context: Context) -> None:
-        scene = self.scene(context)
+        scene, entry = self.scene(context), self.cell.entry
         before = fingerprints(scene)
         method = self._made(findings, context, scene)
         with findings.call("run()", self._hint(scene)):
@@ -53,8 +53,9 @@ class CheckMethod(CellTask):
                 trajectory, reading = method.run(), Reading((float("nan"),))
         if reading.complaint:
             findings.wrong.append(f"{UNBELIEVABLE}{reading.complaint}")
-        elif _shapes(findings, trajectory, scene):
-            self._places(findings, trajectory, scene)
+        elif _shapes(findings, trajectory, scene, other_mesh=entry.other_mesh):
+            if not entry.other_mesh:
+                self._places(findings, trajectory, scene)
             self._numbers(findings, trajectory, reading, scene)
             self._again(findings, trajectory, context, scene)
         self._besides(findings, method, scene)
@@ -114,7 +115,10 @@ class CheckMethod(CellTask):
         """Demand a known status, finite numbers and frame times that fit the clock."""
         import numpy as np
 
-        status, reason = judge(trajectory, reading, scene, truncated=self.cell.entry.truncated)
+        entry = self.cell.entry
+        status, reason = judge(
+            trajectory, reading, scene, truncated=entry.truncated, other_mesh=entry.other_mesh
+        )
         if status == "failed" or (status != "ok" and not trajectory.reason):
             ending = f"ends as {status}: {reason or 'without a reason'}"
             findings.wrong.append(
@@ -168,7 +172,7 @@ class CheckMethod(CellTask):
             with findings.call("quasi_static()", ": return None where there is no such answer"):
                 held = method.quasi_static()
             if held is not None:
-                _shapes(findings, held, scene, "quasi_static(): ")
+                _shapes(findings, held, scene, "quasi_static(): ", other_mesh=self.cell.entry.other_mesh)
         if not self.cell.entry.batched:
             return
         with findings.call("batch()"):
@@ -181,8 +185,13 @@ class CheckMethod(CellTask):
         )
 
 
-def _shapes(findings: Findings, trajectory: object, scene: BuiltScene, what: str = "") -> bool:
-    """Return whether positions, faces and times have the shapes of the scene."""
+def _shapes(
+    findings: Findings, trajectory: object, scene: BuiltScene, what: str = "", *, other_mesh: bool
+) -> bool:
+    """Return whether positions, faces and times have the shapes of the scene.
+
+    other_mesh: whether there may be other vertices and faces.
+    """
     import numpy as np
 
     from reference_sim import Trajectory
@@ -191,7 +200,7 @@ def _shapes(findings: Findings, trajectory: object, scene: BuiltScene, what: str
         kind = type(trajectory).__name__
         findings.wrong.append(f"{what}gives a {kind}: return a reference_sim.Trajectory")
         return False
-    x, wrong = np.asarray(trajectory.positions), misshapen(trajectory.positions, scene)
+    x, wrong = np.asarray(trajectory.positions), misshapen(trajectory.positions, scene, other_mesh=other_mesh)
     fine = findings.demand(not wrong, f"{what}{wrong}")
     ended = trajectory.status in ("diverged", "timeout", "stalled")
     fine = fine and findings.demand(
@@ -201,7 +210,7 @@ def _shapes(findings: Findings, trajectory: object, scene: BuiltScene, what: str
     )
     faces = np.asarray(trajectory.faces)
     findings.demand(
-        np.array_equal(faces, scene.cloth.faces),
+        other_mesh or np.array_equal(faces, scene.cloth.faces),
         f"{what}gives other faces than the scene's: give cloth.faces",
     )
     if fine:

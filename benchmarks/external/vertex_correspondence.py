@@ -76,13 +76,14 @@ def _laid_on(
     rare = dict(zip(*np.unique(our_colours, return_counts=True)))
     rarity = np.array([[rare[c] for c in our_colours[face]] for face in ours]).min(axis=1)
     for seed in ours[np.argsort(rarity, kind="stable")]:
-        if order[seed[0]] >= 0:
+        if (order[seed] >= 0).all():
             continue
+        # A part may share a vertex with parts that are laid already.
         ways = [
             way
             for place in _places(seed, theirs, *colours, their_points, our_points)
-            if place[0] not in taken
-            and (way := _followed(seed, place, their_side, our_side, *colours)) is not None
+            if (way := _followed(seed, place, their_side, our_side, *colours)) is not None
+            and all(b == order[a] if order[a] >= 0 else b not in taken for a, b in way.items())
         ]
         if not ways:
             return None

@@ -70,7 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         only=STATES[1:],  # a training whose process was killed is done again too
         **scene_fields(options),
     )
-    other_data = request.motions or request.body or request.garment or request.self_contact
+    own = (request.motions, request.body, request.garment, request.self_contact)
+    other_data = any((*own, request.test_motions, request.validation_motions))
     if options.into_package and (other_data or options.preset != PRESET):
         what = f"preset {PRESET}, its own body, garments and motions, without self-contact"
         raise PlanError(f"--into-package: the package has networks of {what}")

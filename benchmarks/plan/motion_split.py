@@ -57,7 +57,7 @@ def split_motions(
         test = TEST if with_library else tuple(n for n in learned if n not in validation_names)[:1]
     validation = tuple(name for name in names if name in validation_names)
     if with_library and not validation:
-        validation = tuple(name for name in VALIDATION if name not in test)
+        validation = tuple(name for name in VALIDATION if clip_of(name) not in tested)
     of_library = (*VALIDATION, *TEST) if with_library else ()
     held_out = {clip_of(name) for name in (*test, *validation, *of_library)}
     train = tuple(name for name in learned if clip_of(name) not in held_out)

@@ -72,11 +72,11 @@ def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[list[str], list
         names += [entry.name for entry in entries[file]]
     every = [entry for some in entries.values() for entry in some]
     if kind is METHODS:
-        _check_networks(every)
+        check_networks(every)
     return names, every
 
 
-def _check_networks(entries: Sequence[MethodEntry]) -> None:
+def check_networks(entries: Sequence[MethodEntry]) -> None:
     """Raise DeclarationError where two trainings have one name: one network would be the other's."""
     trainings: dict[str, Training | None] = {**TRAININGS, "untrained": None}
     for entry in entries:

@@ -144,6 +144,14 @@ def test_the_check_names_each_breach_and_its_remedy(name, tmp_path, monkeypatch)
 
 def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatch):
     assert look(lambda *, models, seed: Still(), tmp_path, monkeypatch) == []
+
+    class Finer(Still):
+        def run(self):
+            positions = np.zeros((self.scene.frames, 4, 3))
+            times = np.arange(self.scene.frames) * self.scene.dt
+            return Trajectory(positions, np.array([[0, 1, 2], [0, 2, 3]]), times, status="ok")
+
+    assert look(lambda *, models, seed: Finer(), tmp_path, monkeypatch, other_mesh=True) == []
     wrong = look(lambda *, models: Still(), tmp_path, monkeypatch)
     assert "make() raises TypeError" in wrong[0] and "make(*, models, seed" in wrong[0]
     assert "without prepare, run" in look(lambda *, models, seed: object(), tmp_path, monkeypatch)[0]
@@ -216,18 +224,6 @@ def test_the_command_checks_what_files_declare(in_process, tmp_path, capsys):
     assert "height/highest of simulation is a ndarray: give a float" in out and "2 to mend" in out
 
 
-JUDGED = (
-    METRIC_FILE
-    + """
-def series(roll_out):
-    return {"height/all": roll_out.positions[..., 1]}
-
-def judge(roll_out, values):
-    return SAID
-"""
-)
-
-
 BOUND_FILE = """import numpy as np
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.make_plan import check_garment_name
@@ -250,6 +246,32 @@ class Bound(Method):
 def make(*, models, seed):
     return Bound()
 """
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (BOUND_FILE.replace('name="bound"', 'name="snug"'), "method 'snug' is declared twice"),
+        (BOUND_FILE.replace('role="solver"', 'trained="nowhere"'), "no training is called 'nowhere'"),
+        (METRIC_FILE.replace("height/highest", "energy/strain"), "metric 'energy/strain' is declared twice"),
+        (SCENE_FILE.replace('"lift"', '"free_fall"'), "scene 'free_fall' is declared twice"),
+    ],
+)
+def test_the_check_refuses_what_a_run_refuses(source, message, tmp_path, refused):
+    (tmp_path / "mine.py").write_text(source)
+    refused(message, check.main, [str(tmp_path / "mine.py")])
+
+
+JUDGED = (
+    METRIC_FILE
+    + """
+def series(roll_out):
+    return {"height/all": roll_out.positions[..., 1]}
+
+def judge(roll_out, values):
+    return SAID
+"""
+)
 
 
 def test_a_method_that_is_bound_to_a_mesh_is_checked_in_the_scene_that_has_it(in_process, tmp_path, capsys):

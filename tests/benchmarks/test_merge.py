@@ -10,7 +10,7 @@ import torch
 
 from benchmarks import merge as command
 from benchmarks.fingerprint.digest import digest_of_file
-from benchmarks.merge import MergeError, joined_rows
+from benchmarks.merge import MergeError, joined_rows, of_machines
 from benchmarks.results.row import DECLARED, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -260,6 +260,14 @@ def test_times_are_of_the_first_machine_that_measured_them():
     assert joined_rows({"a": [a], "c": [twin]}, TIMED) == [a, twin]
     clip = dataclasses.replace(b, suite="speed")  # a suite that one machine alone has timed
     assert joined_rows({"a": [a], "b": [clip]}, TIMED) == [a, clip]
+
+
+def test_times_of_engines_are_of_a_machine_though_their_cases_declare_no_metric():
+    timed = of_machines({"metrics": {}})
+    a, b = row("engine/time", 3.1, "ms"), row("engine/time", 3.12, "ms", hardware="B")
+    assert joined_rows({"a": [a], "b": [b]}, timed) == [a]
+    with pytest.raises(MergeError, match="engine/distance"):
+        joined_rows({"a": [row("engine/distance", 1.0, "%")], "b": [row("engine/distance", 2.0, "%")]}, timed)
 
 
 def test_a_declared_time_is_of_no_machine():

@@ -29,6 +29,14 @@ def test_a_symmetric_mesh_is_laid_on_itself_where_it_is_nearest(flip):
     assert same_topology(theirs[:-1], two, both[order], both) is None
 
 
+def test_parts_that_share_one_vertex_are_laid_on_each_other():
+    ours = np.array([[0, 1, 2], [0, 3, 4]])
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1.5, 0]])
+    order = np.array([3, 1, 4, 0, 2])
+    theirs = np.argsort(order)[ours]
+    assert np.array_equal(order[same_topology(theirs, ours, points[order], points)], np.arange(5))
+
+
 def test_a_mesh_with_a_thousand_symmetries_is_laid_on_itself_in_a_moment():
     points, faces, _ = torus(24, 0.3, 0.1)
     order = RANDOM.permutation(len(points))

@@ -196,6 +196,7 @@ def test_motions_are_divided_as_help_says():
     moved = split_motions([], ["walk", "kick"], quick)
     assert set(moved.test) == {"walk", "kick"} and "kick" not in moved.validation
     assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
+    assert not {"05_02_b", "05_02_c"} & set(split_motions([], ["05_02_a"], quick).validation)
     other = split_motions([], [], quick, validation_names=["bow"], split="validation")
     assert (other.validation, other.test, other.measured) == (("bow",), TEST, ("bow",))
     assert not {"bow", *VALIDATION, *TEST} & set(other.train)

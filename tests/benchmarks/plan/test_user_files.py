@@ -294,7 +294,7 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
     other = dataclasses.replace(entry, name="b", training=Training("snug", DEFAULT))
     for wrong in ([entry, other], [dataclasses.replace(entry, trained="snug")]):
         with pytest.raises(DeclarationError, match="another training is called"):
-            user_files._check_networks(wrong)
+            user_files.check_networks(wrong)
 
 
 @pytest.mark.parametrize(

@@ -208,6 +208,7 @@ def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp
     assert command.main([*options, "--preset", "smoke", "--into-package"]) == 2
     assert "networks of preset quick" in capsys.readouterr().err
     assert command.main([*options, "--motions", "library", "--into-package"]) == 2
+    assert command.main([*options, "--validation-motions", "05_04", "--into-package"]) == 2
     assert "its own body, garments and motions" in capsys.readouterr().err
 
 
