@@ -94,7 +94,7 @@ class Material:
             raise MaterialError(f"{path}: lame_lambda and lame_mu also need {', '.join(missing)}")
         try:
             return cls.from_lame(**values) if lame else cls(**values)
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             raise MaterialError(f"{path}: {error}") from None
 
     @classmethod

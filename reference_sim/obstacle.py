@@ -111,7 +111,7 @@ class Obstacle:
 
     def _forget(self) -> None:
         self._search: FaceSearch | None = None
-        self._fitted = -1  # the frame that the search is fitted to
+        self._fitted: int | None = None  # the frame that the search is fitted to
         # Of so many points, in regions or not: the faces found last, the lists to search, places at rest.
         self._last: dict[tuple[int, bool], tuple[np.ndarray, Listed, np.ndarray | None]] = {}
 
@@ -121,7 +121,12 @@ class Obstacle:
         return (len(self.positions) - 1) * self._substeps + 1
 
     def at(self, frame: int) -> np.ndarray:
-        """Return the vertices (B, 3) [m] at `frame`; the last frame holds on for ever."""
+        """Return the vertices (B, 3) [m] at `frame`; the last frame holds on for ever.
+
+        Raises ValueError for a frame below 0.
+        """
+        if frame < 0:
+            raise ValueError(f"obstacle: frame {frame}: frames count from 0")
         whole, part = divmod(min(frame, self.frames - 1), self._substeps)
         if part == 0:
             return self.positions[whole]
@@ -196,12 +201,15 @@ class Obstacle:
     ) -> np.ndarray:
         """Return points (N, 3) [m] of frame - 1 moved along with the body, each beside its nearest face.
 
+        At frame 0 nothing has moved.
+
         The best known initial guess for a garment: the body's own motion, face by face.
         """
-        closest = self._nearest(points, frame - 1, rest_points)
+        before = max(frame - 1, 0)
+        closest = self._nearest(points, before, rest_points)
         carried = np.empty_like(closest.points)
         carry(
-            points, closest.points, closest.faces, closest.barycentric, self.at(frame - 1), self.at(frame),
+            points, closest.points, closest.faces, closest.barycentric, self.at(before), self.at(frame),
             self.faces, carried,
         )  # fmt: skip
         return carried

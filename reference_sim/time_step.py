@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,8 +146,16 @@ class TimeStepper:
         Returns:
             The state at the frame, None if a sub-step diverged, and the result of each minimisation, without
             those that only bring a barrier nearer.
+
+        Raises:
+            ValueError: pins of another shape, or not finite.
         """
         x, v, results = state.x, state.v, []
+        if pins is not None:
+            pins, due = np.asarray(pins, dtype=np.float64), (len(self.cloth.pins), 3)
+            if pins.shape != due or not np.isfinite(pins).all():
+                what = f"simulate: pin_positions({frame}) gives {pins.shape}"
+                raise ValueError(f"{what}: finite positions {due} [m] are due")
         for j in range(1, self.substeps + 1):
             share = j / self.substeps
             handles = state.x[self.cloth.pins]
@@ -303,10 +311,18 @@ class TimeStepper:
             "guess": self.guess,
             "quasi_static": self.quasi_static,
             "refreeze": self.refreeze,
-            "options": {name: getattr(value, "__name__", value) for name, value in self.options.items()},
+            "options": {name: _as_json(value) for name, value in self.options.items()},
             **opening,
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
             "material": asdict(cloth.material),
             "cloth": fingerprint(cloth.rest_positions, cloth.faces, np.asarray(cloth.pins), cloth.rest_uv),
             "obstacle": None if obstacle is None else f"{type(obstacle).__name__} {obstacle.fingerprint}",
         }
+
+
+def _as_json(option: Any) -> Any:
+    """Return a value of JSON for an option: of a function its name, of a partial one its arguments too."""
+    if isinstance(option, partial):
+        named = {name: _as_json(value) for name, value in option.keywords.items()}
+        return [_as_json(option.func), *map(_as_json, option.args), named]
+    return getattr(option, "__name__", type(option).__name__) if callable(option) else option

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy
+from reference_sim.energies.energy import Energy, demand_not_negative
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -22,11 +22,15 @@ if TYPE_CHECKING:
 
 
 class AreaBarrier(Energy):
-    """Barrier energy [J] of each face of `cloth`; stiffness kappa [J/m^2], threshold q0 [1]."""
+    """Barrier energy [J] of each face of `cloth`; stiffness kappa [J/m^2], threshold q0 [1].
+
+    Raises ValueError for one that is negative or not finite.
+    """
 
     name = "area_barrier"
 
     def __init__(self, cloth: Cloth, *, stiffness: float = 100.0, threshold: float = 0.1) -> None:
+        demand_not_negative("AreaBarrier", stiffness=stiffness, threshold=threshold)
         self.cloth = cloth
         self.stencils = cloth.faces
         self.Dm_inverse = cloth.Dm_inverse

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.energies.contact_barrier import ContactBarrier
-from reference_sim.energies.energy import Energy, Step
+from reference_sim.energies.energy import Energy, Step, demand_not_negative
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -41,10 +41,9 @@ class BarrierFriction(Energy):
     dynamic = True
 
     def __init__(self, barrier: ContactBarrier, *, coefficient: float = 0.5, speed: float = 0.02) -> None:
-        if not (np.isfinite(coefficient) and coefficient >= 0):
-            raise ValueError(f"BarrierFriction coefficient = {coefficient!r}: must not be negative")
-        if not (np.isfinite(speed) and speed > 0):
-            raise ValueError(f"BarrierFriction speed = {speed!r}: must be a finite number above 0")
+        demand_not_negative("BarrierFriction", coefficient=coefficient, speed=speed)
+        if speed == 0:
+            raise ValueError("BarrierFriction speed = 0: must be above 0")
         self.cloth, self.barrier = barrier.cloth, barrier
         self.stencils = np.zeros((0, 4), dtype=np.int64)
         self.coefficient, self.speed = float(coefficient), float(speed)

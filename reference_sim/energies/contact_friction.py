@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.energies.contact_penalty.definition import ContactPenalty
-from reference_sim.energies.energy import Energy, Step
+from reference_sim.energies.energy import Energy, Step, demand_not_negative
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -38,14 +38,17 @@ class ContactFriction(Energy):
         speed: [m/s].
 
     Raises:
-        ValueError: at prepare, if the contact was not prepared for the same step; when evaluated, if the step
-            before was not prepared.
+        ValueError: a negative coefficient, or a speed that is not above 0; at prepare, if the contact was not
+            prepared for the same step; when evaluated, if the step before was not prepared.
     """
 
     name = "friction"
     remembers = True
 
     def __init__(self, contact: ContactPenalty, *, coefficient: float = 0.5, speed: float = 0.02) -> None:
+        demand_not_negative("ContactFriction", coefficient=coefficient, speed=speed)
+        if speed == 0:
+            raise ValueError("ContactFriction speed = 0: must be above 0")
         self.cloth = contact.cloth
         self.contact = contact
         self.stencils, self.weights = contact.stencils, contact.weights

@@ -40,6 +40,19 @@ class Step:
     frame: int = 0
 
 
+# What follows from the definition of a term, unless its class has a closed form.
+DERIVATIVES = (
+    "value_and_gradient", "hessian_blocks", "active_hessian_blocks", "add_hessian", "scalar_stiffness",
+)  # fmt: skip
+
+
+def demand_not_negative(what: str, **numbers: float) -> None:
+    """Raise ValueError unless all numbers are finite and at least 0; `what` names the term in the message."""
+    for name, value in numbers.items():
+        if not (np.isfinite(value) and value >= 0):
+            raise ValueError(f"{what} {name} = {value!r}: must be finite and not negative")
+
+
 class Energy:
     """One physical term on one stencil.
 
@@ -69,6 +82,18 @@ class Energy:
     impassable: bool = False
     joins_late: bool = False
     kernels: ClassVar[Mapping[str, str]] = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Take the derivatives of a class with a definition of its own from it, unless it has them too.
+
+        Those that it would inherit are the closed forms of another energy.
+        """
+        super().__init_subclass__(**options)
+        own = vars(cls)
+        if not {"element_energy", "power"}.isdisjoint(own):
+            for name in DERIVATIVES:
+                if name not in own:
+                    setattr(cls, name, vars(Energy)[name])
 
     def energy(self, x: Tensor) -> Tensor:
         """Return the energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""

@@ -66,10 +66,6 @@ class Inertia(Energy):
         """Return the second derivatives (N, 3, 3) [N/m] of each vertex at x (V, 3) [m]."""
         return (self.masses / self.dt**2)[:, None, None] * np.eye(3)
 
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the vertices (n,) with second derivatives, and these (n, 3, 3) [N/m]; see Energy."""
-        return np.arange(len(self.masses)), self.hessian_blocks(x)
-
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices (V,) and m / dt^2 (V, 1, 1) [N/m]."""
         return np.arange(len(self.masses)), (self.masses / self.dt**2)[:, None, None]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy
+from reference_sim.energies.energy import Energy, demand_not_negative
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -15,12 +15,16 @@ if TYPE_CHECKING:
 
 
 class StretchSpring(Energy):
-    """Spring energy [J] of each edge of `cloth`; stiffness [N/m] is the same for all edges."""
+    """Spring energy [J] of each edge of `cloth`; stiffness [N/m] is the same for all edges.
+
+    Raises ValueError for a stiffness that is negative or not finite.
+    """
 
     name = "spring"
     constant = (1,)
 
     def __init__(self, cloth: Cloth, *, stiffness: float = 15.0) -> None:
+        demand_not_negative("StretchSpring", stiffness=stiffness)
         self.cloth = cloth
         self.stencils = cloth.edges
         self.rest_lengths = cloth.edge_lengths

@@ -98,7 +98,7 @@ def write_array(path: str | Path, array: np.ndarray) -> None:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_array(f"{folder}/x.npy", np.zeros(2))
     """
-    array = np.ascontiguousarray(array)
+    array = np.asarray(array, order="C")  # ascontiguousarray would make a number an array of one
     with open(path, "wb") as stream:
         np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(array))
         stream.write(array.reshape(-1).data)

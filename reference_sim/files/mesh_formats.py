@@ -63,7 +63,7 @@ def _read_obj(path: Path) -> Parts:
     uv_polygons: list[list[int]] = []
     with open(path, encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, start=1):
-            parts = line.split()
+            parts = line.partition("#")[0].split()
             try:
                 if parts and parts[0] == "v":
                     x, y, z = parts[1:4]  # colours may follow

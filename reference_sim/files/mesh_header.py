@@ -43,7 +43,7 @@ def check_header(path: Path) -> None:
     lines = list(re.finditer(pattern, head, re.MULTILINE | re.IGNORECASE))
     if (kind == ".ply" and not end) or (kind == ".off" and not lines):
         raise MeshError(f"{path}: cannot be read (its header does not end): {EXPORT_AGAIN}")
-    for line in lines:
+    for line in lines[:1] if kind == ".off" else lines:  # vertices of OFF may be whole numbers too
         for count in line[1].split():
             if len(count) > 20 or int(count) > most:
                 text = " ".join(line[0].decode(errors="replace").split())[:60]

@@ -60,7 +60,7 @@ class _File:
         self.path = path
         names = [name for synonyms in SYNONYMS.values() for name in synonyms]
         try:
-            pickled = path.suffix in (".pkl", ".pickle")
+            pickled = path.suffix.lower() in (".pkl", ".pickle")
             content = read_plain_pickle(path) if pickled else read_arrays(path, names)
         except PlainPickleError as error:
             raise BodyError(str(error)) from error

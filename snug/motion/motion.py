@@ -87,7 +87,12 @@ class Motion:
         return replace(self, poses=self.poses[start:stop], translations=self.translations[start:stop])
 
     def followed_by(self, other: Motion) -> Motion:
-        """Return this motion followed by the other one's frames, unchanged."""
+        """Return this motion followed by the other one's frames. Raises MotionError where rates differ."""
+        if other.fps != self.fps:
+            raise MotionError(
+                f"motion {other.name}: {other.fps:g} frames a second after {self.fps:g} of {self.name}: "
+                "resample it"
+            )
         poses = np.concatenate([self.poses, other.poses])
         return replace(
             self, poses=poses, translations=np.concatenate([self.translations, other.translations])

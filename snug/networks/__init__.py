@@ -4,6 +4,8 @@
 | --- | --- |
 | garment_network | `GarmentNetwork`, the base of all architectures |
 | regressor, pbns, motion_perceptron, santesteban2019, tailornet | one architecture each |
+| handles, ncs | networks of a few affine transforms; Neural Cloth Simulation |
+| initialisation | first weights by the rules of Keras and of torch |
 | fitted | two learners without training steps: nearest poses, ridge regression |
 | architectures | the table of kinds; `make_network` |
 | dressed_body, motion_features | `DressedBody`: a garment on a body, and the inputs of networks |

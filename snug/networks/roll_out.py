@@ -166,7 +166,6 @@ def _trajectory(
             "seed": model.seed,
             "motion": motion.name,
         },
-        frame_fields={},
     )
 
 

@@ -146,7 +146,7 @@ class Recipe:
             )
         sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pretraining")
         for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", "shape_share", *sizes):
-            if getattr(self, option) < 0:
+            if not getattr(self, option) >= 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         if self.shape_of == "clip" and self.shape_range and not self.mixed:
             raise RecipeError(

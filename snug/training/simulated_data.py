@@ -186,9 +186,7 @@ def read_motion(path: Path, line: SimulatedSequence) -> Motion:
     try:
         motion = Motion(line.name, arrays["poses"], arrays["translations"], float(arrays["fps"]), "simulated")
     except (KeyError, TypeError) as error:
-        raise DataSetError(
-            f"{path}: no motion of a data set ({error}); build {path.parents[2]} again"
-        ) from None
+        raise DataSetError(f"{path}: no motion of a data set ({error}); build the data set again") from None
     if motion.frames != line.frames:
         raise DataSetError(f"{path}: {motion.frames} frames, {line.frames} by {INDEX}; make it again")
     return motion

@@ -120,7 +120,7 @@ def _fitted_model(
     seed: int,
     recipe: Recipe,
 ) -> TrainedModel:
-    """Fit a network to the offsets of simulated frames; its loss is the mean square of their offsets left."""
+    """Fit a network to the offsets of simulated frames; its loss is that of the posed vertices."""
     begun = time.perf_counter()
     kind = find_kind(model_kind)
     data = TrainingSet(dressed, motions, recipe, features=kind.network.feature_set, sequences=False)

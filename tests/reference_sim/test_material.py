@@ -98,6 +98,7 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
         ("a.json", "[" * 100_000, "not understood"),
         ("a.toml", "youngs_modulus = 7e4", "unknown field 'youngs_modulus': use young_modulus"),
         ("a.toml", "density = true", "density = True is no number"),
+        ("a.json", '{"density": 1' + 400 * "0" + "}", "int too large"),
         ("a.toml", "density = -1.0", "Material.density = -1.0: must be"),
         ("a.toml", "lame_mu = 23600.0", "also need lame_lambda, thickness"),
         ("a.toml", "#" * (2 << 20), "too large for a material"),

@@ -293,6 +293,10 @@ def test_each_frame_has_its_own_surface_and_the_last_one_stays():
         assert obstacle.signed_distance(point, frame) == pytest.approx([expected], abs=1e-12)
         assert obstacle.planes(point, frame).points[0, 1] == pytest.approx(0.5 - expected, abs=1e-12)
         assert (obstacle.at(frame) == moving[min(frame, 2)]).all()
+    for ask in (obstacle.signed_distance, Obstacle(moving, FACES).planes):
+        with pytest.raises(ValueError, match="frames count from 0"):
+            ask(point, -1)
+    np.testing.assert_allclose(Obstacle(moving, FACES).transported(point, 0), point, atol=1e-12)
 
 
 def test_carried_is_exact_for_a_rigid_motion():

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import h5py
@@ -18,6 +19,7 @@ import torch
 from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, minimise, simulate
 from reference_sim.command.summary import summarise
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Energy, Gravity, StretchStVK
+from reference_sim.minimise import Newton
 from reference_sim.progress import progress_bar
 from tests.reference_sim.meshes import box, grid, random_rotation
 
@@ -168,6 +170,16 @@ def test_the_status_of_a_run_is_its_worst_and_the_reason_the_first_with_it():
     result = simulate(cloth, terms_of(cloth), frames=5, method=stopping)
     assert result.status == "timeout" and result.reason.startswith("frame 3: ")
     assert "\nworst      timeout: frame 3: " in summarise(result, None, frames=5)
+
+
+def test_a_file_names_a_minimiser_with_its_arguments(tmp_path):
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    result = simulate(
+        cloth, terms_of(cloth), frames=2, method=partial(Newton, reuse=True), path=tmp_path / "a.vtkhdf"
+    )
+    stored = Trajectory.load(tmp_path / "a.vtkhdf")
+    assert stored.provenance["options"]["method"] == ["Newton", {"reuse": True}]
+    np.testing.assert_array_equal(stored.positions, result.positions)
 
 
 def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():

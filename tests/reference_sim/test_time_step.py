@@ -38,6 +38,13 @@ def test_pins_arrive_exactly():
     np.testing.assert_array_equal(moved.positions[:, [0, 5]], places)
 
 
+@pytest.mark.parametrize("place", [np.zeros(3), np.zeros((1, 3)), np.full((2, 3), np.nan)])
+def test_pins_of_another_shape_are_refused_and_not_spread(place):
+    cloth = Cloth(SHEET, FACES, pins=[0, 5])
+    with pytest.raises(ValueError, match=r"pin_positions\(1\) gives .*finite positions \(2, 3\)"):
+        simulate(cloth, [StretchStVK(cloth)], frames=2, pin_positions=lambda _: place)
+
+
 def test_an_obstacle_moves_evenly_between_its_frames():
     ball, faces = sphere(2, 0.2)
     coarse = Obstacle(ball + np.array([[[0, 0, 0]], [[0.3, 0, 0]], [[0.3, 0.6, 0]]]), faces)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.energies.bend_hinge.training_batch import P0, P1, P2, P3, P4, P5, P6, P7
+from reference_sim.energies.bend_hinge.training_batch import arctan2
 from reference_sim.kernels.float32_layout import (
     FAST,
     HALF,
@@ -26,7 +26,7 @@ from reference_sim.kernels.kernel_cache import njit
 if TYPE_CHECKING:
     from reference_sim.energies.bend_hinge.definition import BendHinge
 
-PI, HALF_PI, TWO_PI = np.float32(np.pi), np.float32(np.pi / 2), np.float32(2 * np.pi)
+PI, TWO_PI = np.float32(np.pi), np.float32(2 * np.pi)
 
 
 def lanes(term: BendHinge) -> Float32Lanes:
@@ -77,14 +77,7 @@ def hinge_gradient(data, u, gradient, s):
             foot_b = (ex * qx + ey * qy + ez * qz) * inverse
             sine = inverse * ((by * az - bz * ay) * ex + (bz * ax - bx * az) * ey + (bx * ay - by * ax) * ez)
             cosine = -(ax * bx + ay * by + az * bz)
-            size_s, size_c = abs(sine), abs(cosine)
-            a = min(size_s, size_c) / (max(size_s, size_c) + TINY)
-            q = a * a
-            angle = a * (P0 + q * (P1 + q * (P2 + q * (P3 + q * (P4 + q * (P5 + q * (P6 + q * P7)))))))
-            angle = HALF_PI - angle if size_s > size_c else angle
-            angle = PI - angle if cosine < np.float32(0.0) else angle
-            angle = -angle if sine < np.float32(0.0) else angle
-            angle -= c[L + g]
+            angle = arctan2(sine, cosine) - c[L + g]
             angle -= TWO_PI * np.floor((angle + PI) / TWO_PI)
             stiffness = c[g]
             energy += HALF * stiffness * angle * angle

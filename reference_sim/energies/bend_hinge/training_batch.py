@@ -35,7 +35,7 @@ def batch(term: BendHinge) -> BatchKernel:
 
 
 @njit(cache=True, inline="always", fastmath=GUARDED, error_model="numpy")
-def _arctan2(y: np.float32, x: np.float32) -> np.float32:
+def arctan2(y: np.float32, x: np.float32) -> np.float32:
     """Return the angle in float32, without a branch; (0, 0) gives 0."""
     along, across = abs(x), abs(y)
     t = min(along, across) / (max(along, across) + np.float32(1e-37))
@@ -78,7 +78,7 @@ def _bending(
                 bx, by, bz = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
                 cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
                 sine = (cx * ex + cy * ey + cz * ez) * inverse
-                theta = _arctan2(sine, ax * bx + ay * by + az * bz) - angle
+                theta = arctan2(sine, ax * bx + ay * by + az * bz) - angle
                 theta -= TWO_PI * np.floor((theta + PI) / TWO_PI)
                 s = k * theta
                 energy[n] = HALF * s * theta

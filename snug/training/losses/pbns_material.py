@@ -41,9 +41,6 @@ class SquaredContact(ContactPenalty):
     For training alone: its derivatives are those of automatic differentiation.
     """
 
-    value_and_gradient = Energy.value_and_gradient
-    add_hessian = Energy.add_hessian
-    scalar_stiffness = Energy.scalar_stiffness
     power = 2
 
     def __init__(self, cloth: Cloth) -> None:

@@ -10,11 +10,14 @@ import pytest
 
 from reference_sim import GRAVITY, Cloth, Obstacle, Potential, minimise
 from reference_sim.energies import (
+    AreaBarrier,
     BendHinge,
+    ContactFriction,
     ContactPenalty,
     Energy,
     Gravity,
     Step,
+    StretchSpring,
     StretchStVK,
 )
 from tests.reference_sim.meshes import box, grid, random_rotation
@@ -75,3 +78,40 @@ def test_no_contact_beyond_the_margin():
         assert (value > 0) == touching and (np.abs(gradient).max() > 0) == touching
         exact = 3 * contact.sample_areas.sum() / 3 * 3.4e6 * max(0.004 - height, 0) ** 3
         assert value == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda cloth: ContactPenalty(cloth, margin=float("nan")),
+        lambda cloth: ContactPenalty(cloth, stiffness=-1.0),
+        lambda cloth: ContactPenalty(cloth, per_sample_stiffness=float("inf")),
+        lambda cloth: ContactFriction(ContactPenalty(cloth), coefficient=-0.5),
+        lambda cloth: ContactFriction(ContactPenalty(cloth), speed=0.0),
+        lambda cloth: StretchSpring(cloth, stiffness=-15.0),
+        lambda cloth: AreaBarrier(cloth, threshold=float("nan")),
+    ],
+)
+def test_numbers_that_would_push_or_do_nothing_are_refused(make):
+    with pytest.raises(ValueError, match=r"must be (finite and not negative|above 0)"):
+        make(Cloth(*grid(3, 3, width=0.1, depth=0.1)))
+
+
+@pytest.mark.parametrize("parent", [StretchStVK, StretchSpring, ContactPenalty])
+def test_another_definition_has_its_own_derivatives(parent):
+    x, faces = grid(3, 3, width=0.1, depth=0.1)
+    cloth, bent = Cloth(x, faces), x + 0.01 * np.sin(40 * x[:, [1, 2, 0]])
+
+    class Half(parent):
+        def element_energy(self, u):
+            return 0.5 * super().element_energy(u)
+
+    whole, half = parent(cloth), Half(cloth)
+    for term in (whole, half):
+        if isinstance(term, ContactPenalty):
+            term.points = term.sample_matrix @ bent + [0.0, 1e-3, 0.0]
+    value, gradient = half.value_and_gradient(bent)
+    assert value == pytest.approx(0.5 * whole.value_and_gradient(bent)[0]) and value > 0
+    np.testing.assert_allclose(gradient, 0.5 * whole.value_and_gradient(bent)[1], atol=1e-12)
+    blocks = [term.active_hessian_blocks(bent)[1].sum() for term in (half, whole)]
+    assert blocks[0] == pytest.approx(0.5 * blocks[1], abs=1e-6)

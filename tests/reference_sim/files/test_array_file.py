@@ -10,7 +10,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from reference_sim.files.array_file import ArrayFileError, array_names, read_array, read_arrays
+from reference_sim.files.array_file import ArrayFileError, array_names, read_array, read_arrays, write_array
 
 POSES = np.arange(12.0).reshape(4, 3)
 OTHERS = {
@@ -51,6 +51,13 @@ def test_whole_files_are_read_as_numpy_reads_them(tmp_path, save):
     for name, array in OTHERS.items():
         np.save(tmp_path / f"{name}.npy", array)
         np.testing.assert_array_equal(read_array(tmp_path / f"{name}.npy"), array)
+
+
+@pytest.mark.parametrize("array", [np.array(3.0), np.zeros((0, 3)), np.arange(6.0).reshape(2, 3).T])
+def test_what_is_written_is_read(tmp_path, array):
+    write_array(tmp_path / "a.npy", array)
+    assert read_array(tmp_path / "a.npy").shape == array.shape
+    np.testing.assert_array_equal(read_array(tmp_path / "a.npy"), array)
 
 
 def test_an_array_of_objects_is_refused_only_where_it_is_asked_for(tmp_path):

@@ -55,6 +55,14 @@ def test_quads_are_cut_along_the_diagonal_from_their_first_corner(tmp_path):
     assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+def test_whole_numbers_in_off_and_comments_in_obj_change_nothing(tmp_path):
+    corners, sides = "1000 0 0\n0 1000 0\n0 0 1000\n0 0 0\n", "3 0 1 2\n3 0 2 3\n3 0 3 1\n3 1 3 2\n"
+    (tmp_path / "a.off").write_text(f"OFF\n4 4 0\n{corners}{sides}")
+    assert read_mesh(tmp_path / "a.off").positions.max() == 1000.0
+    (tmp_path / "a.obj").write_text("v 0 0 0 # first\nv 1 0 0\nv 0 1 0\nf 1 2 3 # the only one\n")
+    assert read_mesh(tmp_path / "a.obj").faces.tolist() == [[0, 1, 2]]
+
+
 def test_texture_coordinates_and_vertex_colours_change_nothing(tmp_path):
     path = tmp_path / "a.obj"
     path.write_text("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 -2/1/1 3\n")

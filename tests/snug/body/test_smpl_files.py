@@ -40,7 +40,7 @@ def layouts(small):
 
 
 def saved(path, arrays):
-    if path.suffix == ".pkl":
+    if path.suffix.lower() == ".pkl":
         sparse = {k: csc_matrix(v) if k == "J_regressor" else v for k, v in arrays.items()}
         path.write_bytes(pickle.dumps(sparse, protocol=2))
     else:
@@ -48,7 +48,7 @@ def saved(path, arrays):
     return path
 
 
-@pytest.mark.parametrize("ending", [".npz", ".pkl"])
+@pytest.mark.parametrize("ending", [".npz", ".PKL"])
 @pytest.mark.parametrize("layout", ["SMPL", "SMPL-H", "SMPL-X", "A pose", "plain"])
 def test_every_layout_gives_the_same_body(small, layouts, layout, ending, tmp_path):
     user = read_body(saved(tmp_path / f"user{ending}", layouts[layout]))

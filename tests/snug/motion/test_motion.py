@@ -238,6 +238,13 @@ def test_resample_keeps_ends_duration_and_uniform_turning(frames, fps):
         np.testing.assert_allclose(sampled.poses, motion.poses[::4], atol=1e-12)
 
 
+def test_motions_of_two_rates_do_not_follow_one_another():
+    walk = make_motion("walk")
+    assert walk.followed_by(walk).frames == 2 * walk.frames
+    with pytest.raises(MotionError, match="60 frames a second after 30"):
+        walk.followed_by(resample(walk, 60.0))
+
+
 def test_transition_leaves_and_arrives_at_rest():
     goal = np.zeros((24, 3))
     goal[JOINT["left_shoulder"]] = [0.0, 0.0, -1.2]
