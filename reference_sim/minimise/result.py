@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 STATUSES = ("converged", "stalled", "max_iterations", "diverged", "timeout")
+_SEVERITY = {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Result:
 
 def severity(status: str) -> int:
     """Return how bad the status of a minimisation is: 0 is good."""
-    return {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}[status]
+    return _SEVERITY[status]
 
 
 def check_tolerance(tolerance: float) -> None:

@@ -89,8 +89,8 @@ def train_network(
     """
     start = time.perf_counter()
     gc.collect()  # an earlier training refers to itself, and holds gigabytes
-    fitted, recipe = find_kind(model_kind).network.fitted, recipe or _own_recipe(model_kind)
-    if fitted:
+    recipe = recipe or _own_recipe(model_kind)
+    if find_kind(model_kind).network.fitted:
         return _fitted_model(model_kind, dressed, motions, trajectories, seed=seed, recipe=recipe)
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
