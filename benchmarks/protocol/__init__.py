@@ -1,1 +1,1 @@
-"""Protocol: what its digests hold, and which rows are of it. Its number is in benchmarks.results.protocol."""
+"""Protocol: which rows are of it. Its number and digests are in benchmarks.results.protocol."""

@@ -79,10 +79,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _published(name: str, out: Path, into: Path, head: str, more: Sequence[str]) -> bool:
     """Return whether a run is published; where it is not, the next is done all the same."""
     try:
-        return publish(name, RUNS[name], out, into, head, more)
+        publish(name, RUNS[name], out, into, head, more)
     except (PublishError, MergeError) as error:
         print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
         return False
+    return True
 
 
 def commands(name: str, run: PublishedRun, out: Path, more: Sequence[str] = ()) -> dict[Path, list[str]]:
@@ -95,7 +96,7 @@ def commands(name: str, run: PublishedRun, out: Path, more: Sequence[str] = ()) 
     }
 
 
-def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more: Sequence[str] = ()) -> bool:
+def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more: Sequence[str] = ()) -> None:
     """Do one run, or go on with it, and keep what is published of it.
 
     Args:
@@ -106,11 +107,8 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
         head: commit that all rows have to name.
         more: further options of every part.
 
-    Returns:
-        Whether it is published; the reason stands on standard error where it is not.
-
     Raises:
-        PublishError: a picture or film that the documents show was not made.
+        PublishError: a part failed, has rows of another commit, or lacks a picture that the documents show.
         MergeError: its parts are of two machines.
     """
     parts = commands(name, run, out, more)
@@ -122,12 +120,10 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
         print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
         status = subprocess.run(line, check=False).returncode
         if status and not (status == 1 and all_usable(RunFolder(folder))):
-            print(f"{PROGRAM}: {name}: {folder}: exit status {status}; not published", file=sys.stderr)
-            return False
+            raise PublishError(f"{folder}: exit status {status}")
         if others := sorted({row.commit for row in RunFolder(folder).read_rows()} - {head, ""}):
             reason = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
-            print(f"{PROGRAM}: {folder}: {reason}", file=sys.stderr)
-            return False
+            raise PublishError(f"{folder}: {reason}")
     if len(parts) > 1:
         whole = out / name
         shutil.rmtree(whole, ignore_errors=True)  # what it was merged from stays
@@ -140,7 +136,6 @@ def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more
         subprocess.run(line, check=False)
     keep(whole, into / name, run.shown)
     print(f"{name}: published in {into / name}", flush=True)
-    return True
 
 
 def all_usable(folder: RunFolder) -> bool:

@@ -1,7 +1,7 @@
 """Number of the benchmark's protocol, its recorded digests, and the rules of verdicts that reports apply.
 
-The number stands for all that a result depends on and that no method brings itself: see
-`benchmarks.protocol`. Two numbers of the same protocol can stand in one table.
+The number stands for all that a result depends on and that no method brings itself. Two numbers of the same
+protocol can stand in one table.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from benchmarks.fingerprint.digest import digest
 from benchmarks.results.json_file import ResultsError
 
 NUMBER = "1.0"
-# Part of the protocol -> digest of its definitions. A test compares them with the code.
+# Part of the protocol -> digest of its definitions. tests/benchmarks/test_protocol.py holds the code to them.
 DIGESTS = {
     "scenes": "2949e3d57aec722f",
     "materials": "832890dcb5d69952",

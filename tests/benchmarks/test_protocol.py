@@ -12,7 +12,6 @@ from benchmarks.metric import Metric
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.request import Request
 from benchmarks.presets import find_preset
-from benchmarks.protocol import definitions as protocol
 from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
 from benchmarks.results import protocol as recorded
 from benchmarks.results.protocol import DIGESTS, NUMBER, OWN, one_protocol
@@ -20,6 +19,7 @@ from benchmarks.scenes import SCENES
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.material import Material
 from snug.motion.library import make_motion
+from tests.benchmarks import protocol_definitions as protocol
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def _metrics():
         ("materials", "reference_sim.material", "Material", lambda: Material(bending_stiffness=4e-5)),
         ("materials", "reference_sim.material", "GRAVITY", 9.8),
         ("metrics", "benchmarks.metrics", "declared", _metrics),
-        ("reference", "benchmarks.protocol.definitions", "REFERENCE_TOLERANCE", 1e-5),
+        ("reference", "tests.benchmarks.protocol_definitions", "REFERENCE_TOLERANCE", 1e-5),
         ("sampling", "benchmarks.metrics.surface.surface_distance", "SAMPLED_FRAMES", 24),
         ("statistics", "benchmarks.results.protocol", "TIE", 0.1),
     ],

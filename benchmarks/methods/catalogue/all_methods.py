@@ -19,9 +19,8 @@ FURTHER_METHODS = (
     *networks.HANDLES,
     *networks.FLOORS,
     *ablations.RECIPES,
-    *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs", trained="snug-dynamic", pairing_group="snug"),
-    *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs", trained="snug-dynamic",
-                  pairing_group="snug"),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs"),
+    *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs"),
     *networks.POST_PROCESSED,
     MethodEntry(
         name="direct-optimisation",

@@ -52,10 +52,9 @@ def _truncated(
     )
 
 
-def warm_started(
-    base: str, label: str, solver: str, *, trained: str | None, pairing_group: str = ""
-) -> tuple[MethodEntry, ...]:
-    """Declare a network or skinning and some iterations of "newton", "lbfgs" or "fast-lbfgs" from it."""
+def warm_started(base: str, label: str, solver: str) -> tuple[MethodEntry, ...]:
+    """Declare steps from skinning, SNUG or a variant of it: "newton", "lbfgs" or "fast-lbfgs" goes on."""
+    trained = None if base == "skinning" else base
     return tuple(
         MethodEntry(
             name=f"{base}+{solver}-{count}",
@@ -70,7 +69,7 @@ def warm_started(
             conserving=solver == "fast-lbfgs",
             role="warm-started",
             reporting=Reporting(
-                family=f"{base}+{solver}", level=count, base=base, pairing_group=pairing_group
+                family=f"{base}+{solver}", level=count, base=base, pairing_group="snug" if trained else ""
             ),
         )
         for count in (1, 2, 4, 8)
@@ -198,9 +197,9 @@ SOLVERS = (
         )
         for solver, iterations, substeps in (("VBD", 10, 20), ("XPBD", 1, 128))
     ),
-    *warm_started("skinning", "Skinning", "lbfgs", trained=None),
-    *warm_started("skinning", "Skinning", "newton", trained=None),
-    *warm_started("snug", "SNUG", "lbfgs", trained="snug", pairing_group="snug"),
-    *warm_started("snug", "SNUG", "newton", trained="snug", pairing_group="snug"),
-    *warm_started("snug", "SNUG", "fast-lbfgs", trained="snug", pairing_group="snug"),
+    *warm_started("skinning", "Skinning", "lbfgs"),
+    *warm_started("skinning", "Skinning", "newton"),
+    *warm_started("snug", "SNUG", "lbfgs"),
+    *warm_started("snug", "SNUG", "newton"),
+    *warm_started("snug", "SNUG", "fast-lbfgs"),
 )  # fmt: skip

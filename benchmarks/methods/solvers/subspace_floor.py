@@ -13,19 +13,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.method import Method
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
 from reference_sim.minimise.subspace import Placement, SubspaceNewton, nearest_offsets, orthonormal
 from reference_sim.potential import Potential
-from reference_sim.trajectory.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.networks.handles.shape_functions import shape_functions, span
 from snug.networks.trained_model import TrainedModel
@@ -34,8 +32,8 @@ from snug.recipes.recipe import DEFAULT
 Space = tuple[np.ndarray, np.ndarray, int]  # U (3 V, K), m (3 V,) [m], sweeps over the skinning weights
 
 
-@dataclass
-class SubspaceFloor(Method):
+@dataclass(kw_only=True)
+class SubspaceFloor(Simulation):
     """Simulation within a subspace of offsets.
 
     space: makes the subspace for a dressed body.
@@ -43,7 +41,6 @@ class SubspaceFloor(Method):
     """
 
     space: Callable[[DressedBody], Space]
-    simulation: Simulation = field(init=False, default_factory=lambda: Simulation(options={}))
 
     def prepare(self, scene: BuiltScene) -> None:
         """Pose the subspace in each frame, start from its point nearest to the scene's start, compile."""
@@ -64,13 +61,9 @@ class SubspaceFloor(Method):
                 potential, basis=basis, placements=placements[1:], offsets=offsets, **options
             )
 
-        self.simulation.options = {"method": in_subspace}
+        self.options = {"method": in_subspace}
         state = np.stack([start, scene.start_velocity])
-        self.simulation.prepare(dataclasses.replace(scene, settle=lambda: state))
-
-    def run(self) -> Trajectory:
-        """Simulate all frames."""
-        return self.simulation.run()
+        super().prepare(dataclasses.replace(scene, settle=lambda: state))
 
 
 def _placements(
@@ -113,6 +106,5 @@ def _last_layer(path: Path) -> Callable[[DressedBody], Space]:
 
 def make(*, models: Path, seed: int, handles: int = 0, network: str = "") -> SubspaceFloor:
     """Make the floor of so many handles, or that of the last layer of a network."""
-    return SubspaceFloor(
-        _last_layer(model_path(models, network, seed)) if network else _handle_space(handles)
-    )
+    space = _last_layer(model_path(models, network, seed)) if network else _handle_space(handles)
+    return SubspaceFloor(options={}, space=space)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.method import Method, posed_body
+from benchmarks.method import posed_body
 from benchmarks.methods.solvers.residual_transport import ResidualTransport
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
@@ -24,7 +24,6 @@ from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
 from reference_sim.minimise.minimisers import Restartable, make_minimiser
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
-from reference_sim.trajectory.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
 from snug.networks.trained_model import TrainedModel
@@ -72,11 +71,12 @@ class FromElsewhere:
         return result
 
 
-@dataclass
-class WarmStarted(Method):
+@dataclass(kw_only=True)
+class WarmStarted(Simulation):
     """Simulation whose steps start at frames of a network or of skinning and are cut short.
 
-    residual: whether the last frame's residual is carried.
+    guess: name of the network, whose file is `path`, or SKINNING. solver: options of the minimiser that goes
+    on from there. residual: whether the last frame's residual is carried.
     Raises ValueError for a scene of several steps a frame: there is a start for its last alone.
     """
 
@@ -84,7 +84,6 @@ class WarmStarted(Method):
     path: Path
     solver: dict[str, Any]
     residual: bool = False
-    simulation: Simulation = field(init=False, default_factory=lambda: Simulation(options={}))
     of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -99,12 +98,8 @@ class WarmStarted(Method):
             assert isinstance(inner, Restartable)
             return FromElsewhere(inner, frames, pins, scene.start, carry)
 
-        self.simulation.options = {"method": from_elsewhere}
-        self.simulation.prepare(scene)
-
-    def run(self) -> Trajectory:
-        """Simulate all frames."""
-        return self.simulation.run()
+        self.options = {"method": from_elsewhere}
+        super().prepare(scene)
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Return a function of the frame: inputs of the network or of skinning, and the posed body."""
@@ -135,9 +130,9 @@ def make(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -
 
     With "fast-lbfgs" the last residual is carried.
     """
-    options: dict[str, Any] = {"method": solver, "max_iterations": iterations}
-    path, fast = model_path(models, guess, seed), solver == "fast-lbfgs"
-    if fast:
-        return WarmStarted(guess, path, options | {"method": CompiledLBFGS}, fast)
-    options |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
-    return WarmStarted(guess, path, options)
+    fast = solver == "fast-lbfgs"
+    of_solver: dict[str, Any] = {"method": CompiledLBFGS if fast else solver, "max_iterations": iterations}
+    if not fast:
+        of_solver |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
+    path = model_path(models, guess, seed)
+    return WarmStarted(options={}, guess=guess, path=path, solver=of_solver, residual=fast)

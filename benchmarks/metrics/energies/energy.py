@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metric import Metric, skinned
-from benchmarks.metrics.energies.replayed_step import copied_terms
-from reference_sim.energies.energy import Step
+from benchmarks.metrics.energies.replayed_step import copied_terms, step_to
 from reference_sim.energies.gravity import Gravity
 
 if TYPE_CHECKING:
@@ -91,17 +90,8 @@ def energy_series(
 def _terms_at(
     scene: BuiltScene, terms: Sequence[Energy], positions: NDArray[np.float64], frame: int
 ) -> dict[str, float]:
-
     x = np.ascontiguousarray(positions[frame])
-    previous, before = positions[max(frame - 1, 0)], positions[max(frame - 2, 0)]
-    step = Step(
-        previous=previous,
-        velocity=(previous - before) / scene.dt,
-        guess=x,
-        dt=scene.dt,
-        obstacle=scene.obstacle,
-        frame=frame,
-    )
+    step = step_to(scene, positions, frame, guess=x)
     values = {}
     for term in terms:
         if term.name == "inertia" and frame < FIRST_FULL_FRAME:

@@ -54,8 +54,11 @@ def freeze_step(
 
 
 def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats | None = None) -> Step:
-    """Return the step from frame - 1 of positions (T,V,3) [m] to `frame`, as a solver is given it."""
-    previous = positions[frame - 1]
+    """Return the step from frame - 1 of positions (T,V,3) [m] to `frame`, as a solver is given it.
+
+    A frame before the first counts as equal to it: the start is a step from rest.
+    """
+    previous = positions[max(frame - 1, 0)]
     velocity = (previous - positions[max(frame - 2, 0)]) / scene.dt
     guess = first_guess(scene, previous, velocity, frame) if guess is None else guess
     return Step(previous, velocity, guess, scene.dt, scene.obstacle, frame)

@@ -6,7 +6,7 @@ curvature from all eigenvalues of the dense Hessian. A claim that does not hold 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -49,37 +49,29 @@ class StressStep:
     weight: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheckedResult(Measurement):
-    """Row of one minimisation: `value` is the relative residual, computed independently."""
-
-    iterations: int
-
-
-def solve_and_check(
-    step: StressStep, solve: Callable[..., Result] = minimise, *, counted: bool = False
-) -> CheckedResult:
-    """Minimise, keep the points on the way, and check the result.
+def solve_and_check(step: StressStep, *, counted: bool = False) -> Measurement:
+    """Minimise as the simulator does, keep the points on the way, and check the result.
 
     counted: the value of the row is the number of iterations.
     """
     kept: list[np.ndarray] = []
-    result = solve(
+    result = lbfgs_then_newton(
         step.potential, step.guess, tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT, observe=kept.append
     )
     checked = check_result(step, result, kept)
-    return replace(checked, value=float(checked.iterations)) if counted else checked
+    return replace(checked, value=float(result.iterations)) if counted else checked
 
 
-def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = ()) -> CheckedResult:
-    """Check the solver's claim, and the points it kept on the way, against independent numbers."""
+def check_result(step: StressStep, result: Result, kept: Sequence[np.ndarray] = ()) -> Measurement:
+    """Check the solver's claim, and the points it kept on the way, against independent numbers.
+
+    The value of the row is the relative residual, computed independently.
+    """
     terms = "+".join(energy.name for energy in step.potential.energies)
     status = STATUS.get(result.status, result.status)
 
-    def checked(value: float | None, status: str, reason: str) -> CheckedResult:
-        return CheckedResult(
-            value=value, status=status, reason=reason, iterations=result.iterations, terms=terms
-        )
+    def checked(value: float | None, status: str, reason: str) -> Measurement:
+        return Measurement(value=value, status=status, reason=reason, terms=terms)
 
     x = result.positions
     if not np.isfinite(x).all():

@@ -224,7 +224,8 @@ def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step
 
 def test_a_warm_started_solver_has_no_starts_for_steps_between_frames(tmp_path):
     scene = small_scene("hanging_sheet")
-    method = WarmStarted("skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1})
+    solver = {"method": "lbfgs", "max_iterations": 1}
+    method = WarmStarted(options={}, guess="skinning", path=tmp_path, solver=solver)
     with pytest.raises(ValueError, match="2 steps a frame"):
         method.prepare(replace(scene, substeps=2))
 
@@ -241,9 +242,8 @@ def test_a_warm_started_solver_has_its_first_guesses_ready_before_the_clock_star
         begun.append(True)
         return (scene.start.copy() for _ in range(scene.frames))
 
-    warm_started = WarmStarted(
-        "skinning", tmp_path, {"method": "lbfgs", "max_iterations": 1, "finish": False}
-    )
+    solver = {"method": "lbfgs", "max_iterations": 1, "finish": False}
+    warm_started = WarmStarted(options={}, guess="skinning", path=tmp_path, solver=solver)
     warm_started.prepared = False
     monkeypatch.setattr(warm_started, "_frames", ready)
     warm_started.prepare(scene)

@@ -82,7 +82,8 @@ def test_a_warm_started_solver_begins_its_frames_and_residuals_anew(solver, monk
         return (scene.start + np.array([0.0, -2e-3 * frame, 0.0]) for frame in range(scene.frames))
 
     def method() -> WarmStarted:
-        made = WarmStarted("skinning", tmp_path, {"method": solver, "max_iterations": 2}, residual=True)
+        cut_short = {"method": solver, "max_iterations": 2}
+        made = WarmStarted(options={}, guess="skinning", path=tmp_path, solver=cut_short, residual=True)
         monkeypatch.setattr(made, "_frames", lambda scene: frames)
         monkeypatch.setattr(made, "_carry", lambda scene: Carried())
         made.prepare(scene)

@@ -60,15 +60,16 @@ def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     assert [path.name for path in target.parent.iterdir()] == ["run"]
 
 
-def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch, capsys):
+def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch):
     run, status = PublishedRun("?", {"": FALL + "newton-1"}), 1
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=status))
-    assert not publish("fall", run, tmp_path, tmp_path / "kept", "abc")
-    assert "exit status 1; not published" in capsys.readouterr().err
+    with pytest.raises(PublishError, match="fall: exit status 1"):
+        publish("fall", run, tmp_path, tmp_path / "kept", "abc")
     status = 0
     monkeypatch.setattr(RunFolder, "read_rows", lambda _: [SimpleNamespace(commit=c) for c in ("abc", "def")])
-    assert not publish("fall", run, tmp_path, tmp_path / "kept", "abc")
-    assert "rows of commit def" in capsys.readouterr().err and not (tmp_path / "kept").exists()
+    with pytest.raises(PublishError, match="fall: rows of commit def"):
+        publish("fall", run, tmp_path, tmp_path / "kept", "abc")
+    assert not (tmp_path / "kept").exists()
 
 
 @pytest.mark.parametrize(
@@ -120,7 +121,8 @@ def test_a_run_that_lacks_a_picture_is_left_and_the_next_is_done(monkeypatch, ca
     monkeypatch.setattr(command, "commit", lambda: "abc")
     monkeypatch.setattr(command, "publish", without_picture)
     assert command.main(["quick", "shapes"]) == 1 and done == ["quick", "shapes"]
-    assert "quick: quick/figures/none.png: not there" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "quick: quick/figures/none.png: not there" in said and "; not published" in said
 
 
 @pytest.mark.slow
@@ -128,10 +130,10 @@ def test_parts_are_merged_reported_and_kept(tmp_path):
     parts = {"one": FALL + "simulation,newton-1", "two": FALL + "newton-2"}
     films = {"fall.gif": "--scene free_fall --methods simulation,newton-1 --width 100"}
     run = PublishedRun("?", parts, ("error_against_time_free_fall",), films)
-    assert publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
+    publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
     rows = RunFolder(tmp_path / "kept" / "fall").read_rows()
     assert {row.method for row in rows} == {"simulation", "newton-1", "newton-2"}
     assert (tmp_path / "kept" / "fall" / "fall.gif").stat().st_size > 1000
     line = RunFolder(tmp_path / "kept" / "fall").read_config()["command"]
     assert shlex.split(line) == ["python", "-m", "benchmarks.publish", "fall"]
-    assert publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
+    publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())

@@ -2,7 +2,7 @@
 
 Digests are of contents (arrays, declared values, energies of a probe), never of source code: code that is
 written anew and computes the same has the same digests. `benchmarks.results.protocol` records number and
-digests; a test compares them with the code.
+digests; test_protocol.py compares them with the code.
 """
 
 from __future__ import annotations
@@ -32,11 +32,7 @@ OUTSIDE = ("name", "description", "module", "declared_in", "files", "self_contac
 
 
 def definitions() -> dict[str, Any]:
-    """Return part of the protocol -> what it defines, as values that `digest` takes.
-
-    >>> list(definitions())[:3]  # doctest: +SKIP
-    ['scenes', 'materials', 'motions']
-    """
+    """Return part of the protocol -> what it defines, as values that `digest` takes."""
     return {part: make() for part, make in PARTS.items()}
 
 
