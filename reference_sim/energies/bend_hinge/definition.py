@@ -4,9 +4,9 @@
     E = k/2 s (theta - theta_0)^2
 
 with the edge e = x1 - x0 and the face normals n1 = e x (x2 - x0), n2 = (x3 - x0) x e. By default
-s = l^2 / (4 (A1 + A2)) of the rest state. The authors of SNUG have since stated that this is what their code
-computes and that the printed form is a typo; their k belongs to it. scaling="none" is s = 1, as the paper
-prints it (eq. 11): some three times as stiff.
+s = l^2 / (4 (A1 + A2)) of the rest state, as in the code of SNUG's authors (losses/physics.py), to which
+their k belongs; l is the present length there. scaling="none" is s = 1, as the paper prints it (eq. 11): some
+three times as stiff.
 """
 
 from __future__ import annotations

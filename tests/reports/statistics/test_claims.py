@@ -152,9 +152,15 @@ def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdic
 
 
 @pytest.mark.parametrize(
-    ("rival", "verdict"), [((0.7, 0.71, 0.72), "does not hold"), ((0.1, 0.1001, 0.1002), "holds")]
+    ("rival", "verdict"),
+    [
+        ((0.7, 0.71, 0.72), "does not hold"),
+        ((0.1, 0.1001, 0.1002), "holds"),
+        ((0.097, 0.09, 0.094), "holds"),  # 0.85 to 1.03: no tie, and no more than 5 % above
+        ((0.12, 0.08, 0.1), "inconclusive"),
+    ],
 )
-def test_a_tie_upholds_what_is_claimed_to_be_on_par(rival, verdict):
+def test_parity_holds_where_no_more_than_the_margin_is_possible(rival, verdict):
     amplitudes = (0.1, 0.1002, 0.1001)
     rows = [
         r
