@@ -42,7 +42,7 @@ class Engine:
     Attributes:
         name: without a slash; first part of the names of its cases.
         title: for people.
-        module: that is imported; package: the distribution whose version counts; both empty for the project.
+        module: that is imported, named as its distribution, whose version counts; empty for the project.
         licence: SPDX identifier.
         install: command that installs it.
         substeps, iterations: of its default settings, per frame of 1/30 s and per time step.
@@ -55,7 +55,6 @@ class Engine:
     name: str
     title: str
     module: str = ""
-    package: str = ""
     licence: str
     install: str = ""
     substeps: int
@@ -75,8 +74,8 @@ class Engine:
     @property
     def version(self) -> str:
         """Name, version and licence, for every row."""
-        version = package_version(self.package or "neural-garment-benchmark")
-        return f"{self.package or 'this project'} {version}, {self.licence}"
+        version = package_version(self.module or "neural-garment-benchmark")
+        return f"{self.module or 'this project'} {version}, {self.licence}"
 
     def budget(self, factor: int) -> tuple[int, int]:
         """Return sub-steps per frame and iterations per time step of that multiple of the default."""

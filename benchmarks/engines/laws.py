@@ -107,7 +107,7 @@ def reaction_over_weight(run: RollOut) -> float:
     for step in run.last_steps[first:]:
         x = step.x if run.explicit else step.after
         pulls.append(sum(energy.value_and_gradient(x)[1][cloth.pins, 1].sum() for energy in run.energies))
-        acceleration = (step.after - step.x - step.dt * step.v)[:, 1] / step.dt**2
+        acceleration = (step.after - step.x - run.step * step.v)[:, 1] / run.step**2
         inertias.append(cloth.masses @ (GRAVITY + acceleration))
     pinned = GRAVITY * cloth.masses[cloth.pins].sum()
     return float((np.mean(pulls) + pinned) / np.mean(inertias))
@@ -129,11 +129,11 @@ def energy_gap(run: RollOut) -> float | None:
 
 def _gap(step: Step, run: RollOut) -> float:
     cloth = run.specimen.cloth
-    terms: list[Energy] = [*run.energies, Gravity(cloth), Inertia(cloth, step.dt)]
+    terms: list[Energy] = [*run.energies, Gravity(cloth), Inertia(cloth, run.step)]
     potential = Potential(terms)
-    guess = step.x + step.dt * step.v
+    guess = step.x + run.step * step.v
     guess[cloth.pins] = step.x[cloth.pins]
-    potential.prepare(FrozenStep(step.x, step.v, guess, step.dt))
+    potential.prepare(FrozenStep(step.x, step.v, guess, run.step))
     minimum = Newton(potential, max_iterations=200).minimise(guess)
     if minimum.status != "converged":
         raise RuntimeError(

@@ -40,8 +40,8 @@ REFERENCE = Engine(
     settings="one step a frame, minimised to 1e-6", factors=(1, 4), make=_reference,
 )  # fmt: skip
 
-_of_newton = partial(Engine, module="newton", package="newton", licence="Apache-2.0", install=INSTALL)
-_of_mujoco = partial(Engine, module="mujoco", package="mujoco", licence="Apache-2.0", install=INSTALL)
+_of_newton = partial(Engine, module="newton", licence="Apache-2.0", install=INSTALL)
+_of_mujoco = partial(Engine, module="mujoco", licence="Apache-2.0", install=INSTALL)
 
 ENGINES: tuple[Engine, ...] = (
     REFERENCE,

@@ -19,12 +19,11 @@ FAR = 100.0  # [m] from the origin, where a vertex has flown away
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One time step: from x, v (V, 3) [m, m/s] to `after` (V, 3), dt [s] later."""
+    """One time step: from x, v (V, 3) [m, m/s] to `after` (V, 3)."""
 
     x: np.ndarray
     v: np.ndarray
     after: np.ndarray
-    dt: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +94,7 @@ def _all_frames(
         seconds.append(time.process_time() - clock)
         if not (np.isfinite(x).all() and np.abs(x).max() < FAR):
             raise EngineDiverged(f"frame {number}: a vertex is nowhere, or {FAR:g} m away")
-        steps.append(Step(*before, x, dt))
+        steps.append(Step(*before, x))
     return steps, v, seconds
 
 
