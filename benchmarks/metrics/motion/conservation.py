@@ -99,13 +99,9 @@ def _asked(group: SceneRollOuts) -> list[RollOut]:
 def _laws_of(group: SceneRollOuts) -> dict[RollOut, LawSeries]:
     """Return the laws of all conserving roll-outs at once: they share the search trees."""
     asked = _asked(group)
-    positions = [roll_out.positions for roll_out in asked]
-    return dict(zip(asked, law_series(with_minimised_terms(group.scene), positions)))
-
-
-def with_minimised_terms(scene: BuiltScene) -> BuiltScene:
-    """Return the scene with the terms that its simulations minimise, self-contact among them."""
-    return replace(scene, energies=scene.simulated_energies)
+    # Of the terms that simulations minimise, self-contact among them.
+    scene = replace(group.scene, energies=group.scene.simulated_energies)
+    return dict(zip(asked, law_series(scene, [roll_out.positions for roll_out in asked])))
 
 
 @dataclass(frozen=True)
