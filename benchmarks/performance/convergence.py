@@ -34,6 +34,7 @@ def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     checkpoint_path = path.with_name(f".{path.stem}.checkpoint.safetensors")
     checkpoint = Checkpoint(path=checkpoint_path, resume=True, key=settings.key)
     chosen, every = settings.training, max(1, settings.steps // POINTS)
+    assert chosen is not None
     dressed, motions = dressed_body(vertices), training_motions()
     held_out = [motion for motion in motions if motion.name == HELD_OUT]
     model = train_network(

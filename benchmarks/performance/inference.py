@@ -29,6 +29,7 @@ SWEPT = 48  # [MB] of other work between two cold frames: a solver, and what lie
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Return median, 95 % and least time of frames, the median of a cold one, and sizes of the network."""
     chosen = settings.training
+    assert chosen is not None
     dressed, motions = dressed_body(vertices), training_motions()
     model = untrained_model(chosen.kind, dressed, motions, seed=0, recipe=chosen.recipe)
     frame_seconds(model, dressed, motions[0])

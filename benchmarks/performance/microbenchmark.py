@@ -24,25 +24,18 @@ class Settings:
 
     Attributes:
         repeats: of what is timed.
-        chosen: the training of the network, kind and recipe; None for a method that is no network.
+        training: of the network, kind and recipe; None for a method that is no network.
         device, steps: of its training.
         files: to be left behind.
         key: equal where an interrupted training may go on.
     """
 
     repeats: int
-    chosen: Training | None = None
+    training: Training | None = None
     device: str = "cpu"
     steps: int = 0
     files: tuple[Path, ...] = ()
     key: str = ""
-
-    @property
-    def training(self) -> Training:
-        """Training of the network. Raises ValueError for a method that is no network."""
-        if self.chosen is None:
-            raise ValueError("the method of the microbenchmark is no network: it has no training")
-        return self.chosen
 
 
 @dataclass(frozen=True, kw_only=True)

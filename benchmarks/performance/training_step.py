@@ -25,6 +25,7 @@ PAPER_STEPS = find_preset("paper").steps_of("snug", "snug")
 def measure(settings: Settings, *, vertices: int) -> dict[str, float]:
     """Return median and least time of a step over blocks, and the medians of its parts."""
     chosen, device = settings.training, find_device(settings.device)
+    assert chosen is not None
     dressed, motions = dressed_body(vertices), training_motions()
     targets = {motion.name: dressed.skinned(motion) for motion in motions} if chosen.simulated else None
     steps = WARM_UP + BLOCK * settings.repeats

@@ -291,7 +291,7 @@ class Schedule:
         name, method = flat(benchmark.label.replace(" ", "-")), benchmark.method
         training = TRAININGS.get(method)
         inputs: dict[str, Any] = {"declared": declared(benchmark), "training": training}
-        settings = Settings(repeats=benchmark.repeats, chosen=training)
+        settings = Settings(repeats=benchmark.repeats, training=training)
         if benchmark.trains:
             steps = self.preset.steps_of(method, method)
             settings = dataclasses.replace(settings, device=self.plan.device, steps=steps)

@@ -46,7 +46,7 @@ SMALL_SHEET = Microbenchmark(
 
 
 def settings(method="simulation", **changes):
-    return Settings(**{"repeats": 1, "chosen": TRAININGS.get(method)} | changes)
+    return Settings(**{"repeats": 1, "training": TRAININGS.get(method)} | changes)
 
 
 def plan_of(folder, *benchmarks, device="cpu", preset=SMOKE):
