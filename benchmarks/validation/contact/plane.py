@@ -46,7 +46,7 @@ def _sheet_at_rest(samples: str) -> tuple[ContactPenalty, np.ndarray, float]:
     material = Material()
     rest = in_space(points)[:, [0, 2, 1]] - [0.5, 0.0, 0.5]
     cloth = Cloth(rest, faces[:, ::-1], material)
-    floor = Obstacle(*box(half=2.0, height=1.0))
+    floor = Obstacle(*box())
     contact = ContactPenalty(cloth, samples=samples)
     start = rest + np.array([0.0, 0.002, 0.0])
     still = np.zeros_like(start)
@@ -56,9 +56,9 @@ def _sheet_at_rest(samples: str) -> tuple[ContactPenalty, np.ndarray, float]:
     return contact, result.positions, material.areal_density
 
 
-def box(*, half: float, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a closed box under the plane y = 0, `half` to each side and `height` deep [m]; outward faces."""
-    corners = np.array([[x, y, z] for x in (-half, half) for y in (-height, 0.0) for z in (-half, half)])
+def box() -> tuple[np.ndarray, np.ndarray]:
+    """Return a closed box under the plane y = 0, 2 m to each side and 1 m deep; outward faces."""
+    corners = np.array([[x, y, z] for x in (-2.0, 2.0) for y in (-1.0, 0.0) for z in (-2.0, 2.0)])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
     return corners, faces

@@ -28,18 +28,17 @@ def peirce_formula() -> float:
     return float(OVERHANG * (np.cos(angle / 2) / (8 * np.tan(angle))) ** (1 / 3))
 
 
-def simulated_bending_length(fabric: str, columns: int, rate: int) -> tuple[float, float]:
-    """Return the bending length [mm] of a strip at rest, and that of the fabric.
+def simulated_bending_length(columns: int, rate: int) -> tuple[float, float]:
+    """Return the bending length [mm] of a strip of SNUG's fabric at rest, and that of the fabric.
 
     Args:
-        fabric: name of one of FABRICS.
         columns: cells along the strip.
         rate: time steps a second.
     """
-    material = next(known for known in FABRICS if known.name == fabric)
+    material = next(known for known in FABRICS if known.name == "snug")
     strip = cantilever(material, columns)
     cloth = strip.cloth
     energies = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
     moved = simulate(cloth, energies, dt=1.0 / rate, frames=round(SECONDS * rate))
-    rest = demand_converged(moved, f"the strip of {fabric}").positions[-1]
+    rest = demand_converged(moved, "the strip").positions[-1]
     return strip.measure(rest)[BENDING_LENGTH], 1e3 * material.bending_length

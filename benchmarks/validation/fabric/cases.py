@@ -37,7 +37,7 @@ CANTILEVER = (
         _case(f"bending_length_{columns}_cells_{rate}_steps",
             f"bending length of SNUG's fabric by a simulated strip of {columns} cells, {rate} steps a second",
             "fabric.cantilever", "simulated_bending_length", unit="mm",
-            options={"fabric": "snug", "columns": columns, "rate": rate}, tolerance=0.17,
+            options={"columns": columns, "rate": rate}, tolerance=0.17,
             reason="1 % of it")
         for columns, rate in ((14, 30), (28, 30), (56, 30), (28, 60), (28, 120))
     ),

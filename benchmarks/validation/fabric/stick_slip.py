@@ -119,7 +119,7 @@ class Pressed:
             [*self.energies, contact, ContactFriction(contact, coefficient=mu, speed=SLIDING / DT)],
             dt=DT,
             frames=frames,
-            obstacle=Obstacle(*box(half=2.0, height=1.0)),
+            obstacle=Obstacle(*box()),
             start=start,
             velocity=(self._elastica(strain + step, contact.margin - sink) - start) / DT,
             pin_positions=lambda frame: pins - [0.0, frame * step * strip.length, 0.0],

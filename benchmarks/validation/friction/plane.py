@@ -139,7 +139,7 @@ def slid(
     contact = ContactPenalty(cloth, samples="vertices")
     depth = np.sqrt(cloth.material.areal_density * GRAVITY * turn[1, 1] / (3 * DEFAULT_STIFFNESS))
     start = (flat + np.array([0.0, contact.margin - depth, 0.0])) @ turn.T
-    corners, sides = box(half=2.0, height=1.0)
+    corners, sides = box()
     trajectory = simulate(
         cloth,
         [StretchStVK(cloth), Gravity(cloth), contact, ContactFriction(contact, coefficient=MU, speed=speed)],
