@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from reference_sim.energies.energy import Energy
 
 FRAME = 1 / 30  # [s] between frames
+FAR = 100.0  # [m] from the origin, where a vertex has flown away
 ITERATIONS, SUBSTEPS = "iterations", "substeps"
 
 

@@ -9,12 +9,10 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.engines.engine import FRAME, Engine, EngineCloth
+from benchmarks.engines.engine import FAR, FRAME, Engine, EngineCloth
 from benchmarks.engines.registry import find_engine
 from benchmarks.engines.specimens import Specimen, specimen
 from reference_sim.energies.energy import Energy
-
-FAR = 100.0  # [m] from the origin, where a vertex has flown away
 
 
 @dataclass(frozen=True, eq=False)

@@ -133,7 +133,6 @@ class DirectOptimisation(Method):
             status=status,
             reason=reason,
             provenance={"method": "direct-optimisation", "sums_J": [float(value) for value in self.sums]},
-            frame_fields={},
         )
 
     def search(self, x: np.ndarray) -> None:

@@ -10,16 +10,14 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks.engines.engine import FAR
 from benchmarks.engines.newton_cloth import NewtonCloth
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
 from reference_sim.trajectory.trajectory import Trajectory
-
-FAR = 100.0  # [m] from the origin, where a vertex has flown away
 
 
 @dataclass
@@ -38,6 +36,8 @@ class NewtonSolver(Method):
 
     def run(self) -> Trajectory:
         """Advance all frames; stop where a vertex is not finite or flew away."""
+        import newton
+
         scene, pins = self.scene, self.scene.cloth.pins
         x = scene.start
         v = scene.start_velocity
@@ -53,7 +53,7 @@ class NewtonSolver(Method):
                     x[pins] = (1 - share) * held + share * target
                 x, v = self.newton.advance(x, v, scene.dt / self.substeps)
             if not (np.isfinite(x).all() and np.abs(x).max() < FAR):
-                status, reason = "diverged", f"frame {frame}: a vertex is nowhere, or 100 m away"
+                status, reason = "diverged", f"frame {frame}: a vertex is nowhere, or {FAR:g} m away"
                 break
             positions.append(x)
             before, clock = clock, time.perf_counter()
@@ -65,18 +65,12 @@ class NewtonSolver(Method):
             frame_seconds=np.array(seconds),
             status=status,
             reason=reason,
-            provenance=self._provenance(),
-            frame_fields={},
+            provenance={
+                "method": f"newton {newton.__version__} {self.solver}",
+                "iterations": self.iterations,
+                "substeps": self.substeps,
+            },
         )
-
-    def _provenance(self) -> dict[str, Any]:
-        import newton
-
-        return {
-            "method": f"newton {newton.__version__} {self.solver}",
-            "iterations": self.iterations,
-            "substeps": self.substeps,
-        }
 
 
 def make(*, models: Path, seed: int, solver: str, iterations: int, substeps: int) -> NewtonSolver:
