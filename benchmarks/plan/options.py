@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.assets.inputs import FEWEST_FRAMES
 from benchmarks.external.roll_out_option import HELP as ROLL_OUT_HELP
 from benchmarks.external.roll_out_option import parse_roll_out
 from benchmarks.plan.plan import PlanError
@@ -23,7 +24,6 @@ from snug.motion.options import add_motion_options, parse_motion_options
 from snug.trained import FOLDER
 
 PROGRAM = "benchmarks.run"
-LEAST_FRAMES = 3  # inertia needs two frames before
 EXAMPLES = """examples:
   python -m benchmarks.run                                    garments, and a part of three other suites
   python -m benchmarks.run --trained                          the same without training
@@ -191,8 +191,8 @@ def scene_fields(options: argparse.Namespace) -> dict[str, Any]:
         garment = make_garment_file(options.garment, options)
     preset = find_preset(options.preset)
     if options.frames is not None:
-        if options.frames < LEAST_FRAMES:
-            raise PlanError(f"--frames {options.frames}: give {LEAST_FRAMES} or more")
+        if options.frames < FEWEST_FRAMES:
+            raise PlanError(f"--frames {options.frames}: give {FEWEST_FRAMES} or more")
         preset = replace(preset, frames=options.frames)
     return {
         "preset": preset,

@@ -13,6 +13,7 @@ from typing import Any
 from benchmarks.results.row import Row
 
 METHOD = "simulation"
+RELATIVE_RESIDUAL = 1e-6  # of a stress step: largest gradient component over the mean weight of a vertex
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 import torch
 
-from benchmarks.validation.case import Measurement
+from benchmarks.validation.case import RELATIVE_RESIDUAL, Measurement
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.geometry.topology import corner_areas
@@ -22,9 +22,6 @@ from reference_sim.minimise.minimisers import minimise
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 
-RELATIVE_RESIDUAL = (
-    1e-6  # of the relative residual: largest gradient component over the mean weight of a vertex
-)
 ROUND_OFF = 1e-2  # relative residual that round-off may at most excuse
 RISE_ROUND_OFF = 1e-12  # of the sum of the terms' sizes, within the step
 EVALUATION_ROUND_OFF = 1e-6  # of the same: what two evaluations may differ by before the larger one is a rise

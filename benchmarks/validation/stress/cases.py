@@ -10,11 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.validation.case import Case
+from benchmarks.validation.case import RELATIVE_RESIDUAL, Case
 
-RELATIVE_RESIDUAL = (
-    1e-6  # of the relative residual: largest gradient component over the mean weight of a vertex
-)
 DEADLINE = 60.0  # [s] for one test, after which its process is ended
 ALL = "membrane+bending+area"
 
