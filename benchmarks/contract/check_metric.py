@@ -71,7 +71,7 @@ class CheckMetrics(Task):
 
         on = f"of {roll_out.entry.name}"
         with findings.call(f"measure() {on}", ": leave out of the dictionary what does not apply"):
-            values, again = (module.measure(roll_out) if hasattr(module, "measure") else {} for _ in range(2))
+            values, again = (module.measure(roll_out) for _ in range(2))
         if hasattr(module, "compare") and roll_out.reference is not None:
             with findings.call(f"compare() {on}"):
                 compared = module.compare(roll_out, roll_out.reference)

@@ -184,7 +184,7 @@ def _check_sides(points: np.ndarray, expected: np.ndarray, what: str) -> None:
         return mended
 
     here = apart(points)
-    if not len(points) or here < TURNED * _diagonal(expected):
+    if here < TURNED * _diagonal(expected):
         return
     there, name = min((apart(mend(factors)), name) for name, factors in MIRRORS.items())
     if there < BETTER_FIT * here:

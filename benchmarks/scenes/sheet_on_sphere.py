@@ -27,12 +27,13 @@ def build(
     family: of triangles, as `rectangle` has them; such a sheet lies on the sphere and is held at its middle,
     so that it drapes and does not slide off.
     """
-    positions, faces = square_sheet(sheet_cells, SIZE)
-    gap, pins = GAP, []
     if family:
         flat, faces = rectangle(family, sheet_cells, sheet_cells, SIZE, SIZE)
         positions = in_space(flat - SIZE / 2)[:, [1, 2, 0]]  # faces up
         gap, pins = 0.0, [int(np.argmin(np.linalg.norm(positions, axis=1)))]
+    else:
+        positions, faces = square_sheet(sheet_cells, SIZE)
+        gap, pins = GAP, []
     # Off the sphere's axis by a little: centred, it would balance on a symmetry.
     positions += [0.004, RADIUS + gap, 0.002]
     cloth = Cloth(positions, faces, Material(), pins=pins)
