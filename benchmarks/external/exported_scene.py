@@ -36,7 +36,10 @@ def write_scene(
     if simulation is not None and declared.networks_only:
         raise ValueError(f"--reference: nobody simulates {declared.name}: it is for networks alone")
     with new_folder(folder) as part:
-        facts = _description(declared, scene, preset)
+        facts = facts_of(scene) | {
+            "description": declared.description, "preset": preset, "garment": declared.garment,
+            "motion": declared.motion, "part": declared.part,
+        }  # fmt: skip
         files = write_scene_files(part, scene, facts)
         files += _reference(part, scene, simulation) if simulation is not None else []
         (part / "README.txt").write_text(readme(scene, facts, files, score), encoding="utf-8")
@@ -55,12 +58,6 @@ def _reference(part: Path, scene: BuiltScene, method: Method) -> FileList:
         ("reference.vtkhdf, reference.npz", f"the simulation of the scene: {trajectory.status}"),
         ("reference.pc2, reference.obj", "the same in float32"),
     ]
-
-
-def _description(declared: Scene, scene: BuiltScene, preset: str) -> dict[str, Any]:
-    """Return the content of scene.json."""
-    names = {"garment": declared.garment, "motion": declared.motion, "part": declared.part}
-    return facts_of(scene) | {"description": declared.description, "preset": preset} | names
 
 
 def readme(scene: BuiltScene, facts: dict[str, Any], files: FileList, score: str) -> str:

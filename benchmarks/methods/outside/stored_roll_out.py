@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import StoredRollOut, read_roll_out
+from benchmarks.external.roll_out_files import read_roll_out
 from benchmarks.external.roll_out_option import MODULE, FileConventions, RollOutFileError, RollOutOption
 from benchmarks.external.scene_fit import fit_to_scene
 from benchmarks.fingerprint.digest import digest
@@ -36,14 +36,15 @@ class Stored(Method):
 
     def run(self) -> Trajectory:
         """Return the roll-out of the file."""
-        return self._trajectory(self.stored.positions, self.stored)
+        return self._trajectory(self.stored.positions)
 
     def quasi_static(self) -> Trajectory | None:
         """Return the quasi-static solutions of the file; None where it has none."""
         held = None if self.stated.other_mesh else self.stored.quasi_static
-        return None if held is None else self._trajectory(held, self.stored)
+        return None if held is None else self._trajectory(held)
 
-    def _trajectory(self, positions: np.ndarray, stored: StoredRollOut) -> Trajectory:
+    def _trajectory(self, positions: np.ndarray) -> Trajectory:
+        stored = self.stored
         finite, changes = bool(np.isfinite(positions).all()), "; ".join(self.done)
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
         claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
