@@ -258,8 +258,8 @@ def make(*, models, seed):
     ],
 )
 def test_the_check_refuses_what_a_run_refuses(source, message, tmp_path, refused):
-    (tmp_path / "mine.py").write_text(source)
-    refused(message, check.main, [str(tmp_path / "mine.py")])
+    (tmp_path / "clashing.py").write_text(source)
+    refused(message, check.main, [str(tmp_path / "clashing.py")])
 
 
 JUDGED = (
