@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.energies.contact_barrier import ContactBarrier
-from reference_sim.energies.energy import Energy, Step, demand_not_negative
+from reference_sim.energies.energy import Energy, Step, demand_not_negative, demand_positive
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -41,9 +41,8 @@ class BarrierFriction(Energy):
     dynamic = True
 
     def __init__(self, barrier: ContactBarrier, *, coefficient: float = 0.5, speed: float = 0.02) -> None:
-        demand_not_negative("BarrierFriction", coefficient=coefficient, speed=speed)
-        if speed == 0:
-            raise ValueError("BarrierFriction speed = 0: must be above 0")
+        demand_not_negative("BarrierFriction", coefficient=coefficient)
+        demand_positive("BarrierFriction", speed=speed)
         self.cloth, self.barrier = barrier.cloth, barrier
         self.stencils = np.zeros((0, 4), dtype=np.int64)
         self.coefficient, self.speed = float(coefficient), float(speed)

@@ -29,7 +29,7 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.contact.collisions import NO_OBSTACLE, Collisions
-from reference_sim.energies.energy import Energy, Step
+from reference_sim.energies.energy import Energy, Step, demand_positive
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -67,9 +67,7 @@ class ContactBarrier(Energy):
         self_contact: bool = True,
         obstacle: bool = True,
     ) -> None:
-        for name, value in (("distance", distance), ("stiffness", stiffness)):
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"ContactBarrier {name} = {value!r}: must be a finite number above 0")
+        demand_positive("ContactBarrier", distance=distance, stiffness=stiffness)
         if not (self_contact or obstacle):
             raise ValueError("ContactBarrier: meets nothing: give self_contact=True or obstacle=True")
         if self_contact:

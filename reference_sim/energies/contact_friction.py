@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.energies.contact_penalty.definition import ContactPenalty
-from reference_sim.energies.energy import Energy, Step, demand_not_negative
+from reference_sim.energies.energy import Energy, Step, demand_not_negative, demand_positive
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -46,9 +46,8 @@ class ContactFriction(Energy):
     remembers = True
 
     def __init__(self, contact: ContactPenalty, *, coefficient: float = 0.5, speed: float = 0.02) -> None:
-        demand_not_negative("ContactFriction", coefficient=coefficient, speed=speed)
-        if speed == 0:
-            raise ValueError("ContactFriction speed = 0: must be above 0")
+        demand_not_negative("ContactFriction", coefficient=coefficient)
+        demand_positive("ContactFriction", speed=speed)
         self.cloth = contact.cloth
         self.contact = contact
         self.stencils, self.weights = contact.stencils, contact.weights

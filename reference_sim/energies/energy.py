@@ -53,6 +53,13 @@ def demand_not_negative(what: str, **numbers: float) -> None:
             raise ValueError(f"{what} {name} = {value!r}: must be finite and not negative")
 
 
+def demand_positive(what: str, **numbers: float) -> None:
+    """Raise ValueError unless all numbers are finite and above 0; `what` names the term in the message."""
+    for name, value in numbers.items():
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{what} {name} = {value!r}: must be a finite number above 0")
+
+
 class Energy:
     """One physical term on one stencil.
 

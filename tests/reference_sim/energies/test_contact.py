@@ -93,7 +93,7 @@ def test_no_contact_beyond_the_margin():
     ],
 )
 def test_numbers_that_would_push_or_do_nothing_are_refused(make):
-    with pytest.raises(ValueError, match=r"must be (finite and not negative|above 0)"):
+    with pytest.raises(ValueError, match=r"must be (finite and not negative|a finite number above 0)"):
         make(Cloth(*grid(3, 3, width=0.1, depth=0.1)))
 
 
