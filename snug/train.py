@@ -28,8 +28,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from snug.training.training_loop import Interrupted
 
     check_options(options)
-    templates = choose_garments(options)
-    outputs = output_files(Path(options.out), templates)
+    garments = choose_garments(options)
+    outputs = output_files(Path(options.out), garments)
     device = find_device(options.device)
     torch.set_num_threads(options.threads)
     data = DataSet.read(options.dataset) if options.dataset else None
@@ -42,9 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         body = read_body(options.body)
         outputs[0].parent.mkdir(parents=True, exist_ok=True)
-        for template, output in zip(templates, outputs):
+        for garment, output in zip(garments, outputs):
             train_to_file(
-                options, body, template, motions, held_out, data, output,
+                options, body, garment, motions, held_out, data, output,
                 device=str(device), group=group, stop=stop,
             )  # fmt: skip
     except Interrupted as interrupted:

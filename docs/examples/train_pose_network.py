@@ -8,7 +8,7 @@ from reference_sim import Obstacle, Potential
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Step, StretchStVK
 from snug import Body, DressedBody
 from snug.body.skinning import skin
-from snug.garments import tailor_tshirt
+from snug.garments import find_template
 from snug.motion import Motion, make_motion
 
 FRAMES = 8  # of an update
@@ -66,7 +66,8 @@ def train(
 
 if __name__ == "__main__":
     body = Body.load()
-    shirt = DressedBody(body, tailor_tshirt(body, vertices=350))  # 350: as preset smoke has it
-    trained, energies = train(shirt, make_motion("05_01"), steps=60, seed=0)
+    shirt = find_template("tshirt").tailor(body, vertices=350)  # as preset smoke has it
+    dressed = DressedBody(body, shirt)
+    trained, energies = train(dressed, make_motion("05_01"), steps=60, seed=0)
     print(f"mean energy of an update: {energies[0]:.3f} J at first, {np.mean(energies[-10:]):.3f} J at last")
     torch.save(trained.state_dict(), "pose_network-0.pt")

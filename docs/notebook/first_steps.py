@@ -12,7 +12,7 @@ import argparse
 from dataclasses import replace
 
 from snug.body.parametric_body import Body
-from snug.garments import tailor_tshirt
+from snug.garments import find_template
 from snug.motion.library import TRAIN, make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipes.named import PAPER
@@ -31,7 +31,7 @@ def main() -> None:
     parser.add_argument("--rules", nargs="+", default=["keras", "torch"])
     options = parser.parse_args()
     body = Body.load()
-    dressed = DressedBody(body, tailor_tshirt(body, vertices=options.vertices))
+    dressed = DressedBody(body, find_template("tshirt").tailor(body, vertices=options.vertices))
     motions = [make_motion(name) for name in TRAIN]
     frames = sum(motion.frames for motion in motions)
     print(f"{dressed.vertices} vertices, {len(motions)} motions, {frames} frames, seed {options.seed}")

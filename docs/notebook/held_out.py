@@ -15,7 +15,7 @@ import gc
 
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from snug.body.parametric_body import Body
-from snug.garments import tailor_tshirt
+from snug.garments import find_template
 from snug.motion.library import TRAIN, VALIDATION, make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.training.optimisation_step import Trainer
@@ -32,7 +32,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=530)
     options = parser.parse_args()
     body = Body.load()
-    dressed = DressedBody(body, tailor_tshirt(body, vertices=1000))
+    dressed = DressedBody(body, find_template("tshirt").tailor(body, vertices=1000))
     motions = [make_motion(name) for name in TRAIN]
     if options.first:
         print_first(dressed, motions)

@@ -3,7 +3,7 @@
 | module | what lies there |
 | --- | --- |
 | garment | `Garment`: mesh, openings, skinning weights, pins |
-| templates | the garments that are tailored by code: `tailor_tshirt`, `find_template` |
+| templates | the garments that are tailored by code: `GARMENT_TEMPLATES`, `find_template` |
 | assembly, implicit_surface, cuts, meshing, remeshing | how tailoring works, in this order |
 | landmarks | joints and skin of the body that garments are cut by |
 | reading | `read_garment`: a mesh file, checked; what `python -m snug.check` says of it |

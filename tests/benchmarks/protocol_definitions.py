@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from benchmarks.results.ensemble import LEAST_MEMBERS, MEMBERS
 from benchmarks.results.row import REFERENCE_TOLERANCE
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes
+
+if TYPE_CHECKING:
+    from snug.garments.templates import GarmentTemplate
 
 PRESET = "quick"  # whose sizes the meshes of the digest have
 DECIMALS = 6  # [um, urad] of arrays: more may differ between processors
@@ -39,7 +42,7 @@ def definitions() -> dict[str, Any]:
 def _scenes() -> dict[str, Any]:
     """Return declarations of all scenes, body and T-shirt, and what small scenes are built of."""
     from snug.body.parametric_body import Body
-    from snug.garments.templates import find_template, tailor_tshirt
+    from snug.garments.templates import find_template
     from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
     from snug.training.simulated_data import settings_of
 
@@ -49,8 +52,8 @@ def _scenes() -> dict[str, Any]:
     built = {scene.name: scene.at(preset).build() for scene in SCENES}
     return {
         "declared": {name: _declared(scene) for name, scene in declared.items()},
-        "worn": settings_of(body, tailor_tshirt(body, vertices=preset.garment_vertices)),
-        "garments": {worn.garment: _defaults(find_template(worn.garment).tailor) for worn in GARMENT_SCENES},
+        "worn": settings_of(body, find_template("tshirt").tailor(body, vertices=preset.garment_vertices)),
+        "garments": {worn.garment: _defaults(find_template(worn.garment)) for worn in GARMENT_SCENES},
         "built": {
             name: (
                 _rounded(scene.cloth.rest_positions), scene.cloth.faces, scene.terms, scene.dt, scene.frames,
@@ -62,9 +65,10 @@ def _scenes() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _defaults(function: Callable[..., Any]) -> dict[str, Any]:
-    parameters = inspect.signature(function).parameters.values()
-    return {p.name: p.default for p in parameters if p.default is not p.empty}
+def _defaults(template: GarmentTemplate) -> dict[str, Any]:
+    """Return the number of vertices and the measures of a garment that is tailored without any given."""
+    vertices = inspect.signature(template.tailor).parameters["vertices"].default
+    return {"vertices": vertices, **template.measures}
 
 
 def _declared(scene: Scene) -> dict[str, Any]:

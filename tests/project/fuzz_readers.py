@@ -45,7 +45,7 @@ from snug.body.smpl_files import read_body
 from snug.garments.garment import GarmentError
 from snug.garments.options import GarmentFile
 from snug.garments.reading import read_garment
-from snug.garments.templates import tailor_tshirt
+from snug.garments.templates import find_template
 from snug.motion.files import load_motions
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
@@ -140,7 +140,7 @@ def anything() -> dict[str, Any]:
 
 
 def shirt() -> bytes:
-    made = tailor_tshirt(Body.load(), vertices=200)
+    made = find_template("tshirt").tailor(Body.load(), vertices=200)
     return written(".obj", lambda path: write_obj(path, made.rest_positions, made.faces))
 
 

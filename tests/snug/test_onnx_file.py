@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from snug import onnx_file
-from snug.garments import tailor_tshirt
+from snug.garments import find_template
 from snug.motion import make_motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
@@ -21,7 +21,7 @@ from snug.recipes.recipe import DEFAULT
 
 @pytest.fixture(scope="module")
 def dressed(body) -> DressedBody:
-    return DressedBody(body, tailor_tshirt(body, vertices=1000))
+    return DressedBody(body, find_template("tshirt").tailor(body, vertices=1000))
 
 
 def test_a_missing_package_and_a_model_of_another_garment_are_named(tmp_path, monkeypatch):

@@ -21,7 +21,7 @@ from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.material import GRAVITY, Material
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
-from snug.garments.templates import tailor_tshirt
+from snug.garments.templates import find_template
 
 if TYPE_CHECKING:
     from snug.garments.garment import Garment
@@ -81,7 +81,7 @@ def shirt_step(
 def _dressed() -> tuple[Body, Garment]:
 
     body = Body.load()
-    return body, tailor_tshirt(body, vertices=VERTICES)
+    return body, find_template("tshirt").tailor(body, vertices=VERTICES)
 
 
 def _moving(body: Body, arms: float, jump: float, turn: float) -> Obstacle:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from reference_sim.files.atomic_files import demand_writable_folder
 from snug.body.parametric_body import Body
 from snug.garments.garment import Garment
 from snug.garments.options import demand_garment_file, is_garment_file, make_garment_file
-from snug.garments.templates import TSHIRT, GarmentTemplate, find_template
+from snug.garments.templates import TSHIRT, find_template
 from snug.motion.files import load_motions
 from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion
 from snug.motion.motion import Motion
@@ -18,36 +19,55 @@ from snug.motion.options import parse_motion_options
 from snug.training.simulated_data import DataSet
 
 
-def choose_garments(options: argparse.Namespace) -> list[GarmentTemplate]:
+@dataclass(frozen=True)
+class ChosenGarment:
+    """A garment that a network is trained for.
+
+    Attributes:
+        name: of the template or file.
+        description: in words.
+        make: function of (body, vertices=...) that returns it; one that is read has the vertices of its file.
+    """
+
+    name: str
+    description: str
+    make: Callable[..., Garment]
+
+
+def choose_garments(options: argparse.Namespace) -> list[ChosenGarment]:
     """Return the garments to train for, each once; the T-shirt if none is named. Raises ValueError."""
     if not any(map(is_garment_file, options.garment)):
         demand_garment_file(options)
     return [
-        _template_of_file(word, options) if is_garment_file(word) else find_template(word)
+        _garment_of_file(word, options) if is_garment_file(word) else _tailored_garment(word)
         for word in dict.fromkeys(options.garment or [TSHIRT])
     ]
 
 
-def _template_of_file(path: str, options: argparse.Namespace) -> GarmentTemplate:
-    """Return a garment that is read instead of tailored, whatever number of vertices is asked for."""
+def _tailored_garment(name: str) -> ChosenGarment:
+    template = find_template(name)
+    return ChosenGarment(template.name, template.description, template.tailor)
+
+
+def _garment_of_file(path: str, options: argparse.Namespace) -> ChosenGarment:
     from snug.garments.reading import read_garment  # a tailored garment needs no reader of meshes
 
     file = make_garment_file(path, options)
 
-    def tailor(body: Body, *, vertices: int) -> Garment:
+    def read(body: Body, *, vertices: int) -> Garment:
         return read_garment(file, body)
 
-    return GarmentTemplate(file.name, f"garment of {path}", tailor)
+    return ChosenGarment(file.name, f"garment of {path}", read)
 
 
-def output_files(out: Path, templates: Sequence[GarmentTemplate]) -> list[Path]:
+def output_files(out: Path, garments: Sequence[ChosenGarment]) -> list[Path]:
     """Return the model file of each garment.
 
     Raises ValueError for one that cannot be written: now rather than after the training.
     """
     files = [out]
-    if len(templates) > 1:
-        files = [out.with_name(f"{out.stem}-{template.name}{out.suffix}") for template in templates]
+    if len(garments) > 1:
+        files = [out.with_name(f"{out.stem}-{garment.name}{out.suffix}") for garment in garments]
     if duplicate := next((path for path in files if files.count(path) > 1), None):
         raise ValueError(f"--garment: two of them would be {duplicate}: rename a file")
     for path in files:

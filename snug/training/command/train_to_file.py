@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from snug.body.parametric_body import Body
-from snug.garments.templates import GarmentTemplate
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import RECIPE_OF_KIND, find_recipe
 from snug.recipes.recipe import Recipe
 from snug.training.checkpoint import Checkpoint
+from snug.training.command.choices import ChosenGarment
 from snug.training.kinds import find_kind
 from snug.training.losses.vertex_targets import StoredVertices
 from snug.training.process_group import Group
@@ -28,7 +28,7 @@ from snug.training.validation import Validation
 def train_to_file(
     options: argparse.Namespace,
     body: Body,
-    template: GarmentTemplate,
+    garment: ChosenGarment,
     motions: list[Motion],
     held_out: list[Motion],
     data: DataSet | None,
@@ -43,7 +43,7 @@ def train_to_file(
     Args:
         options: of the command line.
         body: wears the garment.
-        template: of the garment.
+        garment: that it is trained for.
         motions: to train on.
         held_out: to validate with.
         data: simulated motions, or None.
@@ -64,7 +64,7 @@ def train_to_file(
     )  # fmt: skip
     if checkpoint.path.is_file() and not options.resume:
         say(f"note: {checkpoint.path} of a stopped run will be replaced; --resume would go on with it")
-    dressed = DressedBody(body, template.tailor(body, vertices=options.vertices))
+    dressed = DressedBody(body, garment.make(body, vertices=options.vertices))
     trajectories = None
     if data is not None:
         data.check(settings_of(body, dressed.garment))
@@ -77,7 +77,7 @@ def train_to_file(
     if output.is_file():
         say(f"note: {output} will be replaced when this training has ended")
     frames = sum(motion.frames for motion in motions)
-    say(f"{template.description}: {dressed.vertices} vertices, {len(motions)} motions, "
+    say(f"{garment.description}: {dressed.vertices} vertices, {len(motions)} motions, "
         f"{frames} frames, recipe {recipe.name}")  # fmt: skip
     validation = None
     if held_out:

@@ -12,7 +12,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
-from snug.garments.templates import tailor_tshirt
+from snug.garments.templates import find_template
 from tests.benchmarks.plan.planned import planned
 from tests.snug.garments.garment_files import own_chart, saved
 from tests.snug.training.dressing import tube_dress
@@ -69,7 +69,7 @@ def test_a_name_that_means_something_else_is_refused(tmp_path, tube, name):
 
 @pytest.mark.slow
 def test_a_garment_of_ones_own_goes_through_a_run(tmp_path):
-    shirt = tailor_tshirt(Body.load(), vertices=300)
+    shirt = find_template("tshirt").tailor(Body.load(), vertices=300)
     path = saved(tmp_path, shirt, uv=own_chart(shirt.rest_positions, shirt.faces))
     out = tmp_path / "run"
     options = ["--preset", "smoke", "--suite", "garments", "--methods", "simulation,skinning,snug"]

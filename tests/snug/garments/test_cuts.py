@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from snug.garments.cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
-from snug.garments.templates import tailor_tshirt
+from snug.garments.templates import find_template
 
 
 def test_a_neck_is_cut_above_high_shoulders(body):
@@ -17,7 +17,7 @@ def test_a_neck_is_cut_above_high_shoulders(body):
     neck = neck_cut(low, 0.015)
     assert neck.point[1] > joints[body.joint_names.index("neck"), 1] + 0.005
     assert neck_cut(body, 0.015).point[1] == body.joint_template[body.joint_names.index("neck"), 1]
-    shirt = tailor_tshirt(low, vertices=500)
+    shirt = find_template("tshirt").tailor(low, vertices=500)
     assert np.abs(shirt.rest_positions[shirt.loops["neck"], 0]).max() < neck.reach - 0.005
 
 

@@ -20,7 +20,7 @@ from snug.garments.fit import pose_in_file
 from snug.garments.garment import GarmentError
 from snug.garments.options import GarmentFile, add_garment_options, demand_garment_file, make_garment_file
 from snug.garments.reading import read_garment
-from snug.garments.templates import tailor_skirt, tailor_tshirt
+from snug.garments.templates import find_template
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.training.command import train_to_file
@@ -31,7 +31,7 @@ from tests.snug.training.dressing import tube_dress
 
 @pytest.fixture(scope="session")
 def shirt(body):
-    return tailor_tshirt(body, vertices=300)
+    return find_template("tshirt").tailor(body, vertices=300)
 
 
 @pytest.fixture(scope="session")
@@ -119,7 +119,7 @@ def test_a_garment_follows_the_limbs_that_it_encloses_and_no_other(tmp_path, bod
 
 
 def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
-    skirt = tailor_skirt(body, vertices=300)
+    skirt = find_template("skirt").tailor(body, vertices=300)
     read = read_garment(GarmentFile(path=saved(tmp_path, skirt)), body)
     assert set(read.loops) == {"waist", "hem"}
     np.testing.assert_array_equal(read.pins, skirt.pins)

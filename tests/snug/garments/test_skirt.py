@@ -13,7 +13,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.ground_truth import SimulateQuasiStatic
 from reference_sim import Trajectory
 from snug.garments.garment import GarmentError
-from snug.garments.templates import tailor_skirt, tailor_tshirt
+from snug.garments.templates import find_template
 from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
@@ -28,7 +28,7 @@ TINY = dataclasses.replace(find_preset("smoke"), garment_vertices=300, frames=10
 
 @pytest.fixture(scope="module")
 def skirt(body):
-    return tailor_skirt(body)
+    return find_template("skirt").tailor(body)
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +79,12 @@ def test_the_body_carries_the_waistband_close_and_nothing_of_a_shirt(body, skirt
         assert np.abs(igl.signed_distance(band, skin, body.faces)[0]).max() < 0.02
     still = skirt.pin_positions(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
     assert still == pytest.approx(skirt.rest_positions[skirt.pins], abs=1e-12)
-    assert len(tailor_tshirt(body, vertices=300).pins) == 0
+    assert len(find_template("tshirt").tailor(body, vertices=300).pins) == 0
 
 
 def test_a_skirt_out_of_range_is_named(body):
     with pytest.raises(GarmentError, match=r"rise=0\.5: a skirt"):
-        tailor_skirt(body, rise=0.5)
+        find_template("skirt").tailor(body, rise=0.5)
 
 
 def handles(scene):

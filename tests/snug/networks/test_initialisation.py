@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from snug.garments import tailor_tshirt
+from snug.garments import find_template
 from snug.networks.architectures import ARCHITECTURES, make_network
 from snug.networks.dressed_body import DressedBody
 from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES
@@ -82,7 +82,7 @@ def test_a_last_layer_of_zero_starts_at_the_template(kind, narrow):
 
 def test_initial_strain_at_the_papers_size_is_of_the_authors_order(body):
     """Hundreds of joules, as the authors report of their own training (391); by torch's rules 70,000."""
-    shirt, strains = DressedBody(body, tailor_tshirt(body, vertices=4400)), {}
+    shirt, strains = DressedBody(body, find_template("tshirt").tailor(body, vertices=4400)), {}
     for rules in ("keras", "torch"):
         recipe = replace(PAPER, initialisation=rules, terms=("strain",))
         trainer = Trainer("snug", shirt, [swaying(60)], steps=1, seed=0, recipe=recipe)
