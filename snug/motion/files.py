@@ -11,7 +11,7 @@ import numpy as np
 from reference_sim.files.array_file import ArrayFileError, array_names
 from snug.body.skeleton import JOINT
 from snug.motion.formats import READERS
-from snug.motion.motion import Motion, MotionError, clear_arms, place, resample, spread_arms
+from snug.motion.motion import Motion, MotionError, clear_arms, place, resample
 from snug.motion.options import MotionFileOptions
 from snug.motion.recording_errors import remove_recording_errors
 from snug.motion.smpl_arrays import ARRAY_NAMES
@@ -26,22 +26,16 @@ SHAPE_FILES = ("shape.npz", "*_stagei.npz")  # of a subject: AMASS keeps them be
 FORMULA = ("=", "+", "-", "@")  # what begins with one of these is a formula to programs that open CSV files
 
 
-def load_motions(
-    path: str | Path,
-    *,
-    spread_degrees: float | None = None,
-    options: MotionFileOptions | None = None,
-) -> list[Motion]:
+def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) -> list[Motion]:
     """Read motions from a file, or from every motion file of a folder, in the order of their names.
 
     Each comes back whole, at 30 frames per second, placed on the floor at the origin facing +z, with the arms
-    spread and the hands' rotations at a tenth. CMU files (.amc) need their skeleton (.asf) beside them. Of a
-    folder of AMASS, files of a subject's shape (SHAPE_FILES) are left out where they hold no motion.
+    spread by `clear_arms` and the hands' rotations at a tenth. CMU files (.amc) need their skeleton (.asf)
+    beside them. Of a folder of AMASS, files of a subject's shape (SHAPE_FILES) are left out where they hold
+    no motion.
 
     Args:
         path: a file of a kind in `snug.motion.formats.READERS`, or a folder of them.
-        spread_degrees: angle by which arms are spread (0: as recorded; None: as far as clear_arms finds
-            needed).
         options: facts that the files do not state.
 
     Raises:
@@ -64,10 +58,8 @@ def load_motions(
         files = [file for file in listed if not holds_shape_alone(file)] or listed
     if not files:
         raise MotionError(f"{path}: holds no motion file ({known}); give a folder of motion capture clips")
-    clips = [resample(place(read_motion(file, options or MotionFileOptions()))) for file in files]
-    if spread_degrees is None:
-        return [clear_arms(clip) for clip in clips]
-    return [spread_arms(clip, spread_degrees) for clip in clips]
+    options = options or MotionFileOptions()
+    return [clear_arms(resample(place(read_motion(file, options)))) for file in files]
 
 
 def read_motion(file: Path, options: MotionFileOptions) -> Motion:

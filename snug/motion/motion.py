@@ -110,8 +110,6 @@ def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
     >>> np.round(np.degrees(spread_arms(standing, 20.0).poses[0, JOINT["left_shoulder"]]), 6)
     array([ 0.,  0., 20.])
     """
-    if degrees == 0.0:
-        return motion
     poses = motion.poses.copy()
     for joint, sign in ((JOINT["left_shoulder"], 1.0), (JOINT["right_shoulder"], -1.0)):
         turn = rotation_matrices(np.array([0.0, 0.0, sign * np.deg2rad(degrees)]))

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.material import Material
 from snug.body.parametric_body import SHAPES, Body
 from snug.body.skeleton import rotation_matrices
 from snug.body.skinning import skin
@@ -35,12 +34,11 @@ class DressedBody:
     Args:
         body: the body.
         garment: tailored to that body.
-        material: in place of the garment's own.
     """
 
-    def __init__(self, body: Body, garment: Garment, *, material: Material | None = None) -> None:
+    def __init__(self, body: Body, garment: Garment) -> None:
         self.body, self.garment = body, garment
-        self.cloth = garment.cloth(material)
+        self.cloth = garment.cloth()
         self.vertices = len(garment.rest_positions)
         self.parents = [int(parent) for parent in body.parents]
         self._weights: dict[int, Tensor] = {}

@@ -200,7 +200,7 @@ def read_cloth(path: Path) -> None:
 
 
 def read_clip(path: Path) -> None:
-    load_motions(path, spread_degrees=0.0)
+    load_motions(path)
 
 
 def read_worn(path: Path) -> None:

@@ -192,7 +192,7 @@ def test_a_checkpoint_of_other_targets_or_cloth_is_refused(tmp_path):
     checkpoint.delete()
     with pytest.raises(Interrupted):
         short(checkpoint=checkpoint, stop=asked_after(2))
-    stiff = DressedBody(dressed.body, dressed.garment, material=Material(young_modulus=1e6))
+    stiff = DressedBody(dressed.body, replace(dressed.garment, material=Material(young_modulus=1e6)))
     checkpoint.delete()
     clip = swaying(16, name="held")
     with pytest.raises(Interrupted):
