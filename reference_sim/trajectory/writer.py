@@ -195,7 +195,7 @@ class TrajectoryWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None and self.frames:
+        if kind is None:
             self._put_in_place()
         self._close(self._part or self.path)
         if self._part is not None:

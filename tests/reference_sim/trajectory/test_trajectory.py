@@ -62,6 +62,15 @@ def test_saving_replaces_a_file_whole_and_leaves_nothing_else(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["wave.vtkhdf"]
 
 
+def test_a_trajectory_of_no_frames_is_saved_too(tmp_path):
+    """As a method returns it that fails at once: the next reader is told so, and not of a missing file."""
+    wave(2).save(tmp_path / "none.vtkhdf")
+    wave(2).first(0).save(tmp_path / "none.vtkhdf")
+    loaded = Trajectory.load(tmp_path / "none.vtkhdf")
+    assert_same(loaded, wave(2).first(0))
+    assert loaded.positions.shape == (0, len(REST), 3)
+
+
 def test_a_save_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
     path = tmp_path / "wave.vtkhdf"
     wave(3).save(path)
