@@ -34,7 +34,7 @@ class Recorder:
         self._file = None
         if path:
             count = cloth.vertex_count
-            self._file = TrajectoryWriter(path, cloth.faces, provenance, vertex_count=count, live=False)
+            self._file = TrajectoryWriter(path, cloth.faces, provenance, vertex_count=count)
 
     def __enter__(self) -> Recorder:
         return self

@@ -86,7 +86,7 @@ class Trajectory:
     def save(self, path: str | Path) -> None:
         """Write the whole file under a temporary name, then put it in place."""
         count = self.positions.shape[1]
-        with TrajectoryWriter(path, self.faces, self.provenance, vertex_count=count, live=False) as writer:
+        with TrajectoryWriter(path, self.faces, self.provenance, vertex_count=count) as writer:
             writer.extend(self.positions, self.times, self.frame_seconds, self.frame_fields)
             writer.finish(self.status, self.reason)
 

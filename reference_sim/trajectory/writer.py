@@ -28,15 +28,14 @@ ROOM_FOR_HDF5 = 1 << 20  # [bytes] that HDF5 may need beside the numbers of a fr
 class TrajectoryWriter:
     """Appends frames to a VTKHDF file; use it in a `with` block.
 
-    A file appears under its name with its first whole frame in it, and from then on a frame counts only once
-    all of it has been flushed: kill -9 leaves the whole frames.
+    The file appears under its name at the end of the block, and only if that ends well; or at `go_live`, and
+    from then on a frame counts only once all of it has been flushed: kill -9 leaves the whole frames.
 
     Args:
         path: the file, replaced if it exists.
         faces: (F, 3).
         provenance: JSON values.
         vertex_count: V.
-        live: False to put the file in place at the end, and only if the block ends well.
     """
 
     def __init__(
@@ -46,11 +45,10 @@ class TrajectoryWriter:
         provenance: dict[str, Any],
         *,
         vertex_count: int,
-        live: bool = True,
     ) -> None:
         self.path = Path(path)
+        # Where it is written; None once it lies under its name.
         self._part: Path | None = self.path.with_name(self.path.name + ".part")
-        self._live = live
         self._vertex_count = vertex_count
         self.frames = 0
         self._create(self._part, np.size(faces))
@@ -160,14 +158,14 @@ class TrajectoryWriter:
                 before  # the other half still serves the frame before, should this one fail
             )
         self.frames = k + count
-        if self._live:
+        if self._part is None:
             self._file.flush()
         benchmark.attrs.modify("frames", self.frames)  # last: a reader trusts only whole frames
-        if self._live:
+        if self._part is None:
             self._file.flush()
-            self._put_in_place()
 
-    def _put_in_place(self) -> None:
+    def go_live(self) -> None:
+        """Put the file in place with what it holds, and flush every frame from now on."""
         if self._part is None:
             return
         import h5py
@@ -176,12 +174,6 @@ class TrajectoryWriter:
         os.replace(self._part, self.path)
         self._part = None
         self._file = h5py.File(self.path, "r+", libver=INDEX_THAT_GROWS)
-
-    def go_live(self) -> None:
-        """Flush every frame from now on; the file is put in place with what it holds."""
-        self._live = True
-        self._file.flush()
-        self._put_in_place()
 
     def first_failure(self, status: str, reason: str) -> None:
         """Note how the frame that is appended next failed, the worst so far, for a run that resumes this."""
@@ -196,7 +188,7 @@ class TrajectoryWriter:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
-            self._put_in_place()
+            self.go_live()
         self._close(self._part or self.path)
         if self._part is not None:
             self._part.unlink()

@@ -194,6 +194,7 @@ def test_killed_between_any_two_writes_of_hdf5(tmp_path):
     path, copy = tmp_path / "run.vtkhdf", tmp_path / "killed.vtkhdf"
     x = np.arange(30.0).reshape(10, 3)
     with TrajectoryWriter(path, np.array([[0, 1, 2]]), {}, vertex_count=10) as writer:
+        writer.go_live()
         for k in range(60):
             writer.append(x + k, 0.1 * k, 1.0, {"energy/strain": 1.0 * k}, before=np.stack([x, x + k]))
         writer._file.close()
@@ -311,7 +312,7 @@ def test_a_lost_sub_step_is_said(tmp_path):
         simulate(**SCENES["handles, sub-steps"](), path=path, resume=True)
 
 
-def test_a_file_appears_with_its_first_whole_frame_or_not_at_all(tmp_path):
+def test_a_file_appears_when_told_or_at_the_end_or_not_at_all(tmp_path):
     faces = np.array([[0, 1, 2]])
     path = tmp_path / "run.vtkhdf"
     with pytest.raises(Cut), TrajectoryWriter(path, faces, {}, vertex_count=3):
@@ -319,9 +320,10 @@ def test_a_file_appears_with_its_first_whole_frame_or_not_at_all(tmp_path):
     assert os.listdir(tmp_path) == []
     with pytest.raises(Cut), TrajectoryWriter(path, faces, {}, vertex_count=3) as writer:
         writer.append(np.zeros((3, 3)), 0.0)
+        writer.go_live()
         raise Cut
     assert Trajectory.load(path).frames == 1
-    with pytest.raises(Cut), TrajectoryWriter(path, faces, {}, vertex_count=3, live=False) as writer:
+    with pytest.raises(Cut), TrajectoryWriter(path, faces, {}, vertex_count=3) as writer:
         writer.append(np.ones((3, 3)), 0.0)
         raise Cut
     assert not Trajectory.load(path).positions.any()  # the old one is still there

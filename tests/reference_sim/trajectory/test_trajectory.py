@@ -91,6 +91,7 @@ def test_an_unfinished_file_gives_its_whole_frames(tmp_path):
     """A copy taken between two frames is what a killed run leaves behind."""
     whole = wave(5)
     with TrajectoryWriter(tmp_path / "live", FACES, {"seed": 3}, vertex_count=len(REST)) as writer:
+        writer.go_live()
         for k in range(3):
             fields = {name: values[k] for name, values in whole.frame_fields.items()}
             writer.append(whole.positions[k], whole.times[k], whole.frame_seconds[k], fields)
@@ -169,6 +170,7 @@ def test_vtk_steps_through_time_with_the_right_points(tmp_path):
 def test_vtk_reads_a_file_that_is_still_being_written(tmp_path):
     whole = wave(4)
     with TrajectoryWriter(tmp_path / "live.vtkhdf", FACES, {}, vertex_count=len(REST)) as writer:
+        writer.go_live()
         for k in range(3):
             writer.append(whole.positions[k], whole.times[k])
         shutil.copy(tmp_path / "live.vtkhdf", tmp_path / "copy.vtkhdf")
