@@ -56,9 +56,9 @@ class Inertia(Energy):
         """Return E [J] of each vertex: u (..., N, 1, 3) [m] -> (..., N)."""
         return self.energy(u[..., 0, :])
 
-    def value_and_gradient(self, x: np.ndarray, x_hat: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
-        offset = x - (self.x_hat if x_hat is None else x_hat)
+        offset = x - self.x_hat
         gradient = (self.masses / self.dt**2)[:, None] * offset
         return 0.5 * float(np.einsum("vi,vi", gradient, offset)), gradient  # BLAS would start threads
 

@@ -205,7 +205,8 @@ def test_inertia_takes_a_target_per_frame():
     energies = energy.energy(x, x_hat)
     exact = 0.5 * cloth.masses / 0.02**2 * ((x - x_hat) ** 2).sum(-1).numpy()
     assert energies.numpy() == pytest.approx(exact, rel=1e-13)
-    value, gradient = energy.value_and_gradient(x[1].numpy(), x_hat[1].numpy())
+    energy.x_hat = x_hat[1].numpy()
+    value, gradient = energy.value_and_gradient(x[1].numpy())
     assert value == pytest.approx(exact[1].sum(), rel=1e-13)
     assert gradient == pytest.approx(cloth.masses[:, None] / 0.02**2 * (x[1] - x_hat[1]).numpy(), rel=1e-13)
 
