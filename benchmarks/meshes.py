@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay
 
+from reference_sim.geometry.topology import half_edges
+
 FAMILIES = ("right", "cross", "union_jack", "equilateral", "delaunay")
 ROW = 2 / 3**0.5  # of the equilateral family: distance of neighbours in a column, over that of columns
 
@@ -70,9 +72,8 @@ def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]
     faces = np.argwhere((i < j) & (i < k) & near[i, j] & near[j, k] & near[k, i])
     faces = faces[np.linalg.det(points[faces]) > 0]
     for _ in range(subdivisions):
-        edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-        unique, inverse = np.unique(edges, axis=0, return_inverse=True)
-        a, b, c = inverse.reshape(3, -1) + len(points)
+        unique, inverse = np.unique(np.sort(half_edges(faces), axis=1), axis=0, return_inverse=True)
+        a, b, c = inverse.reshape(-1, 3).T + len(points)
         points = np.concatenate([points, points[unique].mean(1)])
         i, j, k = faces.T
         faces = np.stack([(i, a, c), (a, j, b), (c, b, k), (a, b, c)]).transpose(0, 2, 1).reshape(-1, 3)

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from reference_sim.contact.anchor_walk import CROSSINGS, WALK_SLACK
+from reference_sim.geometry.surface import faces_around
 from snug.training.contact.cache import PARTS, ContactCache, Patch
 from snug.training.device import CudaGraph, compiled
 
@@ -214,9 +215,8 @@ def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor
 
 def _incident(faces: np.ndarray) -> np.ndarray:
     """Return the faces around each vertex, ascending: (Q, 3) -> (P, K) int64, rows filled up with -1."""
-    counts = np.bincount(faces.ravel())
+    starts, around = faces_around(faces, int(faces.max()) + 1)
+    counts = np.diff(starts)
     table = np.full((len(counts), counts.max()), -1, np.int64)
-    order = np.argsort(faces.ravel(), kind="stable")
-    column = np.arange(len(order)) - np.repeat(np.cumsum(counts) - counts, counts)
-    table[faces.ravel()[order], column] = order // 3
+    table[np.arange(counts.max()) < counts[:, None]] = around
     return table
