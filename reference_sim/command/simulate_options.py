@@ -48,7 +48,15 @@ def make_parser() -> argparse.ArgumentParser:
     add = parser.add_mutually_exclusive_group().add_argument
     add("--resume", action="store_true", help="go on after the last whole frame of OUT.vtkhdf")
     add("--overwrite", action="store_true", help="replace outputs that exist")
+    _add_meshes(parser)
+    _add_material(parser)
+    _add_contact(parser)
+    _add_solver(parser)
+    return parser
 
+
+def _add_meshes(parser: argparse.ArgumentParser) -> None:
+    """Add what the meshes are, in which units, and which vertices are pinned."""
     add = parser.add_argument_group("meshes").add_argument
     add("--units", choices=("m", "cm", "mm", "in"), default="m", help="of all meshes (default m)")
     add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
@@ -67,6 +75,9 @@ def make_parser() -> argparse.ArgumentParser:
         help="vertices held in place: '0,9,12', or 'top', or a box in metres with y up, as in 'y>1.4,x<0.1'",
     )  # fmt: skip
 
+
+def _add_material(parser: argparse.ArgumentParser) -> None:
+    """Add the numbers of the material, in a file or one by one, and how hinges use them."""
     add = parser.add_argument_group("material (default: the cotton of the SNUG paper)").add_argument
     add("--material", type=Path, metavar="FILE",
         help=".toml or .json of the values below; those given below come first",
@@ -81,6 +92,9 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     add("--rest-angles", choices=("flat", "rest"), default="flat", help="hinges at rest (default flat)")
 
+
+def _add_contact(parser: argparse.ArgumentParser) -> None:
+    """Add penalty, friction, barrier and self-contact."""
     add = parser.add_argument_group("contact").add_argument
     add("--contact-stiffness", type=_positive, metavar="J_M5", help="of the penalty [J/m^5] (default 3.4e6)")
     add("--contact-margin", type=_positive, metavar="M", help="of the penalty [m] (default 0.004)")
@@ -102,6 +116,9 @@ def make_parser() -> argparse.ArgumentParser:
         help="keeps triangles from collapsing [J/m^2]; 100 is enough (default 0: none)",
     )  # fmt: skip
 
+
+def _add_solver(parser: argparse.ArgumentParser) -> None:
+    """Add time steps, the minimiser, and what is printed."""
     add = parser.add_argument_group("time and solver").add_argument
     add("--dt", type=_positive, metavar="S",
         help="time between frames, as 0.02 or 1/60 (default: that of an obstacle's trajectory, or 1/30)",
@@ -116,7 +133,6 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     add("--max-iterations", type=_count, metavar="N", help="per step (default 300 of newton, 500 of lbfgs)")
     add("--quiet", action="store_true", help="no progress bar, no summary")
-    return parser
 
 
 def _number(text: str) -> float:
