@@ -64,7 +64,7 @@ def start_loading(*also: str) -> None:
 class IsolatedProcess:
     """One worker process, started when first needed, and again after it had to be ended.
 
-    begin(*arguments) is called first in each new process. Use it in a `with` block, or call `close`.
+    begin(*arguments) is called first in each new process. Call `close` at the end.
     """
 
     def __init__(self, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
@@ -136,12 +136,6 @@ class IsolatedProcess:
             self._process.join()
             self._pipe.close()
             self._process = None
-
-    def __enter__(self) -> IsolatedProcess:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def how_it_ended(code: int) -> tuple[str, str]:

@@ -6,6 +6,7 @@ import operator
 import os
 import sys
 import time
+from contextlib import closing
 
 import pytest
 
@@ -13,7 +14,7 @@ from benchmarks.process.isolated_process import LOADED_BY_ALL, IsolatedProcess, 
 
 
 def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():
-    with IsolatedProcess() as process:
+    with closing(IsolatedProcess()) as process:
         assert process.call(operator.mul, 2, 4, seconds=60) == 8
         began = time.monotonic()
         with pytest.raises(WorkerDied, match=r"no answer within 0\.2 s"):
@@ -31,14 +32,14 @@ def interrupt():
 
 
 def test_an_interrupt_that_the_work_raises_is_a_failure_of_the_work():
-    with IsolatedProcess() as process:
+    with closing(IsolatedProcess()) as process:
         with pytest.raises(WorkerDied, match="KeyboardInterrupt: by the work itself"):
             process.call(interrupt, seconds=60)
         assert process.call(operator.mul, 2, 4, seconds=60) == 8
 
 
 def test_a_process_that_cannot_start_is_none_at_all():
-    with IsolatedProcess(lambda: None) as process:  # cannot be sent to it
+    with closing(IsolatedProcess(lambda: None)) as process:  # cannot be sent to it
         for _ in range(2):
             with pytest.raises(Exception, match="lambda"):
                 process.call(operator.mul, 2, 4, seconds=1)
@@ -51,6 +52,6 @@ def loaded(names):
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere each process loads its own")
 def test_a_process_begins_with_what_all_need_and_nothing_that_a_scene_may_do_without():
     assert "torch" not in LOADED_BY_ALL
-    with IsolatedProcess() as process:
+    with closing(IsolatedProcess()) as process:
         names = [*LOADED_BY_ALL, "torch", "igl", "snug", "reports"]
         assert process.call(loaded, names, seconds=60) == list(LOADED_BY_ALL)

@@ -267,9 +267,10 @@ def test_torch_says_in_a_plain_error_that_there_is_no_room():
 
 HANGING = """
 import time
+from contextlib import closing
 from benchmarks.process.isolated_process import IsolatedProcess
 if __name__ == "__main__":
-    with IsolatedProcess() as process:
+    with closing(IsolatedProcess()) as process:
         process.call(print, "begun", seconds=60)
         process.call(time.sleep, 60, seconds=60)
 """
