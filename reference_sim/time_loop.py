@@ -21,7 +21,7 @@ from reference_sim.energies.energy import Energy
 from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise.result import Result
 from reference_sim.progress import progress_bar
-from reference_sim.time_step import State, TimeStepper
+from reference_sim.time_step import FirstGuess, State, TimeStepper
 from reference_sim.trajectory.recorder import Recorder
 from reference_sim.trajectory.resume import recover
 from reference_sim.trajectory.trajectory import Trajectory
@@ -40,7 +40,7 @@ def simulate(
     start: np.ndarray | None = None,
     velocity: np.ndarray | None = None,
     pin_positions: Callable[[int], np.ndarray] | None = None,
-    guess: str | None = None,
+    guess: str | FirstGuess | None = None,
     quasi_static: bool = False,
     substeps: int = 1,
     refreeze: int = 0,
@@ -61,7 +61,9 @@ def simulate(
         velocity: (V, 3) [m/s] at frame 0; default zero.
         pin_positions: frame -> (P, 3) [m], for handles that move.
         guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
-            along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated").
+            along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated");
+            or a function of the step's number, 1 for the first of a run, and its start (V, 3) [m] that
+            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there.
         quasi_static: set the velocity to zero after every step, sub-steps included; for settling.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
@@ -89,9 +91,9 @@ def simulate(
         within the tolerance up to round-off alone; the reason tells of the first), energy/<term> [J].
 
     Raises:
-        ValueError: unknown guess, wrong shapes, fewer than 1 frame or sub-step, a step of no size, a
-            tolerance that is no number above 0, refreeze with resume, a function as method beside a term that
-            joins a step late (self-contact alone), which Newton's method ends.
+        ValueError: unknown guess, wrong shapes (of a guess too), fewer than 1 frame or sub-step, a step of no
+            size, a tolerance that is no number above 0, refreeze with resume, a function as method beside a
+            term that joins a step late (self-contact alone), which Newton's method ends.
         TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
 
     Example: a triangle that one corner holds falls by g dt^2 in the first step.

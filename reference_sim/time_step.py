@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
 GUESSES = ("previous", "extrapolated", "body_transported")
+# First guess (V, 3) [m] of the end of a step, from its number, 1 for the first, and its start (V, 3) [m].
+FirstGuess = Callable[[int, np.ndarray], np.ndarray]
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
 LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
 # Minimiser of a step whose terms join late, as L-BFGS ends by it too, and options that it shares.
@@ -59,7 +61,7 @@ class TimeStepper:
         dt: time between frames [s].
         substeps: steps per frame.
         obstacle: the moving body, one mesh per frame.
-        guess: one of GUESSES, see `simulate`.
+        guess: one of GUESSES or a function, see `simulate`.
         quasi_static: whether the velocity is set to zero after every step, sub-steps included.
         refreeze: times that what a step freezes is searched again at its end, and the step solved again. A
             step in which a barrier stopped the obstacle is not.
@@ -78,7 +80,7 @@ class TimeStepper:
         dt: float,
         substeps: int = 1,
         obstacle: Obstacle | None = None,
-        guess: str | None = None,
+        guess: str | FirstGuess | None = None,
         quasi_static: bool = False,
         refreeze: int = 0,
         **options: Any,
@@ -89,9 +91,11 @@ class TimeStepper:
             raise ValueError(f"simulate: dt / substeps = {step:.3g} s: give {LEAST_DT:g} to {MOST_DT:g} s")
         if guess is None:
             guess = "extrapolated" if obstacle is None else "body_transported"
-        if guess not in GUESSES or (guess == "body_transported" and obstacle is None):
+        if not callable(guess) and (
+            guess not in GUESSES or (guess == "body_transported" and obstacle is None)
+        ):
             raise ValueError(
-                f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)};"
+                f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)}, or give a function;"
                 " body_transported needs an obstacle"
             )
         if refreeze < 0:
@@ -186,8 +190,15 @@ class TimeStepper:
         """Freeze every term for the step from x with velocity v (V, 3); return its first guess (V, 3) [m].
 
         handles: (P, 3) [m] where the pins are at the end of the step.
+
+        Raises:
+            ValueError: a function as guess gives another shape.
         """
-        if self.guess == "body_transported":
+        if callable(self.guess):
+            first = np.array(self.guess(step, x), dtype=np.float64)
+            if first.shape != x.shape:
+                raise ValueError(f"simulate: guess of step {step} is {first.shape}: {x.shape} [m] is due")
+        elif self.guess == "body_transported":
             assert self.obstacle is not None
             first = self.obstacle.transported(x, step, self.cloth.rest_positions)
         else:
@@ -308,7 +319,7 @@ class TimeStepper:
             "method": "backward Euler",
             "dt_s": self.frame_dt,
             "substeps": self.substeps,
-            "guess": self.guess,
+            "guess": _as_json(self.guess),
             "quasi_static": self.quasi_static,
             "refreeze": self.refreeze,
             "options": {name: _as_json(value) for name, value in self.options.items()},

@@ -1,9 +1,8 @@
 """Warm-started solver: a network's frame, or skinning's, as first guess of a step, then a few iterations.
 
 The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while the
-network sees what it always sees. The potential of the step is frozen as for every solver (contact planes at
-the guess that the body carries), and only the starting point differs. The time of the network or of skinning
-is that of run(); posed body, features and joint transforms are ready before.
+network sees what it always sees. Contact planes are frozen at the first guess, as for every solver. The time
+of the network or of skinning is that of run(); posed body, features and joint transforms are ready before.
 """
 
 from __future__ import annotations
@@ -21,9 +20,6 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
 from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
-from reference_sim.minimise.minimisers import Restartable, make_minimiser
-from reference_sim.minimise.result import Result
-from reference_sim.potential import Potential
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
 from snug.networks.trained_model import TrainedModel
@@ -33,42 +29,31 @@ SKINNING = "skinning"
 SHARE = 0.6  # of the last residual
 
 
-class FromElsewhere:
-    """Minimiser that starts each step at the next of the frames, whatever guess it is given.
+class GivenFrames:
+    """First guesses of the steps of a run, one of the given frames each.
 
-    With `carry`, SHARE of the last frame's residual, carried by the skin, is added to each start.
-    The residual is what the inner minimiser added to the last frame; that of frame 0 is what the start of the
-    scene, `start` (V, 3) [m], adds. frames: yields positions (V, 3) [m] from frame 0 on, at each call.
+    With `carry`, SHARE of the last frame's residual, carried by the skin, is added to each guess. The
+    residual is what the solver added to the frame before: where the step starts, less the frame given there.
+
+    Args:
+        frames: starts the frames, each (V, 3) [m], from frame 0 on, at each call.
+        carry: transport of the residual, or None.
     """
 
     def __init__(
-        self, inner: Restartable, frames: Callable[[], Iterator[np.ndarray]], pins: np.ndarray,
-        start: np.ndarray, carry: ResidualTransport | None = None,
-    ) -> None:  # fmt: skip
-        self._inner, self._frames, self._pins = inner, frames, pins
-        self._start, self._carry = start, carry
-        self._begin()
+        self, frames: Callable[[], Iterator[np.ndarray]], carry: ResidualTransport | None = None
+    ) -> None:
+        self._start, self._carry = frames, carry
 
-    def _begin(self) -> None:
-        self._starts, self._frame = self._frames(), 0
-        self._added = self._start - next(self._starts)  # frame 0 is the scene's start, as for every solver
-
-    def start_again(self) -> None:
-        """Begin the frames anew, without the residual of the last run."""
-        self._inner.start_again()
-        self._begin()
-
-    def minimise(self, x0: np.ndarray) -> Result:
-        """Run from the next start; pinned vertices stay where x0 (V, 3) [m] has them."""
-        self._frame += 1
-        given = start = next(self._starts)
-        if self._carry is not None:
-            start = given + SHARE * self._carry.carried(self._added, self._frame)
-        start[self._pins] = x0[self._pins]
-        result = self._inner.minimise(start)
-        if self._carry is not None:
-            self._added = result.positions - given
-        return result
+    def __call__(self, step: int, x: np.ndarray) -> np.ndarray:
+        """Return the guess (V, 3) [m] for a step from x (V, 3) [m]. Steps are asked for in turn, from 1."""
+        if step == 1:
+            self._frames = self._start()
+            self._given = next(self._frames)  # frame 0 itself is the scene's start, as for every solver
+        before, self._given = self._given, next(self._frames)
+        if self._carry is None:
+            return self._given
+        return self._given + SHARE * self._carry.carried(x - before, step)
 
 
 @dataclass(kw_only=True)
@@ -90,15 +75,8 @@ class WarmStarted(Simulation):
         """Prepare the network or skinning, and the solver that starts from its frames."""
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
-        frames = self._frames(scene)
-        carry = self._carry(scene) if self.residual else None
-
-        def from_elsewhere(potential: Potential, **options: Any) -> FromElsewhere:
-            inner, pins = make_minimiser(potential, **self.solver), np.asarray(potential.cloth.pins)
-            assert isinstance(inner, Restartable)
-            return FromElsewhere(inner, frames, pins, scene.start, carry)
-
-        self.options = {"method": from_elsewhere}
+        guess = GivenFrames(self._frames(scene), self._carry(scene) if self.residual else None)
+        self.options = {"guess": guess, **self.solver}
         super().prepare(scene)
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:

@@ -11,7 +11,7 @@ from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
 from benchmarks.methods.minimisers.kernels import block
 from benchmarks.methods.minimisers.xpbd import XPBD
-from benchmarks.methods.solvers.warm_started import FromElsewhere, WarmStarted
+from benchmarks.methods.solvers.warm_started import SHARE, GivenFrames, WarmStarted
 from benchmarks.metrics.energies.replayed_step import first_guess
 from benchmarks.scenes.free_fall import exact_fall
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
@@ -29,7 +29,7 @@ from reference_sim.energies.contact_penalty.definition import sample_depth
 from reference_sim.energies.stretch_stvk.definition import strain
 from reference_sim.kernels.element_sweeps import SCRATCH_SHAPE
 from reference_sim.kernels.fast_kernels import step_terms
-from reference_sim.minimise import Newton, make_minimiser
+from reference_sim.minimise import Newton
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 DT = 1 / 30
@@ -194,32 +194,21 @@ def test_simulate_takes_a_minimiser_of_its_callers_and_says_which():
     assert run.frame_fields["iterations"].tolist() == [0, 5, 5]
 
 
-def test_a_hybrid_starts_each_step_from_the_next_frame_with_the_pins_of_the_step(touching):
-    potential, guess = touching
-    starts = [guess + 0.01, guess - 0.02]
-    seen = []
+def test_given_frames_begin_anew_with_each_run_and_carry_what_the_solver_added_to_the_last():
+    frames = np.random.default_rng(0).normal(size=(3, 5, 3))
+    added = np.random.default_rng(1).normal(size=(2, 5, 3))
 
-    class Looking:
-        def minimise(self, x0):
-            seen.append(x0.copy())
-            return make_minimiser(potential, max_iterations=1).minimise(x0)
+    class Turning:
+        def carried(self, residual, frame):
+            return frame * residual[:, ::-1]
 
-        def start_again(self):
-            seen.clear()
-
-    def frames():
-        return (frame.copy() for frame in [guess, *starts])
-
-    pins = potential.cloth.pins
-    warm_started = FromElsewhere(Looking(), frames, pins, guess)
-    for start in starts:
-        result = warm_started.minimise(guess)
-        free = potential.cloth.free
-        assert np.array_equal(seen[-1][free], start[free]) and np.array_equal(seen[-1][pins], guess[pins])
-        assert np.array_equal(result.positions[pins], guess[pins])
-    warm_started.start_again()
-    warm_started.minimise(guess)
-    assert len(seen) == 1 and np.array_equal(seen[0][free], starts[0][free])
+    plain, carrying = GivenFrames(lambda: iter(frames)), GivenFrames(lambda: iter(frames), Turning())
+    for _ in range(2):
+        for step in (1, 2):
+            x = frames[step - 1] + added[step - 1]
+            carried = SHARE * step * added[step - 1][:, ::-1]
+            assert np.array_equal(plain(step, x), frames[step])
+            assert carrying(step, x) == pytest.approx(frames[step] + carried, abs=1e-12)
 
 
 def test_a_warm_started_solver_has_no_starts_for_steps_between_frames(tmp_path):
