@@ -45,7 +45,8 @@ class Potential:
         self.cloth = self.energies[0].cloth
         for energy in self.energies:
             if energy.cloth is not self.cloth:
-                raise ValueError(f"energy {energy.name!r} was built on another cloth: use one for all")
+                first = self.energies[0].name
+                raise ValueError(f"energies {first!r} and {energy.name!r} are of different cloths: use one")
         names = [energy.name for energy in self.energies]
         for name in names:
             if names.count(name) > 1:  # one would hide the other in tables and files

@@ -146,7 +146,7 @@ def test_positions_need_not_be_contiguous_or_double():
 
 
 def test_energies_of_different_cloths_are_refused():
-    with pytest.raises(ValueError, match="'gravity' was built on another cloth"):
+    with pytest.raises(ValueError, match="'strain' and 'gravity' are of different cloths"):
         Potential([StretchStVK(bent_cloth()), Gravity(bent_cloth())])
 
 
