@@ -72,6 +72,13 @@ RUNS = {
         },
         ("frames_tshirt-01_01_a", "training"),
     ),
+    "paper_supervised": PublishedRun(
+        "the supervised network at the same 4378 vertices, trained on simulations of the same frames",
+        {
+            "": f"--preset paper --suite garments {THREE} {ALL_TESTS} --scenes 'tshirt/*' --methods "
+            "simulation,simulation-perturbed-1e-4,skinning,supervised"
+        },
+    ),
     "fabric": PublishedRun(
         "textile tests of six fabrics by the reference and by every solver stopped early",
         {"": "--suite fabric"},
