@@ -68,6 +68,17 @@ def test_a_gif_has_every_frame_in_its_time_and_the_same_bytes_twice(run, tmp_pat
     assert np.abs(half[4][0] - half[4][1]).max() > 100
 
 
+@pytest.mark.parametrize("rate", [15.0, 30.0, 50.0 + 1e-12, 60.0, 120.0])
+def test_a_gif_takes_its_time_and_no_frame_less_than_browsers_show(tmp_path, rate):
+    frames = np.full((120, 8, 120, 3), film.INK, dtype=np.uint8)
+    frames[np.arange(120), :, np.arange(120)] = 255  # a line that moves: no frame is like the one before
+    film.write_gif(tmp_path / "x.gif", iter(frames), rate)
+    with Image.open(tmp_path / "x.gif") as picture:
+        lasted = [picture.info["duration"] for k in range(picture.n_frames) if picture.seek(k) is None]
+    assert min(lasted) >= 20 and max(lasted) < 80
+    assert sum(lasted) == pytest.approx(1000 * 120 / rate, abs=10)
+
+
 @needs_opengl
 def test_an_mp4_has_every_frame(run, tmp_path):
     av = pytest.importorskip("av", reason="the extra [film] is not installed")
