@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder, replacing
-from reports.pictures.render import camera_axes, vertex_normals
+from reports.pictures.render import camera_axes
 
 if TYPE_CHECKING:
     from reference_sim.trajectory.trajectory import Trajectory
@@ -96,6 +96,8 @@ class Stage:
 
 
 def _move(mesh, positions: np.ndarray, frame: int) -> None:
+    from reference_sim.geometry.surface import vertex_normals  # loads numba
+
     mesh.points = positions[min(frame, len(positions) - 1)].astype(np.float32)
     mesh.point_data.active_normals = vertex_normals(mesh.points.astype(float), mesh.regular_faces)
 
