@@ -173,6 +173,14 @@ def test_clips_come_first_and_leading_methods_before_others(folder):
     ]  # fmt: skip
 
 
+def test_a_roll_out_of_the_user_comes_before_solvers(tmp_path):
+    roles = {"newton-4": "solver", "mine": "external"}
+    run = run_folder(tmp_path, [row(WHOLE, name, role=role, seeded=False) for name, role in roles.items()])
+    for name in roles:
+        write_mesh(run.trajectory_path(WHOLE, name), *moving(0.0), {})
+    assert [list(seeds) for _, seeds in groups(run, read_run(run))] == [["mine"], ["newton-4"]]
+
+
 def test_what_does_not_fit_is_left_out_and_said(tmp_path):
     run = make_folder(tmp_path)
     write(run, tables=False, budget=1)
