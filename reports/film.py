@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder, replacing
-from reports.pictures.render import camera_axes, vertex_normals
+from reports.pictures.render import camera_axes
 
 if TYPE_CHECKING:
     from reference_sim.trajectory.trajectory import Trajectory
@@ -34,6 +36,7 @@ TALL = 1.25  # height of a view over its width
 ANGLE = 18.0  # [degrees] of the perspective, over the height of a view
 SMOOTHED = 0.6  # [s] over which the camera's path is smoothed
 MARGIN = 1.25  # around the garment
+MOST_RATE = 50.0  # frames a second of a GIF that browsers show in their time
 SWATCH = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).screenshot()"
 
 
@@ -93,6 +96,8 @@ class Stage:
 
 
 def _move(mesh, positions: np.ndarray, frame: int) -> None:
+    from reference_sim.geometry.surface import vertex_normals  # loads numba
+
     mesh.points = positions[min(frame, len(positions) - 1)].astype(np.float32)
     mesh.point_data.active_normals = vertex_normals(mesh.points.astype(float), mesh.regular_faces)
 
@@ -179,18 +184,26 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
 
 
 def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
-    """Write a GIF whose hundredths of a second add up to the right time, in shades of the film's colours."""
+    """Write a GIF whose hundredths of a second add up to the right time, in shades of the film's colours.
+
+    Browsers show a frame for two hundredths or more: of a higher rate every second or third frame is kept.
+    """
     from PIL import Image, ImageColor
 
+    step = max(1, math.ceil(round(rate / MOST_RATE, 6)))
+    rate /= step
     # Of all frames at once: one picture's own palette has no place for what the others show.
     shades = np.linspace(0.0, 1.3, 126)[:, None]
     colours = [np.minimum(shades * ImageColor.getrgb(colour), 255.0) for colour in (CLOTH, BODY)]
     table = np.concatenate([*colours, [ImageColor.getrgb(PAPER), INK]]).round().astype(np.uint8)
     palette = Image.new("P", (1, 1))
     palette.putpalette(table.tobytes())
-    drawn = [Image.fromarray(x).quantize(palette=palette, dither=Image.Dither.NONE) for x in frames]
+    drawn = [
+        Image.fromarray(x).quantize(palette=palette, dither=Image.Dither.NONE)
+        for x in islice(frames, 0, None, step)
+    ]
     ends = [10 * round(100.0 * (k + 1) / rate) for k in range(len(drawn))]
-    durations = [max(end - start, 20) for start, end in zip([0, *ends], ends)]
+    durations = [end - start for start, end in zip([0, *ends], ends)]
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
 
 

@@ -87,7 +87,7 @@ BLOCKS: tuple[Block, ...] = (
     Heading("How cells, checks and stress tests ended"),
     TableBlock("endings"),
     TableBlock("unfinished", printed=with_labels),
-    SentenceBlock(unread_files),
+    SentenceBlock(unread_files, small=True),
 )
 
 FIGURES = tuple(block for block in BLOCKS if isinstance(block, Figure))

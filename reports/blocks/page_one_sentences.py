@@ -144,8 +144,8 @@ def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
         sentences.append(f"of {claims} of the paper {paper_claims.in_words(counted)}{failing}")
     where = in_scenes(set(timed[timed["method"] == run.reference]["scene"]))
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
-    if finest:
-        sentences.append(f"{_left_out_by_the_step(run, timed, finest)}, {where}")
+    if finest and (left_out := _left_out_by_the_step(run, timed, finest)):
+        sentences.append(f"{left_out}, {where}")
     apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
     if all(apart):
         sentences.append(
@@ -157,7 +157,10 @@ def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
 
 
 def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
-    """Say how far the simulation with the smallest time steps lies from the reference, and a network."""
+    """Say how far the simulation with the smallest time steps lies from the reference, and a network.
+
+    Empty where nothing but the times of that simulation is known.
+    """
     steps = int(run.methods[finest].level or 0)
     strain, amplitude = (pair(timed, finest, run.reference, name) for name in ("energy/strain", SWING))
     ratios = [
@@ -171,6 +174,8 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     beside = "" if far is None else f", from which {run.label(network)} lies {number(far, 2)} mm"
     has = [f"has {' and '.join(ratios)}"] if ratios else []
     distance = [] if away is None else [f"lies {number(away, 2)} mm from the reference{beside}"]
+    if not (has or distance):
+        return ""
     return (
         "the reference minimises each time step of 1/30 s to convergence, but smaller steps change it: a "
         f"simulation with {steps} steps a frame {', and '.join([*has, *distance])}"

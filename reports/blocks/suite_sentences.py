@@ -48,9 +48,8 @@ def engines(run: Run) -> str:
     if not rows:
         return ""
     right = [row["engine"] for row in rows if row["violates"] == "nothing"]
-    verdict = (
-        "violates no law and is at its own limit" if len(right) == 1 else "violate no law and are at theirs"
-    )
+    one, several = "violates no law and is at its own limit", "violate no law and are at their own limits"
+    verdict = one if len(right) == 1 else several
     count = f"Of {len(rows)} default settings of other engines {len(right)} {verdict}"
     sentences = [f"{count}: {', '.join(right)}." if right else f"{count}."]
     measured = [row for row in rows if row["distance"] is not None]

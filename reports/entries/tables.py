@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlencode
 
+from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import DECLARED
 from benchmarks.results.run_folder import RunFolder
@@ -75,13 +76,22 @@ class Scored:
 
 
 def of_entry(folder: RunFolder, run: Run) -> Scored:
-    """Return the entry whose scores a folder holds. Raises KeyError where run.json has no metadata."""
-    metadata = run.config["metadata"]
+    """Return the entry whose scores a folder holds.
+
+    Raises:
+        ResultsError: run.json without the entry's metadata, or no scores of a method with the entry's name.
+    """
+    again = f"run python -m benchmarks.submit score {folder.path.parent} --replace"
+    try:
+        title, authors, data = (run.config["metadata"][key] for key in ("title", "authors", "training_data"))
+    except (KeyError, TypeError):
+        raise ResultsError(f"{folder.config_path}: has no metadata of an entry: {again}") from None
     name = folder.path.resolve().parent.name
     scenes = tuple(sorted(set(run.frame[run.frame["method"] == name]["scene"])))
-    return Scored(
-        run, folder, name, f"{metadata['title']}; {metadata['authors']}", metadata["training_data"], scenes
-    )
+    if not scenes:
+        remedy = f"give the folder its old name, or {again}"
+        raise ResultsError(f"{folder.rows_path}: no scores of '{name}': {remedy}")
+    return Scored(run, folder, name, f"{title}; {authors}", data, scenes)
 
 
 def of_published(folder: RunFolder, run: Run, scenes: Sequence[str]) -> list[Scored]:

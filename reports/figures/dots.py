@@ -34,8 +34,9 @@ def dots(run: Run) -> Iterator[Drawing]:
     if not run.first_garment or not methods:
         return
     rows = with_relative_excess(run, rows)
-    names = [name for name in METRICS if name in set(rows["metric"])]
-    excess = RELATIVE_EXCESS.name if RELATIVE_EXCESS.name in set(rows["metric"]) else ""
+    measured = set(rows[rows["method"].isin(methods)]["metric"])
+    names = [name for name in METRICS if name in measured]
+    excess = RELATIVE_EXCESS.name if RELATIVE_EXCESS.name in measured else ""
     if excess:
         names[0] = excess
     by_method = means(rows, "method", "metric")

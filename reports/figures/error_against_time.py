@@ -27,6 +27,7 @@ from reports.statistics.pareto import (
 from reports.tables.number_texts import number
 
 MOST_PANELS, MOST_SCENES = 4, 9  # in the PDF; the page has all
+BAND_REMARK = " Grey: within the reference's uncertainty."  # remark of a caption
 Scenes = list[tuple[pd.DataFrame, list[tuple[Metric, list[Point]]]]]  # rows and panels of each
 
 
@@ -78,7 +79,7 @@ def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequenc
     caption = f"{rows['scene'].iloc[0]}: lower left is better. Pale line: the best at each time."
     if any(curve.aside for curve in curves):
         caption += f" {SOLVERS.label} are joined where none is faster and as accurate; the others are faint."
-    caption += " Grey: within the reference's uncertainty." + hollow_remark(run, drawn.below)
+    caption += (BAND_REMARK if drawn.band else "") + hollow_remark(run, drawn.below)
     return Drawing(figure, "error_against_time", caption)
 
 
@@ -103,8 +104,8 @@ def _draw_scene(run: Run, rows: pd.DataFrame, panels: Sequence[tuple[Metric, lis
     for axes, panel in zip(every, drawn):
         write_labels(axes, panel, size=6.5, known=known)
         known |= {label.text for label in panel.labels}
-    caption = f"{scene}: lower left is better. Pale line: the best at each time. Grey: within the "
-    caption += "reference's uncertainty."
+    caption = f"{scene}: lower left is better. Pale line: the best at each time."
+    caption += BAND_REMARK if any(panel.band for panel in drawn) else ""
     caption += f" Dotted: the converged simulation, {number(reference)} ms." if reference else ""
     caption += " Joined: one family, its first and last number beside. Bars: repeats and seeds or, where "
     caption += "larger, the change by a perturbed reference."

@@ -49,6 +49,8 @@ def draw_hem(run: Run, roll_outs: SceneRollOuts) -> Drawing:
     series, body, methods = roll_outs.series, roll_outs.body, _methods_with_hem(run, roll_outs)
     yaw = {m: np.degrees(series[m].frame_fields[YAW]) for m in methods}
     stop = None if body is None else stop_frame(body)
+    if stop is not None and stop >= max(series[m].frames for m in methods):
+        stop = None  # every cloth ended before it
     from_end = {m: 1e3 * series[m].frame_fields[FROM_END] for m in methods}
     panels = [("yaw of the hem [degrees]", yaw, 0), ("from its end [mm]", from_end, 0)]
     if stop is not None:

@@ -80,7 +80,8 @@ KNOWN = {
     "nearest-poses-data": Style("Nearest poses", "", "8", ":"),
     "pose-regression-data": Style("Ridge on principal components", "", "h", ":"),
 }
-LEADING = ("reference", "baseline", "network")  # roles that a figure shows when it has no room for all
+# Roles that a figure shows when it has no room for all; external: roll-outs of the user.
+LEADING = ("reference", "baseline", "network", "external")
 ROOM = 8  # methods that a figure shows whatever they are
 # Members of a family share its colour. Iterations go by doubling: four in a row have four lines.
 _DASHES: tuple[Line, ...] = ((0.0, (8.0, 1.5)), "--", "-.", ":")

@@ -1,4 +1,4 @@
-// What pack.py wrote, as arrays again.
+// What packed_arrays.py wrote, as arrays again.
 
 async function inflated(id) {
   const letters = atob(document.getElementById(id).textContent);

@@ -110,7 +110,7 @@ def _column(run: Run, column: Column) -> dict[str, Any]:
 
 def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
     """Return a text that sorts by itself, or a number as [text, value, spread, mark]."""
-    value = cell.value if isinstance(cell, Mean | Effect) else cell
+    value = cell.shown if isinstance(cell, Effect) else cell.value if isinstance(cell, Mean) else cell
     if isinstance(value, str):
         return text["text"]
     number = None if value is None or math.isnan(value) else max(min(float(value), 1e300), -1e300)

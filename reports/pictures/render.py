@@ -1,6 +1,6 @@
 """Rendering of meshes: an orthographic camera, a depth buffer, light from the side.
 
-Drawn with numpy alone: no OpenGL is needed, whose drivers kill the process where there is no display, and
+Drawn on the processor: no OpenGL is needed, whose drivers kill the process where there is no display, and
 the same machine gives the same bytes.
 """
 
@@ -84,6 +84,8 @@ def _paint(
     surface: Surface, camera: Camera, size: tuple[int, int], depth: np.ndarray, image: np.ndarray
 ) -> None:
     """Paint into the buffers (h*w,) and (h*w,3), where the surface is the nearest yet."""
+    from reference_sim.geometry.surface import vertex_normals  # loads numba
+
     w, h = size
     seen = camera.seen(surface.positions)
     scale = h / camera.height
@@ -129,16 +131,6 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     kept = weights[0] >= 0.0
     triangle, x, y = triangle[kept], x[kept] + low[triangle[kept], 0], y[kept] + low[triangle[kept], 1]
     return y * w + x, seen[triangle], np.stack([weight[kept] for weight in weights], axis=1)
-
-
-def vertex_normals(seen: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return unit normals (V,3) of vertices, by the areas of their faces; zero for one without any."""
-    corners = seen[faces]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.stack(
-        [np.bincount(faces.ravel(), np.repeat(flat[:, k], 3), len(seen)) for k in range(3)], axis=1
-    )
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def _creased(image: np.ndarray, depth: np.ndarray) -> np.ndarray:

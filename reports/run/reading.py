@@ -12,7 +12,7 @@ from benchmarks.results import frame_energies
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import one_protocol
 from benchmarks.results.run_folder import RunFolder, model_path
-from reference_sim.files.array_file import read_arrays
+from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
 from reports.run.finished_run import NoRollOuts, Run, make_run
 from reports.run.training_histories import History, read_history
@@ -91,8 +91,8 @@ class RollOuts(NoRollOuts):
     def rest_areas(self, scene: str) -> np.ndarray | None:
         """Return areas (F,) [m^2] at rest of the faces of the scene's garment, None where unknown."""
         try:
-            return np.load(self.folder.rest_areas_path(scene))
-        except (OSError, ValueError):
+            return read_array(self.folder.rest_areas_path(scene))
+        except ArrayFileError:
             return None
 
     def read(self, path: Path) -> Trajectory | None:

@@ -20,7 +20,7 @@ ERRORS = (
 PLANES = {"gap/energy": "gap/refrozen"}  # what the reference leaves where its planes are searched at its end
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 # Of the step's own potential, which another step size changes.
-OWN_STEP = ("gap/energy", "gap/relative", "step/curvature", "step/distance", "gradient/norm")
+OWN_STEP = ("gap/energy", "step/curvature", "step/distance")
 MOST_SLACK = 0.2  # share of a run time within which another one may count as no slower
 
 
@@ -101,15 +101,10 @@ def fastest(points: Iterable[Point], error: float) -> Point | None:
     return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
 
 
-def of_one_problem(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Return the points of methods that solve the same discrete problem as the reference."""
-    return [p for p in points if run.methods[p.method].family != SMALLER_STEPS]
-
-
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
     """Return the points of solvers without anything learned, of the reference's discrete problem."""
     kept = set(run.with_role("reference", "solver", "reference-variant"))
-    return [p for p in of_one_problem(run, points) if p.method in kept]
+    return [p for p in points if p.method in kept and run.methods[p.method].family != SMALLER_STEPS]
 
 
 def truncated(run: Run, points: Iterable[Point]) -> list[Point]:

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse
 
 from benchmarks.metrics.surface.curvature import curvature_series
+from reference_sim.geometry.topology import corner_areas
 from reference_sim.obstacle import Obstacle
 
 MM = 1e3
@@ -19,9 +20,7 @@ def mean_curvature(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def area_change(positions: np.ndarray, faces: np.ndarray, rest_areas: np.ndarray) -> np.ndarray:
     """Return area over rest area less 1 (T,V) [%], mean over a vertex's faces by rest_areas (F,) [m^2]."""
-    corners = positions[:, faces]
-    normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
-    areas = 0.5 * np.linalg.norm(normals, axis=-1)
+    areas = corner_areas(positions[:, faces].reshape(-1, 3, 3)).reshape(len(positions), -1)
     gather = _gather(faces, positions.shape[1])
     rest = gather @ np.repeat(rest_areas, 3)
     now = (gather @ np.repeat(areas, 3, axis=1).T).T

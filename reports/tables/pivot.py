@@ -108,9 +108,10 @@ def pivot(
     return metrics, sorted(lines, key=order)
 
 
-def metric_tables(run: Run) -> list[Table]:
-    """Return the two tables of each name that metrics of the run declare."""
-    names = list(dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table))
+def metric_tables(run: Run, only: str = "") -> list[Table]:
+    """Return the two tables of each name that metrics of the run declare, or of the name `only`."""
+    declared_names = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
+    names = [name for name in declared_names if only in ("", name)]
     return [table for name in names for declared in declared_pivots(name) for table in declared(run)]
 
 

@@ -16,13 +16,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from io import StringIO
+from itertools import chain
 from pathlib import Path
 
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks.page_one_sentences import headline, topics
 from reports.statistics.published import PUBLISHED, read_published
 from reports.tables import TABLES
-from reports.tables.pivot import declared_pivots
+from reports.tables.pivot import metric_tables
 from reports.tables.table import Table
 from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
 from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows
@@ -124,29 +125,16 @@ def _of_methods(table: Table, methods: Sequence[str]) -> Table:
     return replace(table, rows=tuple(row for row in table.rows if not methods or row[place] in methods))
 
 
+@cache
 def _table(folder: Path, name: str) -> Table:
     """Return a table of a run, having made no more tables than it takes to meet it."""
-    if name in (tables := _metric_tables(folder, name.removesuffix("_by_scene"))):
-        return tables[name]
-    names: list[str] = []
-    # Most tables have the name of the function that makes them.
-    for place in sorted(range(len(TABLES)), key=lambda place: getattr(TABLES[place], "__name__", "") != name):
-        made = {table.name: table for table in _made(folder, place)}
-        if name in made:
-            return made[name]
-        names += made
-    raise ValueError(f"run {folder.name} has no table {name}; it has {', '.join(names)}")
-
-
-@cache
-def _metric_tables(folder: Path, name: str) -> dict[str, Table]:
-    """Return the tables of a name that metrics declare, for a run has many of them; empty where none does."""
     run = read_published(folder)
-    if not any(metric.table == name for metric in run.metrics.values()):
-        return {}
-    return {table.name: table for declared in declared_pivots(name) for table in declared(run)}
-
-
-@cache
-def _made(folder: Path, place: int) -> list[Table]:
-    return TABLES[place](read_published(folder))
+    # Metrics declare many; most others have the name of the function that makes them.
+    makers = sorted(TABLES, key=lambda make: getattr(make, "__name__", "") != name)
+    of_others = chain.from_iterable(make(run) for make in makers)
+    names = []
+    for table in chain(metric_tables(run, name.removesuffix("_by_scene")), of_others):
+        if table.name == name:
+            return table
+        names.append(table.name)
+    raise ValueError(f"run {folder.name} has no table {name}; it has {', '.join(names)}")

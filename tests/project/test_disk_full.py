@@ -26,6 +26,7 @@ from reference_sim import Trajectory
 from reference_sim.command import simulate_command as command
 from reference_sim.files.array_file import write_array
 from reference_sim.files.atomic_files import disk_full, new_folder, replacing
+from reference_sim.trajectory.point_cache import write_obj
 from reference_sim.trajectory.writer import ROOM_FOR_HDF5
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.training import checkpoint as checkpoints
@@ -115,9 +116,7 @@ def test_a_trajectory_takes_no_more_room_than_it_needs(tmp_path):
 
 def test_a_simulation_stops_in_one_line_and_resumes_to_the_same_bits(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    positions, faces = grid(6, 6, width=0.4, depth=0.4)
-    lines = [f"v {x} {y} {z}\n" for x, y, z in positions] + [f"f {a} {b} {c}\n" for a, b, c in faces + 1]
-    Path("sheet.obj").write_text("".join(lines))
+    write_obj(Path("sheet.obj"), *grid(6, 6, width=0.4, depth=0.4))
     arguments = ["sheet.obj", "--pins", "0,6", "--frames", "12", "--quiet", "-o"]
     assert command.main([*arguments, "whole.vtkhdf"]) == 0
     limit = Path("whole.vtkhdf").stat().st_size + ROOM_FOR_HDF5 - 10_000
@@ -169,6 +168,7 @@ def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatc
         "-o",
     ]
     folder, other = RunFolder(tmp_path / "a"), RunFolder(tmp_path / "b")
+    assert run.main([*arguments, str(other.path)]) == 0  # kernels that it compiles are files that grow, too
     if own_processes:
         stopped = limited(100_000, "benchmarks.run", *arguments, str(folder.path), cwd=ROOT)
         status, errors = stopped.returncode, stopped.stderr
@@ -181,7 +181,7 @@ def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatc
     assert status == 1 and "Traceback" not in errors and line.endswith("the same command goes on from there")
     assert "simulation.vtkhdf.part: File too large" in line
     assert folder.read_config()["interrupted"] and not list(folder.path.rglob("*.part*"))
-    assert run.main([*arguments, str(folder.path)]) == run.main([*arguments, str(other.path)]) == 0
+    assert run.main([*arguments, str(folder.path)]) == 0
     rows, others = (
         [(r.metric, r.value, r.status) for r in made.read_rows() if "cost/" not in r.metric]
         for made in (folder, other)

@@ -27,6 +27,8 @@ ALLOWED = {
         "reference_sim.files.array_file",
         "reference_sim.trajectory.point_cache",
         "reference_sim.files.atomic_files",
+        "reference_sim.geometry.surface",
+        "reference_sim.geometry.topology",
         "reference_sim.obstacle",
     ),
 }

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reports.figures import plotting
+from reports.figures import figure
 from reports.pictures import sheets
 
 DOTS = 40  # of a picture in an inch; 200 in a report
@@ -12,5 +12,5 @@ DOTS = 40  # of a picture in an inch; 200 in a report
 def few_dots():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sheets, "DOTS", DOTS)
-        patch.setattr(plotting, "DOTS", DOTS)
+        patch.setattr(figure, "DOTS", DOTS)
         yield

@@ -131,7 +131,5 @@ def test_a_report_that_is_not_there_is_a_finding(copy, capsys):
     assert lines(copy, capsys) == [f"files     {name} is absent: {again}" for name in missing]
 
 
-def test_a_folder_that_is_no_run_is_one_line_and_status_2(built, tmp_path, capsys):
-    assert check.main([str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("reports.check: ") and error.count("\n") == 1
+def test_a_folder_that_is_no_run_is_one_line_and_status_2(tmp_path, refused):
+    assert refused("is this the folder of a run?", check.main, [str(tmp_path)]).startswith("reports.check: ")

@@ -163,6 +163,19 @@ def test_curves_beside_a_trajectory_are_its_own(tmp_path):
     assert read.roll_outs.cloth(SCENES[0], "snug", 0) is None and "snug.npz" in read.problems[0]
 
 
+def test_rest_areas_that_cannot_be_read_are_unknown(tmp_path):
+    run = run_folder(tmp_path, all_rows())
+    path = run.rest_areas_path(SCENES[0])
+    roll_outs = read_run(run).roll_outs
+    assert roll_outs.rest_areas(SCENES[0]) is None  # no such file
+    path.parent.mkdir(parents=True)
+    np.save(path, np.ones(3))
+    assert roll_outs.rest_areas(SCENES[0]).tolist() == [1.0, 1.0, 1.0]
+    for damaged in (b"", b"PK\x03\x04", path.read_bytes()[:-1]):
+        path.write_bytes(damaged)
+        assert roll_outs.rest_areas(SCENES[0]) is None
+
+
 def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     run = RunFolder(tmp_path)
     run.write_rows(all_rows())

@@ -51,8 +51,9 @@ def textile_errors(run: Run) -> Iterator[Drawing]:
     caption = (
         "Textile tests: mean error over the fabrics against run time; lower left is better. Bending "
         "length: distance from the exact one. Drape coefficient: difference from the reference's; bars: "
-        "the change by a perturbed reference. Grey: no more than that of the reference and of its "
-        "perturbed runs. Dotted: the reference's run time. Joined: a family, "
+        "the change by a perturbed reference. Dotted: the reference's run time. Joined: a family, "
         "its first and last number beside."
     )
+    if any(panel.band for panel in drawn):
+        caption += " Grey: no more than that of the reference and of its perturbed runs."
     yield Drawing(figure, "textile_errors", caption)

@@ -29,12 +29,14 @@ class Drawn:
     """Content of a panel, in data coordinates.
 
     below: methods whose error is too small for the panel. labels: what its curves are called, the first ones
-    to be placed first. lines: points (N,2) of each curve, also of one that has a single point.
+    to be placed first. lines: points (N,2) of each curve, also of one that has a single point. band: whether
+    the band of what is inconclusive is in sight.
     """
 
     below: set[str]
     labels: list[Label]
     lines: list[np.ndarray]
+    band: bool
 
 
 def draw_points(
@@ -79,7 +81,8 @@ def draw_points(
         labels.append(Label(run.label(run.reference), (reference, high / (high / low) ** 0.06), "black"))
     log_axis(axes, "x")
     log_axis(axes, "y")
-    return Drawn({p.method for p in points if p.error <= least}, labels, lines)
+    in_sight = band > axes.get_ylim()[0]
+    return Drawn({p.method for p in points if p.error <= least}, labels, lines, in_sight)
 
 
 def write_labels(axes: Axes, drawn: Drawn, size: float = 7.5, known: Collection[str] = ()) -> None:

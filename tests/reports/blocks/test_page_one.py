@@ -121,6 +121,16 @@ def test_scenes_that_nothing_simulates_do_not_count_for_the_reference():
     assert "curvature from the reference, in 2 scenes:" in certainty
 
 
+def test_a_simulation_with_smaller_steps_that_has_only_times_says_nothing_of_the_time_step():
+    more = {"role": "reference-variant", "family": "simulation-dt", "level": 4.0}
+    times = [row(s, m, "cost/frame", 9.0, unit="ms") for s in SCENES for m in ("snug", "simulation")]
+    times += [row(s, "simulation-dt-4", "cost/frame", 9.0, unit="ms", **more) for s in SCENES]
+    assert "smaller steps" not in dict(headline(run_of(times)))["How certain"]
+    far = [row(s, "simulation-dt-4", "distance/rms", 30.0, unit="mm", **more) for s in SCENES]
+    certainty = dict(headline(run_of([*times, *far])))["How certain"].replace("\u00a0", " ")
+    assert certainty.endswith("with 4 steps a frame lies 30 mm from the reference, in 2 scenes.")
+
+
 def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
     rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
     assert "what does not hold" not in dict(headline(run_of(rows))).get("How certain", "")

@@ -8,7 +8,9 @@ import re
 
 import pytest
 
+from benchmarks.results.json_file import ResultsError
 from benchmarks.results.row import DECLARED
+from benchmarks.results.run_folder import RunFolder
 from reports.entries.__main__ import main
 from reports.entries.page import page_of
 from reports.entries.tables import entries_tables, full_scenes, of_entry
@@ -84,6 +86,19 @@ def test_a_row_links_to_its_roll_out_where_a_page_is_kept(tmp_path, published):
     assert json.dumps(address)[1:-1] in text and without == [] and "<script>window" not in text
     (table,) = json.loads(re.search(r'id="content">(.*?)</script>', text, re.DOTALL)[1])
     assert table["rows"][1][0] == [f"mine {NASTY}; they"] * 2 + ["", "", address]
+
+
+def test_scores_of_another_entry_or_of_none_are_refused_with_what_to_do(tmp_path, published):
+    folder = tmp_path / "in"
+    write_entry(folder, "old", 2.0)
+    (folder / "old").rename(folder / "new")
+    with pytest.raises(ResultsError, match=r"no scores of 'new'.* benchmarks.submit score .*new --replace"):
+        page_of(folder, folder / "index.html", published)
+    (folder / "new").rename(folder / "old")
+    scores = RunFolder(folder / "old" / "scores")
+    scores.write_config({k: value for k, value in scores.read_config().items() if k != "metadata"})
+    with pytest.raises(ResultsError, match=r"run.json: .*no metadata.* benchmarks.submit score .*old"):
+        page_of(folder, folder / "index.html", published)
 
 
 def test_entries_without_scores_are_named_and_no_entry_is_refused(tmp_path, published):

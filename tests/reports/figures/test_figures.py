@@ -42,6 +42,12 @@ def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
     assert method_styles.style(alone, "snug+cleanup").label == "SNUG, cleaned up"
 
 
+def test_a_roll_out_of_the_user_is_shown_where_there_is_no_room_for_all():
+    rows = [row(method=f"solver-{k}", role="solver") for k in range(method_styles.ROOM)]
+    run = run_of([*rows, row(method="mine", role="external"), row(method="simulation")])
+    assert method_styles.leading(run, run.methods) == ["simulation", "mine"]
+
+
 def test_the_hem_is_drawn_where_it_swings():
     turn = {
         "hem/yaw": np.radians(np.linspace(0.0, 40.0, FRAMES)),
@@ -56,11 +62,28 @@ def test_the_hem_is_drawn_where_it_swings():
     assert not hem.hem_turns(run, SceneRollOuts("tunic/still", {"snug": still}))
 
 
-def test_a_stop_is_where_the_body_no_longer_moves():
+def stopping() -> tuple[np.ndarray, np.ndarray]:
+    """A sheet that stands still from frame 12 of 40, (T,V,3) and (F,3)."""
     cloth, faces = sheet(0.1)
-    frames = 40
-    moving = np.repeat(cloth[:1], frames, axis=0)
+    moving = np.repeat(cloth[:1], 40, axis=0)
     moving[:12] += 0.01 * np.arange(12, 0, -1)[:, None, None]
+    return moving, faces
+
+
+def test_a_hem_whose_roll_outs_all_ended_before_the_body_stopped_is_drawn_without_the_stop():
+    moving, faces = stopping()
+    turn = {"hem/yaw": np.radians(np.linspace(0.0, 40.0, 12)), "hem/from_end": np.linspace(0.1, 0.0, 12)}
+    run = run_of([row(method="snug")])
+    for frames, stopped in ((12, False), (13, True)):
+        fields = {name: np.append(curve, curve[-1])[:frames] for name, curve in turn.items()}
+        series = {"snug": mesh(moving[:frames], faces, fields)}
+        drawing = hem.draw_hem(run, SceneRollOuts("tunic/stop", series, mesh(moving, faces, {})))
+        assert ("the body has stopped" in drawing.caption) == stopped
+
+
+def test_a_stop_is_where_the_body_no_longer_moves():
+    moving, faces = stopping()
+    frames = len(moving)
     body = mesh(moving, faces, {})
     assert hem.stop_frame(body) == 12
     assert hem.stop_frame(mesh(moving[: 12 + hem.HELD], faces, {})) is None
@@ -144,6 +167,14 @@ def test_a_dot_stands_for_each_motion_and_seed():
     assert sorted(marks.get_xdata()) == [1.0, 1.0, 3.0, 3.0] and list(bar.get_xdata()) == [2.0, 2.0]
     assert drawing.canvas.axes[0].get_xlabel() == "Total [J]"
     assert list(dots(run_of([row("flag", garment="")]))) == []
+
+
+def test_a_metric_that_no_leading_method_has_takes_no_panel_of_dots():
+    solvers = [f"solver-{k}" for k in range(method_styles.ROOM)]
+    rows = [row("tshirt/a", m, "curvature/error", 1.0, role="solver") for m in solvers]
+    rows += [row("tshirt/a", m, "energy/total", 2.0) for m in ("simulation", "snug")]
+    (drawing,) = dots(run_of(rows))
+    assert [axes.get_xlabel() for axes in drawing.canvas.axes] == ["Total [J]"]
 
 
 def test_dots_of_relative_excess_stand_on_a_logarithmic_axis_on_both_sides_of_zero():

@@ -77,10 +77,18 @@ def test_every_figure_of_the_suite_is_drawn(drawings, tmp_path):
     ]
     assert [drawing.name for drawing in drawings] == names
     assert all(save_drawing(tmp_path, drawing).path.is_file() for drawing in drawings)
-    assert "Grey: within the reference's uncertainty." in drawings[0].caption
     walk = run.frame[run.frame["scene"] == "tshirt/walk"]
     assert indistinct(run, walk, "distance/rms") == 21.0  # no rival of whom it may be said who is nearer
     assert indistinct(run, walk, "gap/energy") == 0.015 and indistinct(run, walk, "curvature/error") == 0.0
+
+
+def test_a_caption_speaks_of_a_grey_band_only_where_one_is_seen():
+    unknown = [r for r in all_rows() if not r.method.startswith("simulation-") and r.metric != "gap/refrozen"]
+    tiny = [*unknown, row(SCENES[0], "simulation", "gap/refrozen", 1e-9, "J")]  # below the panel
+    for rows, grey in ((all_rows(), True), (unknown, False), (tiny, False)):
+        for figure in (error_of_page_one, errors_of_scene):
+            (drawing,) = figure(run_of(rows))
+            assert ("Grey: within the reference's uncertainty." in drawing.caption) == grey
 
 
 def test_no_axis_is_labelled_in_markup(drawings):

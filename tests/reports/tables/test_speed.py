@@ -13,7 +13,7 @@ from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
 
 
-def test_the_table_of_crossings_has_every_network_and_the_figure_those_it_has_room_for(tmp_path):
+def test_the_table_of_crossings_leaves_no_ablation_out_for_want_of_room():
     more = [f"snug-{k}" for k in range(9)]
     costs = (("cost/frame", 0.25), ("cost/train", 9.0), ("cost/data", 0.0))
     rows = [

@@ -48,7 +48,14 @@ def test_errors_are_drawn_against_run_time(rows):
         "cantilever": [("simulation", 4.0, pytest.approx(0.01)), ("vbd-5", 0.5, 3.0)],
         "drape": [("simulation", 50.0, pytest.approx(0.01)), ("vbd-5", 5.0, 9.0)],
     }
-    assert len(list(textile_errors(run_of(rows)))) == 1
+    (drawing,) = textile_errors(run_of(rows))
+    assert "Grey" not in drawing.caption  # no perturbed run: no band
+    perturbed = {"role": "reference-variant", "family": "simulation-perturbed", "level": 1e-4}
+    exact = perturbed | {"family": "simulation-tolerance", "level": 1e-8}
+    for name, member in (("simulation-perturbed-1e-4", perturbed), ("simulation-1e-8", exact)):
+        rows += read("drape", name, {"limp": 40.0}, 4.0, 50.0, **member)
+    (drawing,) = textile_errors(run_of(rows))
+    assert "Grey" in drawing.caption
 
 
 def test_cases_make_the_tables_of_the_reference():
