@@ -23,10 +23,11 @@ class Report:
 
     @property
     def subtitle(self) -> str:
-        """Preset, commit and day of the run."""
+        """Preset, commit or version, and day of the run."""
         config = self.run.config
         parts = [f"preset {config['preset']}"] if config.get("preset") else []
-        parts += [f"commit {config['commit']}"] if config.get("commit") else []
+        if made_by := str(config.get("commit") or ""):  # an installed package knows its version alone
+            parts += [made_by if made_by.startswith("version ") else f"commit {made_by}"]
         parts += [str(config["started"])[:10]] if config.get("started") else []
         return " · ".join(parts)
 

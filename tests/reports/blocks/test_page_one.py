@@ -28,6 +28,14 @@ def near(rows) -> str:
     return dict(headline(run_of(rows)))["How near"].replace("\u00a0", " ")
 
 
+@pytest.mark.parametrize(
+    ("made_by", "shown"), [("0123456789", "commit 0123456789"), ("version 0.1.0", "version 0.1.0")]
+)
+def test_the_line_below_the_title_names_the_commit_or_of_an_installed_package_the_version(made_by, shown):
+    report = report_of(on_two_scenes("simulation", 0.5, 7.0), preset="quick", commit=made_by)
+    assert report.subtitle.startswith(f"preset quick · {shown}")
+
+
 # Skinning has 10 J more than the simulation in either scene.
 BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.5, 17.0)]
 
