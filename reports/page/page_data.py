@@ -105,7 +105,7 @@ def _column(run: Run, column: Column) -> dict[str, Any]:
     better = metric.lower_is_better if metric else None
     if better is not None:
         definition += f"; {'lower' if better else 'higher'} is better"
-    return {"title": column.title, "unit": column.unit, "words": column.text, "definition": definition}
+    return {"title": column.title, "unit": column.unit_above, "words": column.text, "definition": definition}
 
 
 def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:

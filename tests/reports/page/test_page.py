@@ -272,6 +272,17 @@ def test_effects_sort_by_the_numbers_that_they_show():
     assert [number for _, number, *_ in cells] == pytest.approx([effect.shown for effect in effects])
 
 
+def test_heads_have_no_unit_where_each_duration_has_its_own():
+    columns = (
+        Column("run", "Run", text=True),
+        Column("train", "Training", "s"),
+        Column("rms", "Distance", "mm"),
+    )
+    data = table_data(run_of([]), Table("t", columns, (("a", 143.4, 5.0),), "t"))
+    assert [column["unit"] for column in data["columns"]] == ["", "", "mm"]
+    assert data["rows"][0][1][:2] == ["2.39 min", 143.4]
+
+
 def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(tmp_path):
     run = make_folder(tmp_path)
     cloth, faces = moving(0.0)
