@@ -63,7 +63,9 @@ def simulate(
         guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
             along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated");
             or a function of the step's number, 1 for the first of a run, and its start (V, 3) [m] that
-            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there.
+            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there. A
+            step may be asked for twice, where a start is checked or a run is resumed, so its answer should
+            depend on its arguments alone; a resumed run knows the function by its name.
         quasi_static: set the velocity to zero after every step, sub-steps included; for settling.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.

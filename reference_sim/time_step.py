@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
 GUESSES = ("previous", "extrapolated", "body_transported")
-# First guess (V, 3) [m] of the end of a step, from its number, 1 for the first, and its start (V, 3) [m].
+# First guess (V, 3) [m] of the end of a step, from its number, 1 for the first, and its start (V, 3) [m]. The
+# first step is asked for again where a start is checked, and the last one when a run is resumed.
 FirstGuess = Callable[[int, np.ndarray], np.ndarray]
 MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
 LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
@@ -168,7 +169,10 @@ class TimeStepper:
             step = (frame - 1) * self.substeps + j
             guess = self.prepare(step, x, v, handles)
             self.obstacle_stopped = False
-            results.append(self.open(x, guess) if self.opening else self.reach(x, guess))
+            if not np.isfinite(guess).all():
+                results.append(self.minimiser.minimise(guess))  # which says so: there is no way to search
+            else:
+                results.append(self.open(x, guess) if self.opening else self.reach(x, guess))
             for _ in range(self.refreeze):
                 # To freeze the step again would put an obstacle that stopped on its way at the end of it.
                 if self.obstacle_stopped or not np.isfinite(results[-1].positions).all():
@@ -195,7 +199,7 @@ class TimeStepper:
             ValueError: a function as guess gives another shape.
         """
         if callable(self.guess):
-            first = np.array(self.guess(step, x), dtype=np.float64)
+            first = np.array(self.guess(step, x.copy()), dtype=np.float64)
             if first.shape != x.shape:
                 raise ValueError(f"simulate: guess of step {step} is {first.shape}: {x.shape} [m] is due")
         elif self.guess == "body_transported":

@@ -88,7 +88,7 @@ class GarmentTemplate:
                 sound mesh comes out.
         """
         if unknown := measures.keys() - self.measures.keys():
-            known = ", ".join(self.measures)
+            known = ", ".join(["vertices", *self.measures])
             raise GarmentError(f"{min(unknown)}: no measure of a {self.name}: use {known}")
         cut = {**self.measures, **measures}
         for name, value in {"vertices": vertices, **cut}.items():

@@ -18,10 +18,18 @@ import torch
 
 from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, minimise, simulate
 from reference_sim.command.summary import summarise
-from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Energy, Gravity, StretchStVK
+from reference_sim.energies import (
+    BendHinge,
+    ContactBarrier,
+    ContactFriction,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    StretchStVK,
+)
 from reference_sim.minimise import Newton
 from reference_sim.progress import progress_bar
-from tests.reference_sim.meshes import box, grid, random_rotation
+from tests.reference_sim.meshes import box, grid, random_rotation, sphere
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
 DOWN = np.array([0.0, -GRAVITY, 0.0])
@@ -78,6 +86,22 @@ def test_a_function_as_first_guess_is_asked_at_each_step_and_terms_freeze_there_
     assert run.positions == pytest.approx(usual.positions, abs=1e-9)
     with pytest.raises(ValueError, match=r"guess of step 1 is \(48, 3\): \(49, 3\) \[m\] is due"):
         simulate(cloth, terms, frames=3, guess=lambda step, x: x[1:])
+
+
+@pytest.mark.parametrize("barrier", [False, True])
+def test_a_guess_that_is_not_finite_ends_the_run_at_once_and_may_write_into_its_argument(barrier):
+    cloth = Cloth(SHEET, FACES)
+    ball = Obstacle(*sphere(2, 0.1))
+    start = SHEET + np.array([0.0, 0.3, 0.0])
+
+    def broken(step: int, x: np.ndarray) -> np.ndarray:
+        x += 0.5
+        return x - 0.5 if step == 1 else np.full_like(x, np.nan)
+
+    contact = ContactBarrier(cloth) if barrier else ContactPenalty(cloth)
+    run = simulate(cloth, [*terms_of(cloth), contact], frames=4, start=start, obstacle=ball, guess=broken)
+    assert run.status == "diverged" and run.frames == 2
+    assert np.array_equal(run.positions[0], start) and np.ptp(run.positions[1] - start) < 0.02
 
 
 # Pins

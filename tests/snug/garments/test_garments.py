@@ -233,7 +233,7 @@ def test_another_shape_carries_the_shirt_along(body, shirt):
         ({"clearance": 0.0}, "clearance=0.0"),
         ({"sleeve": 1.2}, "sleeve=1.2"),
         ({"length": 1.0}, "length=1.0"),
-        ({"strap": 0.05}, "strap: no measure of a tshirt: use ease, clearance, sleeve, length"),
+        ({"strap": 0.05}, "strap: no measure of a tshirt: use vertices, ease, clearance, sleeve, length"),
     ],
 )
 def test_a_measure_out_of_range_or_of_another_kind_is_named(body, wrong, says):

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from snug.body.skeleton import JOINT
 from snug.motion.files import HAND_DAMPING, HANDS, load_motions, read_motion
 from snug.motion.library import make_motion
-from snug.motion.motion import Motion, MotionError, place, resample, transition
+from snug.motion.motion import Motion, MotionError, clear_arms, place, resample, transition
 from snug.motion.options import MotionFileOptions
 from tests.snug.motion.cmu_clips import amc_frame, write_clip
 from tests.snug.motion.motion_forms import TO_Z_UP, Y_UP, of_root, write_forms
@@ -26,7 +26,12 @@ def write(path, motion, turn=Y_UP, **changes):
 
 
 def with_arms_as_recorded(path):
-    return resample(place(read_motion(path, MotionFileOptions())))
+    """The one motion of a file before its arms are spread; what `load_motions` gives is that, spread."""
+    motion = resample(place(read_motion(path, MotionFileOptions())))
+    [loaded], spread = load_motions(path), clear_arms(motion)
+    for name in ("poses", "translations"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(spread, name))
+    return motion
 
 
 def refused(path, pattern, **reading):
