@@ -63,7 +63,7 @@ def test_saving_replaces_a_file_whole_and_leaves_nothing_else(tmp_path):
 
 
 def test_a_trajectory_of_no_frames_is_saved_too(tmp_path):
-    """As a method returns it that fails at once: the next reader is told so, and not of a missing file."""
+    """A method that fails at once returns one; its reader finds no frames in it, instead of no file."""
     wave(2).save(tmp_path / "none.vtkhdf")
     wave(2).first(0).save(tmp_path / "none.vtkhdf")
     loaded = Trajectory.load(tmp_path / "none.vtkhdf")

@@ -26,7 +26,7 @@ def write(path, motion, turn=Y_UP, **changes):
 
 
 def with_arms_as_recorded(path):
-    """The one motion of a file before its arms are spread; what `load_motions` gives is that, spread."""
+    """Return the motion of a file with its arms as recorded; assert that `load_motions` gives it spread."""
     motion = resample(place(read_motion(path, MotionFileOptions())))
     [loaded], spread = load_motions(path), clear_arms(motion)
     for name in ("poses", "translations"):
