@@ -170,7 +170,7 @@ class TimeStepper:
             guess = self.prepare(step, x, v, handles)
             self.obstacle_stopped = False
             if not np.isfinite(guess).all():
-                results.append(self.minimiser.minimise(guess))  # which says so: there is no way to search
+                results.append(self.minimiser.minimise(guess))  # it reports the divergence
             else:
                 results.append(self.open(x, guess) if self.opening else self.reach(x, guess))
             for _ in range(self.refreeze):

@@ -21,7 +21,7 @@ class RunCase(Task):
 
     kind = "case"
     stage = "validation"
-    unit_seconds = 0.5
+    unit_seconds = 0.2
     case: Case
 
     def warm_up(self) -> None:

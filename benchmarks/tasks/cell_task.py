@@ -38,6 +38,7 @@ OURS = ("reference_sim", "snug", "benchmarks")
 HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
 BATCH = 16  # bodies at once, where a method can
 INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milliseconds a frame
+SHORT = 0.05  # of the time of a simulation that was not stopped early
 UNBELIEVABLE = "its time cannot be believed: "
 
 
@@ -202,7 +203,13 @@ class RunUntimedCell(RunCell):
     """The trajectory of a cell whose time nobody asks for: it runs beside others."""
 
     stage = "cells that are not timed"
-    unit_seconds = 6.0  # many are simulations
+    unit_seconds = 7.0  # of a simulation to convergence
+
+    @property
+    def expected_seconds(self) -> float:
+        """Expected duration [s]: networks and solvers that stop early take a small part of a simulation's."""
+        short = self.cell.entry.trained or self.cell.entry.truncated
+        return super().expected_seconds * (SHORT if short else 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -227,6 +234,7 @@ class RepeatCell(CellTask):
     """One more run of a cell, for its time alone. longest: [s] of a first run that is repeated."""
 
     kind = "repeat"
+    unit_seconds = 0.5
     longest: float
 
     def skip(self, needed: Mapping[TaskId, Outcome]) -> str:

@@ -39,7 +39,7 @@ class MeasureCell(Task):
 
     kind = "metrics"
     stage = "metrics"
-    unit_seconds = 0.016
+    unit_seconds = 0.01
     cell: Cell
     cells: tuple[Cell, ...]
     gap_samples: int

@@ -26,6 +26,7 @@ LONGEST = 4  # times the steps of others: at most as many has a training that is
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
 # Of a step, where a step of SNUG's network takes 1: the longest training begins first.
 COST = {"pbns": 0.4, "ncs": 2.5, "ncs-static": 2.5, "handles-20": 0.4, "handles-40": 0.4, "handles-80": 0.5}
+PREPARATION = 25.0  # [s] expected before the first step: clips are mixed, bodies posed
 LOG_EVERY = 20  # training steps between two reports of progress
 # Of a training's summary: what its guard against divergence has done, and its epochs.
 INCIDENTS = ("high_windows", "skipped_updates", "restored", "epochs")
@@ -64,7 +65,9 @@ class TrainNetwork(Task):
     @property
     def expected_seconds(self) -> float:
         """Expected duration [s]."""
-        return super().expected_seconds * (COST.get(self.chosen.kind, 1.0) if self.chosen else 1.0)
+        if self.chosen is None:
+            return 0.0
+        return PREPARATION + super().expected_seconds * COST.get(self.chosen.kind, 1.0)
 
     @property
     def key(self) -> str:
