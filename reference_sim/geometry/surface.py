@@ -31,7 +31,7 @@ def vertex_normals(positions, faces):
             for c in range(3):
                 normals[faces[f, a], c] += n[c]
     for v in range(len(normals)):
-        _normalise(normals[v])
+        normals[v, 0], normals[v, 1], normals[v, 2], _ = _unit(normals[v, 0], normals[v, 1], normals[v, 2])
     return normals
 
 
@@ -54,20 +54,20 @@ def normals_of_corners(some, positions, faces, starts, around):
             if known[v]:
                 continue
             known[v] = True
-            normals[v] = 0.0
-            for f in around[starts[v] : starts[v + 1]]:
+            x, y, z = 0.0, 0.0, 0.0
+            for place in range(starts[v], starts[v + 1]):
+                f = around[place]
                 n = cross_of_face(positions, faces[f, 0], faces[f, 1], faces[f, 2])
-                for c in range(3):
-                    normals[v, c] += n[c]
-            _normalise(normals[v])
+                x, y, z = x + n[0], y + n[1], z + n[2]
+            normals[v, 0], normals[v, 1], normals[v, 2], _ = _unit(x, y, z)
     return normals
 
 
 @njit(cache=True, error_model="numpy")
-def _normalise(v):
-    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 1e-30
-    v[0], v[1], v[2] = v[0] / length, v[1] / length, v[2] / length
-    return length
+def _unit(x, y, z):
+    """Return the unit vector along (x, y, z), and its length."""
+    length = np.sqrt(x * x + y * y + z * z) + 1e-30
+    return x / length, y / length, z / length, length
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,35 +105,32 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
     tangent. starts, around: see `faces_around`.
     """
     of_vertices = normals_of_corners(closest_faces, vertices, faces, starts, around)
-    offset, smooth = np.empty(3), np.empty(3)
     for s in range(len(points)):
         i, j, k = faces[closest_faces[s], 0], faces[closest_faces[s], 1], faces[closest_faces[s], 2]
         u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
-        for c in range(3):
-            smooth[c] = u * of_vertices[i, c] + v * of_vertices[j, c] + w * of_vertices[k, c]
-            offset[c] = points[s, c] - closest[s, c]
-        _normalise(smooth)
-        length = _normalise(offset)
-        cosine = offset[0] * smooth[0] + offset[1] * smooth[1] + offset[2] * smooth[2]
+        m0 = u * of_vertices[i, 0] + v * of_vertices[j, 0] + w * of_vertices[k, 0]
+        m1 = u * of_vertices[i, 1] + v * of_vertices[j, 1] + w * of_vertices[k, 1]
+        m2 = u * of_vertices[i, 2] + v * of_vertices[j, 2] + w * of_vertices[k, 2]
+        m0, m1, m2, _ = _unit(m0, m1, m2)  # of the smooth surface
+        x, y, z, length = _unit(
+            points[s, 0] - closest[s, 0], points[s, 1] - closest[s, 1], points[s, 2] - closest[s, 2]
+        )
+        cosine = x * m0 + y * m1 + z * m2
         # Within a micrometre, or looking along the surface, the offset has no direction to trust.
         beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
             face = faces[closest_faces[s]]
-            beside |= _beyond(offset, closest[s], face, barycentric[s], vertices, faces, starts, around)
+            beside |= _beyond((x, y, z), closest[s], face, barycentric[s], vertices, faces, starts, around)
         if beside:
-            ball = max(TANGENT_BALL, 1.5 * length)  # below c is in it, however deep
-            for c in range(3):
-                normals[s, c] = ball * smooth[c] + length * offset[c]
-            _normalise(normals[s])
-            continue
-        if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
-            n = cross_of_face(vertices, i, j, k)
-            side = np.sign(n[0] * offset[0] + n[1] * offset[1] + n[2] * offset[2])
-            for c in range(3):
-                offset[c] = side * n[c]
-            _normalise(offset)
-        for c in range(3):
-            normals[s, c] = np.sign(cosine) * offset[c]
+            ball, outwards = max(TANGENT_BALL, 1.5 * length), 1.0  # below c is in it, however deep
+            x, y, z, _ = _unit(ball * m0 + length * x, ball * m1 + length * y, ball * m2 + length * z)
+        else:
+            outwards = np.sign(cosine)
+            if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
+                n = cross_of_face(vertices, i, j, k)
+                side = np.sign(n[0] * x + n[1] * y + n[2] * z)
+                x, y, z, _ = _unit(side * n[0], side * n[1], side * n[2])
+        normals[s, 0], normals[s, 1], normals[s, 2] = outwards * x, outwards * y, outwards * z
 
 
 @njit(cache=True, error_model="numpy")
@@ -142,8 +139,8 @@ def _frame_of_face(x, i, j, k, axes):
     for c in range(3):
         axes[0, c] = x[j, c] - x[i, c]
     axes[2, 0], axes[2, 1], axes[2, 2] = cross_of_face(x, i, j, k)
-    _normalise(axes[0])
-    _normalise(axes[2])
+    for a in (0, 2):
+        axes[a, 0], axes[a, 1], axes[a, 2], _ = _unit(axes[a, 0], axes[a, 1], axes[a, 2])
     for c in range(3):
         d, e = (c + 1) % 3, (c + 2) % 3
         axes[1, c] = axes[2, d] * axes[0, e] - axes[2, e] * axes[0, d]

@@ -61,7 +61,8 @@ def to_blocks(values: np.ndarray) -> np.ndarray:
 def lay_out(stencils: np.ndarray, *constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return 3 times the vertices of stencils (N, k), and constants (N,) or (N, ...), both in blocks."""
     columns = np.concatenate([c.reshape(len(c), prod(c.shape[1:])) for c in constants], axis=1)
-    return to_blocks(3 * stencils.astype(np.int32)), to_blocks(columns.astype(np.float32))
+    # Unsigned, for a signed index is first asked whether it counts from the end.
+    return to_blocks(3 * stencils.astype(np.uint32)), to_blocks(columns.astype(np.float32))
 
 
 def empty_state(vertices: np.ndarray, quantities: int) -> np.ndarray:

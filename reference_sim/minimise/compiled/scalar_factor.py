@@ -52,6 +52,10 @@ class ScalarPattern:
         self.row_starts = np.searchsorted(moved[rows, 1], np.arange(count + 1))
         self.factor_rows, self.factor_columns = _pattern_of_rows(self.row_starts, self.row_columns)
         self.starts, self.rows = _by_columns(self.factor_rows, self.factor_columns)
+        # A signed index is first asked whether it counts from the end: a quarter of a factorisation's time.
+        self.row_columns, self.factor_columns, self.rows = (
+            columns.astype(np.uint32) for columns in (self.row_columns, self.factor_columns, self.rows)
+        )
 
     @property
     def entries(self) -> int:
