@@ -157,10 +157,10 @@ class TimeStepper:
         """
         x, v, results = state.x, state.v, []
         if pins is not None:
-            pins, due = np.asarray(pins, dtype=np.float64), (len(self.cloth.pins), 3)
-            if pins.shape != due or not np.isfinite(pins).all():
+            pins, shape = np.asarray(pins, dtype=np.float64), (len(self.cloth.pins), 3)
+            if pins.shape != shape or not np.isfinite(pins).all():
                 what = f"simulate: pin_positions({frame}) gives {pins.shape}"
-                raise ValueError(f"{what}: finite positions {due} [m] are due")
+                raise ValueError(f"{what}: finite positions {shape} [m] are due")
         for j in range(1, self.substeps + 1):
             share = j / self.substeps
             handles = state.x[self.cloth.pins]
