@@ -127,12 +127,13 @@ class TrainNetwork(Task):
             path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
             resume=True, key=digest([self.key, targets]),
         )  # fmt: skip
-        reported = 0  # steps
+        reported, preparation = 0.0, PREPARATION / max(self.expected_seconds, PREPARATION)  # steps, share
 
         def log(row: dict[str, float]) -> None:
             nonlocal reported
-            context.tell(int(row["step"]) - reported)
-            reported = int(row["step"])
+            done = self.steps * preparation + row["step"] * (1.0 - preparation)
+            context.tell(done - reported)
+            reported = done
 
         if self.chosen is None:
             model = untrained_model("snug", dressed, assets.named(motions), seed=self.seed)
