@@ -1,0 +1,255 @@
+"""Mutated files given to every reader of a user's files; what went wrong is printed as JSON.
+
+`python -m tests.project.fuzzing.fuzz_readers COUNT FOLDER [FIRST]` in the repository; FOLDER exists and is
+empty.
+
+A process of its own: a reader that crashes the interpreter, or takes all memory, is found out too. READERS is
+the table; a new reader is one line in it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import faulthandler
+import json
+import os
+import random
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from benchmarks.external.roll_out_files import read_roll_out
+from benchmarks.external.roll_out_option import RollOutFileError
+from benchmarks.process.memory import peak_memory
+from benchmarks.results.json_file import ResultsError, read_json
+from benchmarks.results.run_folder import RunFolder
+from reference_sim import Trajectory, TrajectoryError
+from reference_sim.cloth import Cloth, MeshError
+from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
+from reference_sim.files.mesh_files import read_mesh
+from reference_sim.trajectory.point_cache import read_point_cache
+from reference_sim.trajectory.resume import recover
+from snug.body.parametric_body import Body
+from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
+from snug.body.skeleton import BodyError
+from snug.body.smpl_files import read_body
+from snug.garments.garment import GarmentError
+from snug.garments.options import GarmentFile
+from snug.garments.reading import read_garment
+from snug.motion.files import load_motions
+from snug.motion.motion import MotionError
+from snug.motion.options import MotionFileOptions
+from snug.networks.tensor_file import read_tensors, write_tensors
+from snug.networks.trained_model import ModelFileError, TrainedModel
+from tests.project.fuzzing import samples
+from tests.project.fuzzing.mutations import bytes_of, values_of
+from tests.reports.report_folder import all_rows
+
+
+class Reader(NamedTuple):
+    """A valid file, what reads it, and what may be raised. mutate: of bytes, or of the values in JSON."""
+
+    name: str
+    suffix: str
+    make: Callable[[], bytes]
+    read: Callable[[Path], object]
+    errors: tuple[type[Exception], ...]
+    mutate: Callable[[bytes, random.Random], bytes]
+
+
+def read_cloth(path: Path) -> None:
+    surface = read_mesh(path)
+    Cloth(surface.positions, surface.faces)
+
+
+def read_clip(path: Path) -> None:
+    load_motions(path)
+
+
+def read_worn(path: Path) -> None:
+    read_garment(path, Body.load())
+
+
+def read_material(path: Path) -> None:
+    mesh = path.with_suffix(".obj")
+    if not mesh.is_file():
+        mesh.write_bytes(samples.shirt())
+    read_garment(GarmentFile(path=mesh, material=path), Body.load())
+
+
+def read_joints(path: Path) -> None:
+    path.with_suffix(".bvh").write_bytes(samples.bvh_text())
+    load_motions(path.with_suffix(".bvh"), options=MotionFileOptions(joint_map=path))
+
+
+def read_amc(path: Path) -> None:
+    path.with_suffix(".asf").write_bytes(samples.skeleton_text())
+    read_clip(path)
+
+
+def read_asf(path: Path) -> None:
+    clip = path.with_suffix(".amc")
+    clip.write_bytes(samples.clip_text())
+    read_clip(clip)
+
+
+def read_resumed(path: Path) -> None:
+    recover(path, {}, frames=9)
+
+
+def read_header(path: Path) -> None:
+    """A model whose header says something else, and whose digest is right."""
+    tensors, _ = read_tensors(Path("model.safetensors"))
+    write_tensors(path.with_suffix(".safetensors"), tensors, json.loads(path.read_bytes()))
+    TrainedModel.load(path.with_suffix(".safetensors"))
+
+
+def read_rows(path: Path, name: str = "results.csv") -> None:
+    """Read a run whose file `name` is the one at `path`, the others intact, up to the report's tables."""
+    from reports.blocks.block import Report
+    from reports.document.content import content
+    from reports.run.reading import read_run
+    from reports.tables import make_tables
+
+    folder = RunFolder(path.parent / "run")
+    folder.write_rows(all_rows())
+    folder.config_path.write_bytes(Path("run.json").read_bytes())
+    (folder.path / name).write_bytes(path.read_bytes())
+    run = read_run(folder)
+    json.dumps(content(Report(run, make_tables(run), {})), allow_nan=False)
+
+
+def read_config(path: Path) -> None:
+    read_rows(path, "run.json")
+
+
+def read_frames(path: Path) -> None:
+    read_rows(path, "frame_energies.csv")
+
+
+MESH = (MeshError,)
+READERS: tuple[Reader, ...] = (
+    Reader("array", ".npy", samples.arrays_npy, read_array, (ArrayFileError,), bytes_of),
+    Reader("arrays", ".npz", samples.arrays(a=samples.CORNERS, b=samples.FACES),
+           read_arrays, (ArrayFileError,), bytes_of),
+    Reader("body", ".npz", samples.arrays(**samples.smpl_arrays()), read_body, (BodyError,), bytes_of),
+    Reader("AMASS", ".npz", samples.arrays(**samples.amass_arrays()), read_clip, (MotionError,), bytes_of),
+    Reader("body pickle", ".pkl", samples.pickled(samples.smpl_arrays), read_body, (BodyError,), bytes_of),
+    Reader("motion pickle", ".pkl", samples.pickled(samples.amass_arrays),
+           read_clip, (MotionError,), bytes_of),
+    Reader("plain pickle", ".pkl", samples.pickled(samples.anything),
+           read_plain_pickle, (PlainPickleError,), bytes_of),
+    Reader("garment", ".obj", samples.shirt, read_worn, (GarmentError,), bytes_of),
+    Reader("material", ".toml", lambda: samples.MATERIAL, read_material, (GarmentError,), bytes_of),
+    Reader("joints", ".toml", lambda: samples.JOINTS, read_joints, (MotionError,), bytes_of),
+    Reader("JSON", ".json", samples.run_json, read_json, (ResultsError,), bytes_of),
+    Reader("BVH", ".bvh", samples.bvh_text, read_clip, (MotionError,), bytes_of),
+    Reader("roll-out", ".npz", samples.arrays(**samples.roll_out()),
+           read_roll_out, (RollOutFileError,), bytes_of),
+    Reader("roll-out pickle", ".pkl", samples.pickled(samples.hood_arrays),
+           read_roll_out, (RollOutFileError,), bytes_of),
+    Reader("PC2", ".pc2", samples.point_cache, read_point_cache, (TrajectoryError,), bytes_of),
+    Reader("amc", ".amc", samples.clip_text, read_amc, (MotionError,), bytes_of),
+    Reader("asf", ".asf", samples.skeleton_text, read_asf, (MotionError,), bytes_of),
+    Reader("OBJ", ".obj", samples.mesh(".obj"), read_cloth, MESH, bytes_of),
+    Reader("PLY", ".ply", samples.mesh(".ply", binary=False), read_cloth, MESH, bytes_of),
+    Reader("binary PLY", ".ply", samples.mesh(".ply"), read_cloth, MESH, bytes_of),
+    Reader("STL", ".stl", samples.mesh(".stl", binary=False), read_cloth, MESH, bytes_of),
+    Reader("binary STL", ".stl", samples.mesh(".stl", binary=True), read_cloth, MESH, bytes_of),
+    Reader("OFF", ".off", samples.mesh(".off"), read_cloth, MESH, bytes_of),
+    Reader("VTK", ".vtk", samples.mesh(".vtk", binary=False), read_cloth, MESH, bytes_of),
+    Reader("VTK polygons", ".vtk", samples.polydata(".vtk"), read_cloth, MESH, bytes_of),
+    Reader("VTP", ".vtp", samples.polydata(".vtp"), read_cloth, MESH, bytes_of),
+    Reader("VTU", ".vtu", samples.mesh(".vtu"), read_cloth, MESH, bytes_of),
+    Reader("trajectory", ".vtkhdf", samples.trajectory, Trajectory.load, (TrajectoryError,), bytes_of),
+    Reader("resumed", ".vtkhdf", samples.trajectory, read_resumed, (TrajectoryError,), bytes_of),
+    Reader("model", ".safetensors", samples.model_file, TrainedModel.load, (ModelFileError,), bytes_of),
+    Reader("model's header", ".json", samples.model_header, read_header, (ModelFileError,), values_of),
+    Reader("results.csv", ".csv", samples.results_csv, read_rows, (ResultsError,), bytes_of),
+    Reader("frame_energies.csv", ".csv", samples.frame_energies_csv, read_frames, (ResultsError,), bytes_of),
+    Reader("run.json", ".json", samples.run_json, read_config, (ResultsError,), bytes_of),
+    Reader("values of run.json", ".json", samples.run_json, read_config, (ResultsError,), values_of),
+)  # fmt: skip
+
+
+@dataclasses.dataclass
+class Problem:
+    reader: str
+    number: int
+    what: str
+    seconds: float = 0.0
+
+
+def problem_of(reader: Reader, path: Path) -> tuple[str, bool]:
+    """Return the fault in how `reader` handles a file (empty if none), and whether it refused the file."""
+    try:
+        with quiet() as noise:
+            reader.read(path)
+    except reader.errors as error:
+        text = str(error)
+        wrong = "" if "\n" not in text and len(text) < 1000 else f"no one line: {text[:200]!r}"
+        return wrong or (f"printed: {noise[0][:200]!r}" if noise else ""), True
+    except Exception:
+        return traceback.format_exc(limit=-3), True
+    return "", False
+
+
+@contextmanager
+def quiet() -> Iterator[list[str]]:
+    """Everything printed meanwhile, also by libraries in C, in place of printing it."""
+    output: list[str] = []
+    with open("printed", "w+b") as file:
+        kept = [os.dup(1), os.dup(2)]
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+        try:
+            yield output
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            for number, descriptor in zip((1, 2), kept):
+                os.dup2(descriptor, number)
+                os.close(descriptor)
+            file.seek(0)
+            if printed := file.read().decode(errors="replace"):
+                output.append(printed)
+
+
+def main(count: int, folder: Path, first: int = 0) -> dict[str, Any]:
+    """`count` mutated files over all readers in turn, always the same ones, from number `first` on."""
+    os.chdir(folder)
+    problems, refused, slowest = [], 0, 0.0
+    valid = [reader.make() for reader in READERS]
+    samples.run_json()
+    for reader, data in zip(READERS, valid):
+        place = Path(f"whole{reader.suffix}")
+        place.write_bytes(data)
+        print(reader.name, file=sys.stderr, flush=True)
+        reader.read(place)  # what nobody has touched is read
+    start = peak_memory()
+    for number in range(first, first + count):
+        reader, data = READERS[number % len(READERS)], valid[number % len(READERS)]
+        path = folder / f"mutated{reader.suffix}"
+        path.write_bytes(reader.mutate(data, random.Random(number)))
+        Path("last").write_text(f"{reader.name} {number}")  # to be found after a crash
+        faulthandler.dump_traceback_later(120, exit=True)
+        clock = time.process_time()  # a busy machine makes no problem
+        what, was_refused = problem_of(reader, path)
+        seconds = time.process_time() - clock
+        slowest, refused = max(slowest, seconds), refused + was_refused
+        if what or seconds > 10.0:
+            problems.append(dataclasses.asdict(Problem(reader.name, number, what, seconds)))
+    peak = peak_memory()
+    return {
+        "problems": problems, "refused": refused, "slowest": slowest,
+        "megabytes": peak - start, "peak": peak,
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    print(json.dumps(main(numbers[0], Path(sys.argv[2]).resolve(), *numbers[1:]), indent=1))
