@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import os
-import random
 import signal
-import subprocess
 import sys
 import threading
-import time
-from contextlib import nullcontext, suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +13,6 @@ import pytest
 pytest.importorskip("distributed")
 
 from benchmarks import run
-from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.plan.make_plan import check_scheduler_fits
 from benchmarks.plan.plan import PlanError
 from benchmarks.plan.request import Request
@@ -29,12 +23,11 @@ from benchmarks.runner import cluster_worker
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cluster_executor import ClusterExecutor
 from benchmarks.runner.local_executor import LocalExecutor
-from benchmarks.tasks.task import Outcome, RunStopped
+from benchmarks.tasks.task import RunStopped
 from snug.networks.tensor_file import read_tensors
-from tests.benchmarks.runner.cluster_by_hand import PATH, Cluster, cluster, finish, write
+from tests.benchmarks.runner.cluster_by_hand import cluster, finish, write
+from tests.benchmarks.runner.cluster_runs import alive, files, lines, start_runner, together, until
 from tests.benchmarks.runner.tasks_by_hand import Bar
-
-KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
 
 
 @pytest.fixture(scope="module")
@@ -48,44 +41,6 @@ def two(tmp_path_factory):
 def folder(tmp_path):
     (tmp_path / "run").mkdir()
     return RunFolder(tmp_path / "run")
-
-
-def together(folder: RunFolder, address: str, *batches, needed=None) -> dict[str, Outcome]:
-    executor = ClusterExecutor(folder, None, 1, address)
-    left = [(batch, needed or {}) for batch in reversed(batches)]
-    try:
-        outcomes = executor.together(lambda: left.pop() if left else None, Bar())
-        return {task.name: outcome for task, outcome in outcomes}
-    finally:
-        executor.close()
-
-
-def files(folder: Path) -> dict[str, str]:
-    """Name -> digest, of what is whole and of what is not."""
-    return {path.name: digest_of_file(path) for path in sorted(folder.rglob("*.npy"))}
-
-
-def until(true, seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
-def lines(mark: Path) -> list[list[int]]:
-    """Process ids of worker and task, of each beginning of a task that has this mark."""
-    return (
-        [[int(word) for word in line.split()] for line in mark.read_text().splitlines()]
-        if mark.is_file()
-        else []
-    )
-
-
-def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
 
 
 # --- what comes back ---------------------------------------------------------------------------------------
@@ -267,127 +222,3 @@ def test_what_a_killed_runner_had_begun_is_ended(two, folder, tmp_path):
     runner.wait()
     until(lambda: not any(alive(task) for _, task in lines(mark)), 10.0)
     assert together(folder, two.address, [write("after")])["after"].status == "ok"
-
-
-def start_runner(folder: Path, address: str, *, seconds: float, mark: Path) -> subprocess.Popen:
-    program = (
-        "import sys; from tests.benchmarks.runner import cluster_by_hand; cluster_by_hand.main(*sys.argv[1:])"
-    )
-    return subprocess.Popen(
-        [sys.executable, "-c", program, str(folder), address, str(seconds), str(mark)],
-        env=os.environ | {"PYTHONPATH": PATH}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-
-
-@pytest.mark.slow
-def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path):
-    with cluster(tmp_path, 4) as four:
-        batch = [write("deadly", how="die with the worker"), write("after")]
-        outcomes = together(folder, four.address, batch, [write("beside")])
-    assert outcomes["deadly"].failed and outcomes["deadly"].reason.startswith(
-        "3 workers died while they did it: "
-    )
-    assert outcomes["after"].status == outcomes["beside"].status == "ok"
-
-
-@pytest.mark.slow
-def test_an_outcome_that_goes_with_its_worker_keeps_nobody_waiting(folder, tmp_path, monkeypatch):
-    killed: list[float] = []
-    take = ClusterExecutor._take
-
-    def taken(self, future):
-        if not killed:
-            (address,) = self._client.nthreads()
-            one.workers[0].kill()
-            killed.append(time.monotonic())
-            one.add()
-            until(lambda: address not in self._client.nthreads())
-        return take(self, future)
-
-    monkeypatch.setattr(ClusterExecutor, "_take", taken)
-    with cluster(tmp_path, 1) as one:
-        assert together(folder, one.address, [write("one")])["one"].status == "ok"
-        assert time.monotonic() - killed[0] < 55.0
-
-
-@pytest.mark.slow
-def test_workers_behind_a_nanny_need_a_setting_and_then_come_back(folder, tmp_path):
-    with cluster(tmp_path, 0) as none:
-        none.add("--nanny")
-        with pytest.raises(RunStopped, match="DASK_DISTRIBUTED__WORKER__DAEMON=False"):
-            together(folder, none.address, [write("one")])
-        none.workers[0].terminate()
-        none.workers[0].wait(30)
-        none.add("--nanny", DASK_DISTRIBUTED__WORKER__DAEMON="False")
-        outcomes = together(
-            folder, none.address, [write("deadly", how="die with the worker"), write("after")]
-        )
-    assert outcomes["deadly"].failed and outcomes["after"].status == "ok"
-
-
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory) -> dict[str, str]:
-    folder = tmp_path_factory.mktemp("expected")
-    finish(folder, LocalExecutor(RunFolder(folder), None, 1))
-    return files(folder)
-
-
-@pytest.mark.slow
-def test_with_a_worker_killed_and_the_scheduler_restarted_the_files_are_the_same(folder, tmp_path, expected):
-    with cluster(tmp_path, 2) as two:
-        mark = tmp_path / "mark"
-        runner = start_runner(folder.path, two.address, seconds=1.0, mark=mark)
-        until(lambda: len(lines(mark)) >= 3)
-        os.kill(lines(mark)[-1][0], signal.SIGKILL)
-        two.add()
-        until(lambda: len(list(folder.path.rglob("*.json"))) >= 5)
-        two.restart_scheduler()
-        two.add()
-        two.add()
-        assert runner.wait(180) == 0
-    assert files(folder.path) == expected
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [0, 2])
-def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
-    """The runner, or a worker; here a task's process. What was finished is done no second time."""
-    chance, kills, mark = random.Random(7), 0, tmp_path / "mark"
-    with cluster(tmp_path, workers) if workers else nullcontext() as dask_cluster:
-        address = dask_cluster.address if dask_cluster else ""
-        while kills < KILLS:
-            runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
-            while kills < KILLS and runner.poll() is None:
-                begun = len(lines(mark))
-                until(lambda: len(lines(mark)) > begun or runner.poll() is not None)  # noqa: B023
-                time.sleep(chance.uniform(0.0, 0.6))
-                if runner.poll() is not None:
-                    break
-                kept = {path: path.read_bytes() for path in folder.path.glob("cache/**/*.json")}
-                kill_one(chance, dask_cluster, runner, lines(mark)[-1][1])
-                kills += 1
-                assert {path: path.read_bytes() for path in kept} == kept
-            runner.wait(120)
-            if files(folder.path) == expected:  # begin again: there are kills left
-                for path in folder.path.rglob("*.json"):
-                    path.unlink()
-        last = ClusterExecutor(folder, None, 1, address) if dask_cluster else LocalExecutor(folder, None, 2)
-        finish(folder.path, last)
-    assert files(folder.path) == expected
-    until(lambda: not any(alive(task) for _, task in lines(mark)), 15.0)
-
-
-def kill_one(
-    chance: random.Random, dask_cluster: Cluster | None, runner: subprocess.Popen, task: int
-) -> None:
-    if chance.random() < 0.5:
-        runner.kill()
-        runner.wait()
-    elif dask_cluster is None:
-        with suppress(ProcessLookupError):  # it has just ended with the chain
-            os.kill(task, signal.SIGKILL)
-    else:
-        victim = dask_cluster.workers.pop(chance.randrange(len(dask_cluster.workers)))
-        victim.kill()
-        victim.wait()
-        dask_cluster.add()

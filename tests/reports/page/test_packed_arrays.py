@@ -8,7 +8,7 @@ import pytest
 from benchmarks.metrics.surface import curvature
 from reports.page.packed_arrays import Pack
 from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
-from tests.reports.page.test_page import block, unpacked
+from tests.reports.page.page_by_hand import block, unpacked
 from tests.reports.report_folder import sheet
 
 
