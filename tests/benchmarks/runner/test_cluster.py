@@ -25,8 +25,17 @@ from benchmarks.runner.cluster_executor import ClusterExecutor
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.tasks.task import RunStopped
 from snug.networks.tensor_file import read_tensors
-from tests.benchmarks.runner.cluster_by_hand import cluster, finish, write
-from tests.benchmarks.runner.cluster_runs import alive, files, lines, start_runner, together, until
+from tests.benchmarks.runner.cluster_by_hand import (
+    alive,
+    cluster,
+    files,
+    finish,
+    lines,
+    start_runner,
+    together,
+    until,
+    write,
+)
 from tests.benchmarks.runner.tasks_by_hand import Bar
 
 

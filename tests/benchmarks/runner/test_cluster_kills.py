@@ -17,8 +17,18 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cluster_executor import ClusterExecutor
 from benchmarks.runner.local_executor import LocalExecutor
 from benchmarks.tasks.task import RunStopped
-from tests.benchmarks.runner.cluster_by_hand import Cluster, cluster, finish, write
-from tests.benchmarks.runner.cluster_runs import alive, files, lines, start_runner, together, until
+from tests.benchmarks.runner.cluster_by_hand import (
+    Cluster,
+    alive,
+    cluster,
+    files,
+    finish,
+    lines,
+    start_runner,
+    together,
+    until,
+    write,
+)
 
 KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
 
