@@ -50,6 +50,11 @@ def in_space(points: np.ndarray) -> np.ndarray:
     return np.concatenate([points, np.zeros((len(points), 1))], axis=1)
 
 
+def lying(points: np.ndarray) -> np.ndarray:
+    """Return points (V,2) as (V,3) in the plane y = 0, where faces that were counter-clockwise look down."""
+    return in_space(points)[:, [0, 2, 1]]
+
+
 def random_rotation(seed: int) -> np.ndarray:
     """Return a proper rotation (3,3)."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))

@@ -12,7 +12,7 @@ from typing import Any
 GRAVITY = 9.81  # [m/s^2], downwards along -y
 LARGEST_FILE = 1 << 20  # [bytes]
 SMALLEST, LARGEST = 1e-60, 1e60  # of moduli and masses per area: squares and ratios of them are still numbers
-_LAME = ("lame_lambda", "lame_mu", "thickness", "areal_density", "bending_stiffness")
+_LAME = ("lame_lambda_pa", "lame_mu_pa", "thickness", "areal_density", "bending_stiffness")
 
 
 class MaterialError(ValueError):
@@ -83,15 +83,16 @@ class Material:
         """
         path = Path(path)
         values = _table(path)
-        lame = "lame_lambda" in values or "lame_mu" in values
+        lame = "lame_lambda_pa" in values or "lame_mu_pa" in values
         known = _LAME if lame else tuple(field.name for field in fields(cls))
         for name, value in values.items():
             if name not in known:
-                raise MaterialError(f"{path}: unknown field {name!r}: use {', '.join(known)}")
+                use = ", ".join(known) + ("" if lame else f"; or all of {', '.join(_LAME)}")
+                raise MaterialError(f"{path}: unknown field {name!r}: use {use}")
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise MaterialError(f"{path}: {name} = {value!r} is no number: give it in SI units")
         if lame and (missing := [name for name in known if name not in values]):
-            raise MaterialError(f"{path}: lame_lambda and lame_mu also need {', '.join(missing)}")
+            raise MaterialError(f"{path}: lame_lambda_pa and lame_mu_pa also need {', '.join(missing)}")
         try:
             return cls.from_lame(**values) if lame else cls(**values)
         except (ValueError, OverflowError) as error:
@@ -101,19 +102,22 @@ class Material:
     def from_lame(
         cls,
         *,
-        lame_lambda: float,
-        lame_mu: float,
+        lame_lambda_pa: float,
+        lame_mu_pa: float,
         thickness: float,
         areal_density: float,
         bending_stiffness: float,
     ) -> Material:
         """Return the material from the numbers that SNUG's code and the methods after it give.
 
+        They are moduli in Pa; `lame_lambda` and `lame_mu` of a material are membrane constants in N/m, the
+        same times the thickness.
+
         nu = lambda / (lambda + 2 mu), E = 2 mu (1 + nu).
 
         Args:
-            lame_lambda: of plane stress, not yet times the thickness [Pa]: 44,400 there.
-            lame_mu: of plane stress, not yet times the thickness [Pa]: 23,600 there.
+            lame_lambda_pa: of plane stress, not yet times the thickness [Pa]: 44,400 there.
+            lame_mu_pa: of plane stress, not yet times the thickness [Pa]: 23,600 there.
             thickness: [m], 0.47e-3 there.
             areal_density: [kg/m^2], 0.20022 there.
             bending_stiffness: k of scaled hinges [J], 3.96e-5 there.
@@ -121,12 +125,12 @@ class Material:
         Raises:
             ValueError: a value is not finite or outside its physical range.
         """
-        for name, value in {"thickness": thickness, "lambda + 2 mu": lame_lambda + 2 * lame_mu}.items():
+        for name, value in {"thickness": thickness, "lambda + 2 mu": lame_lambda_pa + 2 * lame_mu_pa}.items():
             if not value > 0:
                 raise ValueError(f"{name} = {value}: must be above 0")
-        poisson_ratio = lame_lambda / (lame_lambda + 2 * lame_mu)
+        poisson_ratio = lame_lambda_pa / (lame_lambda_pa + 2 * lame_mu_pa)
         return cls(
-            young_modulus=2 * lame_mu * (1 + poisson_ratio),
+            young_modulus=2 * lame_mu_pa * (1 + poisson_ratio),
             poisson_ratio=poisson_ratio,
             thickness=thickness,
             density=areal_density / thickness,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from functools import cached_property, partial
+from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +13,9 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.inertia import Inertia
 from reference_sim.fingerprint import fingerprint
-from reference_sim.minimise.minimisers import Minimiser, Restartable, make_minimiser
-from reference_sim.minimise.result import Result, severity
+from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
+from reference_sim.step_minimiser import StepMinimiser
 from reference_sim.trajectory.resume import PartialRun
 from reference_sim.trajectory.trajectory import TrajectoryError
 
@@ -28,12 +27,6 @@ GUESSES = ("previous", "extrapolated", "body_transported")
 # First guess (V, 3) [m] of the end of a step, from its number, 1 for the first, and its start (V, 3) [m]. The
 # first step is asked for again where a start is checked, and the last one when a run is resumed.
 FirstGuess = Callable[[int, np.ndarray], np.ndarray]
-MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
-LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
-# Minimiser of a step whose terms join late, as L-BFGS ends by it too, and options that it shares.
-ENDING = {"method": "newton", "reuse": True, "start_projected": True}
-LIMITS = ("tolerance", "max_iterations", "timeout")
-APPROACH_SHARE = 0.8  # of the way to the next touch: closer, a barrier grows stiff
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,37 +98,12 @@ class TimeStepper:
         self.frame_dt, self.dt = dt, dt / substeps  # between frames, and of one step
         self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
         self.potential = Potential([*energies, Inertia(cloth, self.dt)])
-        # The preconditioner of L-BFGS knows nothing of pairs that come and go.
-        method = "newton" if any(energy.dynamic for energy in energies) else "lbfgs"
-        self.quasi_static, self.options = quasi_static, {"method": method} | options
-        self.late = [energy for energy in energies if energy.joins_late]
-        early = Potential([energy for energy in self.potential.energies if not energy.joins_late])
-        self.body_may_stop, self.obstacle_stopped = obstacle is not None and early.impassable, False
-        self.opening: Minimiser | None = None
-        self.ending = self.options
-        if self.late and not early.impassable:
-            if callable(self.options["method"]):
-                raise ValueError(
-                    f"simulate: Newton's method, not a function, ends steps that {self.late[0].name!r} joins:"
-                    " choose method 'lbfgs' or 'newton', or leave the term out"
-                )
-            self.opening_method: str = options.get("method", "lbfgs")
-            self.opening = make_minimiser(early, **options | {"method": self.opening_method})
-            self.ending = ENDING | {name: options[name] for name in LIMITS if name in options}
-        self.minimiser = make_minimiser(self.potential, **self.ending)
+        self.quasi_static = quasi_static
+        self.minimiser = StepMinimiser(self.potential, obstacle=obstacle is not None, **options)
 
     def start_again(self) -> None:
-        """Let the next run give the bits of a first one: minimisers forget what they have learned.
-
-        A minimiser without `start_again` is made anew.
-        """
-        self.__dict__.pop("rough_minimiser", None)
-        if isinstance(self.opening, Restartable):
-            self.opening.start_again()
-        if isinstance(self.minimiser, Restartable):
-            self.minimiser.start_again()
-        else:
-            self.minimiser = make_minimiser(self.potential, **self.ending)
+        """Let the next run give the bits of a first one: minimisers forget what they have learned."""
+        self.minimiser.start_again()
 
     def check_start(self, x: np.ndarray, v: np.ndarray) -> None:
         """Raise ValueError where x (V, 3) [m] at frame 0 is impossible for a term that nothing may pass."""
@@ -149,8 +117,8 @@ class TimeStepper:
         """Take the sub-steps to `frame`, with pins (P, 3) [m] at its end.
 
         Returns:
-            The state at the frame, None if a sub-step diverged, and the result of each minimisation, without
-            those that only bring a barrier nearer.
+            The state at the frame, None if a sub-step diverged, and the result of each sub-step, and of each
+            time that it was solved again.
 
         Raises:
             ValueError: pins of another shape, or not finite.
@@ -168,17 +136,13 @@ class TimeStepper:
                 handles = (1 - share) * handles + share * pins
             step = (frame - 1) * self.substeps + j
             guess = self.prepare(step, x, v, handles)
-            self.obstacle_stopped = False
-            if not np.isfinite(guess).all():
-                results.append(self.minimiser.minimise(guess))  # it reports the divergence
-            else:
-                results.append(self.open(x, guess) if self.opening else self.reach(x, guess))
+            results.append(self.minimiser.minimise(x, guess))
             for _ in range(self.refreeze):
                 # To freeze the step again would put an obstacle that stopped on its way at the end of it.
-                if self.obstacle_stopped or not np.isfinite(results[-1].positions).all():
+                if self.minimiser.obstacle_stopped or not np.isfinite(results[-1].positions).all():
                     break
                 self.freeze(step, x, v, results[-1].positions)
-                results.append(self.minimiser.minimise(results[-1].positions))
+                results.append(self.minimiser.minimise_from(results[-1].positions))
             y = results[-1].positions
             if results[-1].status == "diverged" or not np.isfinite(y).all():
                 return None, results
@@ -245,80 +209,12 @@ class TimeStepper:
         self.prepare(last * self.substeps, before[0], before[1], x[pins])
         return State(x, self.velocity(x, before[0]), before if self.substeps > 1 else None)
 
-    def open(self, x: np.ndarray, guess: np.ndarray) -> Result:
-        """Minimise without the terms that join late, and with them only where they have something to say.
-
-        The minimum without them is the answer if the way there is free and they are zero around it. If not,
-        the minimisation with them starts on the way there: from `guess` on if that can be reached, else from
-        x on. Cloth meets itself late on such a way, for a guess moves it with the body.
-        """
-        assert self.opening is not None
-        potential, opened = self.potential, self.opening.minimise(guess)
-        y = opened.positions if np.isfinite(opened.positions).all() else guess
-        free = potential.ccd_fraction(x, y, 0.0) == 1
-        terms = potential.terms(y)
-        if free and opened.status == "converged" and not any(terms[term.name] for term in self.late):
-            return replace(opened, terms=terms)
-        if not free and potential.ccd_fraction(x, guess, 0.0) == 1:
-            x = guess
-        return self.reach(x, y)
-
-    def reach(self, x: np.ndarray, guess: np.ndarray) -> Result:
-        """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
-
-        With such a term (a barrier) x, pins and obstacle move together from the start of the step to the
-        guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
-        minimisation gains distance, and all move on. So the last minimisation starts without an intersection,
-        pins and obstacle at the end of their way. Without such a term it starts at the guess.
-
-        The rough minimisations share one timeout, and the last one has its own.
-        """
-        potential, pins = self.potential, self.cloth.pins
-        motion, goal, progress = guess - x, guess, 0.0
-        reached, begun, late = [0.0], time.perf_counter(), False
-        while len(reached) <= MAX_APPROACHES and not late:
-            shares: list[float] = []
-            for free_too in (True, False):
-                if not free_too:
-                    goal = x.copy()
-                    goal[pins] = guess[pins]
-                share = potential.ccd_fraction(x, goal, progress)
-                if share == 1:
-                    potential.set_progress(1.0)
-                    return self.minimiser.minimise(goal)
-                if share >= max(shares, default=0.0):
-                    part = APPROACH_SHARE * share
-                    x, progress = x + part * (goal - x), progress + part * (1 - progress)
-                shares.append(share)
-            potential.set_progress(progress)
-            x = self.rough_minimiser.minimise(x).positions
-            goal = x + (1 - progress) * motion
-            goal[pins] = guess[pins]
-            reached.append(progress)
-            late = time.perf_counter() - begun > self.options.get("timeout", float("inf"))
-            if progress - reached[max(len(reached) - 4, 0)] < LEAST_APPROACH and len(reached) > 3:
-                break
-        self.obstacle_stopped = self.body_may_stop
-        result = self.minimiser.minimise(x)
-        if result.status == "diverged":
-            return result
-        status = max("stalled", "timeout" if late else result.status, key=severity)
-        problem = "no way without intersection" if status == "stalled" else "gave up after the timeout"
-        reason = f"{problem}: pins and obstacle came {progress:.1%} of theirs"
-        return replace(result, status=status, reason=reason)
-
-    @cached_property
-    def rough_minimiser(self) -> Minimiser:
-        """Minimiser of few iterations, which gains distance half-way."""
-        options: dict[str, Any] = self.ending | {"max_iterations": 8, "tolerance": 1e-2}
-        return make_minimiser(self.potential, **options)
-
     def provenance(self) -> dict[str, Any]:
         """Return JSON values of everything that decides the result: a resumed run must have the same."""
-        cloth, obstacle = self.cloth, self.obstacle
+        cloth, obstacle, minimiser = self.cloth, self.obstacle, self.minimiser
         # The options have "newton" by default as well as by request, but L-BFGS opens a step by default. Runs
         # without an opening have no such key: they can go on with the files of earlier versions.
-        opening = {"opening": self.opening_method} if self.opening else {}
+        opening = {"opening": minimiser.opening_method} if minimiser.opening_method else {}
         return {
             "method": "backward Euler",
             "dt_s": self.frame_dt,
@@ -326,7 +222,7 @@ class TimeStepper:
             "guess": _as_json(self.guess),
             "quasi_static": self.quasi_static,
             "refreeze": self.refreeze,
-            "options": {name: _as_json(value) for name, value in self.options.items()},
+            "options": {name: _as_json(value) for name, value in minimiser.options.items()},
             **opening,
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
             "material": asdict(cloth.material),

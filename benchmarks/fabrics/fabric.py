@@ -67,3 +67,8 @@ FABRICS = (
     ),
     isotropic("thick_stiff", 0.38, 32e-3),
 )
+
+
+def find_fabric(name: str) -> Fabric:
+    """Return one of FABRICS by its name."""
+    return next(fabric for fabric in FABRICS if fabric.name == name)

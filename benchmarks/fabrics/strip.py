@@ -18,7 +18,7 @@ import scipy.sparse.linalg as spla
 
 from benchmarks.fabrics.elastica import bending_length
 from benchmarks.fabrics.fabric import SNUG, Fabric
-from benchmarks.meshes import ROW, in_space, rectangle
+from benchmarks.meshes import ROW, lying, rectangle
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge.definition import BendHinge
 from reference_sim.material import GRAVITY, Material
@@ -108,7 +108,7 @@ def clamped_strip(
     width = ROWS * cell * (ROW if family == "equilateral" else 1.0)
     points, faces = rectangle(family, columns, ROWS, columns * cell, width)
     points[:, 0] -= cell / 2
-    x = in_space(points)[:, [0, 2, 1]]  # the strip lies in the plane y = 0
+    x = lying(points)
     cloth = Cloth(x, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.51 * cell))
     w = _small_deflection(BendHinge(cloth, scaling=scaling))
     ends = [w[np.abs(points[:, 0] - at) < 1e-6 * cell].mean() for at in (length, length - 2 * cell)]

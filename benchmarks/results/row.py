@@ -24,7 +24,6 @@ ROLES = (
 
 OF_TRAINING = ("cost/setup", "cost/train")  # [s] a network, on the machine that trained it
 BEFORE_FRAMES = ("cost/data", *OF_TRAINING)  # [s] all that it costs before its first frame
-REFERENCE_TOLERANCE = 1e-6  # of the reference's minimisations
 DECLARED = "declared by its author, not measured"  # reason of such a run time
 PRETRAINED = "pretrained network"  # how the remark begins that a row's network is of a file
 

@@ -178,7 +178,7 @@ def _faults_of_fields(table: Mapping[str, Any]) -> Iterator[str]:
         kind = {"milliseconds": float, "seeds": tuple, "scenes": tuple}.get(name, str)
         fits = {
             str: isinstance(value, str) and bool(value.strip()),
-            float: isinstance(value, int | float) and math.isfinite(value) and value > 0,
+            float: type(value) in (int, float) and math.isfinite(value) and value > 0,
             tuple: isinstance(value, list) and bool(value),
         }[kind]
         if not fits:
@@ -287,17 +287,22 @@ def faults_of_scores(entry: Entry) -> Iterator[str]:
     changed = list(entry.scores.changed(config))
     for name in changed:
         yield f"{entry.scores.path / name}: is not as it was written: score with --replace"
-    if not changed and entry.name not in {row.method for row in entry.scores.read_rows()}:
-        remedy = "give the folder its old name, or score with --replace"
-        yield f"{entry.scores.path}: no scores of '{entry.name}': {remedy}"
+    try:
+        scored = {row.method for row in entry.scores.read_rows()}
+    except ResultsError as error:
+        yield f"{error}: score with --replace"
+    else:
+        if not changed and entry.name not in scored:
+            remedy = "give the folder its old name, or score with --replace"
+            yield f"{entry.scores.path}: no scores of '{entry.name}': {remedy}"
     metadata, before = json.loads(json.dumps(asdict(entry.metadata))), config.get("metadata") or {}
     for name in metadata:
         if metadata[name] != before.get(name):
             yield f"{entry.path / METADATA}: {name} is not what was scored: score with --replace"
-    scored, now = config.get("entry") or {}, entry.digests()
-    for name in sorted(scored.keys() | now.keys()):
-        if scored.get(name) != now.get(name):
-            what = "is not the file that was scored" if name in scored else "was not there when it was scored"
+    then, now = config.get("entry") or {}, entry.digests()
+    for name in sorted(then.keys() | now.keys()):
+        if then.get(name) != now.get(name):
+            what = "is not the file that was scored" if name in then else "was not there when it was scored"
             if name not in now:
                 what = "was scored and is gone"
             yield f"{entry.path / name}: {what}: put it right, or score with --replace"

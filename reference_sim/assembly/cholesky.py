@@ -45,9 +45,9 @@ class CholmodSolver:
         self._A = spmatrix(matrix(np.ones(len(columns))), matrix(indices), matrix(columns), (size, size))
         self._symbolic = cholmod.symbolic(self._A, p=matrix(order.tolist()), uplo="L")
 
-    def factorise(self, data: np.ndarray) -> bool:
+    def factorise(self, values: np.ndarray) -> bool:
         """Factorise the matrix with these values (nnz,); False if not positive definite."""
-        self._A.V = self._matrix(data)
+        self._A.V = self._matrix(values)
         try:
             self._cholmod.numeric(self._A, self._symbolic)
         except ArithmeticError:
@@ -68,10 +68,12 @@ class SuperLUSolver:
         self._indptr, self._indices, self._order = indptr, indices, order
         self._lu: spla.SuperLU | None = None
 
-    def factorise(self, data: np.ndarray) -> bool:
+    def factorise(self, values: np.ndarray) -> bool:
         """Factorise the matrix with these values (nnz,); False if not positive definite."""
         size = len(self._order)
-        lower = sp.tril(sp.csc_matrix((data, self._indices, self._indptr), shape=(size, size)), format="csc")
+        lower = sp.tril(
+            sp.csc_matrix((values, self._indices, self._indptr), shape=(size, size)), format="csc"
+        )
         A = sp.csc_matrix(lower + sp.tril(lower, -1).T)[self._order][:, self._order]
         try:
             lu = spla.splu(

@@ -141,45 +141,45 @@ class HessianPattern:
             changing: Hessians of the dynamic terms at x, which this pattern must cover.
             convexity: see Energy.active_hessian_blocks.
         """
-        data = self._constant.copy()
+        values = self._constant.copy()
         for energy, slots in zip(self.energies, self._slots):
             if not (energy.dynamic or self.block in energy.constant):
-                self._add_term(energy, slots, x, convexity, data)
+                self._add_term(energy, slots, x, convexity, values)
         for matrix in changing:
-            self._add(matrix, data)
-        return data
+            self._add(matrix, values)
+        return values
 
     @cached_property
     def _constant(self) -> np.ndarray:
         """(nnz,) values of the terms that give the same everywhere."""
-        data, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
+        values, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
         for energy, slots in zip(self.energies, self._slots):
             if self.block in energy.constant:
-                self._add_term(energy, slots, anywhere, 0.0, data)
-        return data
+                self._add_term(energy, slots, anywhere, 0.0, values)
+        return values
 
     def _add_term(
-        self, energy: Energy, slots: np.ndarray, x: np.ndarray, convexity: float, data: np.ndarray
+        self, energy: Energy, slots: np.ndarray, x: np.ndarray, convexity: float, values: np.ndarray
     ) -> None:
         places = BlockPlaces(slots, self._base, self._stride, self.block)
         if self.block == 3:
-            energy.add_hessian(x, convexity, places, data)
+            energy.add_hessian(x, convexity, places, values)
         else:
-            places.add(*energy.scalar_stiffness(x), data)
+            places.add(*energy.scalar_stiffness(x), values)
 
-    def _add(self, hessian: sp.csc_matrix, data: np.ndarray) -> None:
-        key, values = self._keys_of(hessian)
+    def _add(self, hessian: sp.csc_matrix, values: np.ndarray) -> None:
+        key, blocks = self._keys_of(hessian)
         slot = np.searchsorted(self._key, key)
         i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
-        data[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += values
+        values[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += blocks
 
-    def lower(self, data: np.ndarray) -> sp.csc_matrix:
+    def lower(self, values: np.ndarray) -> sp.csc_matrix:
         """Return the values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
-        return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.size, self.size))
+        return sp.csc_matrix((values, self.indices, self.indptr), shape=(self.size, self.size))
 
-    def symmetric(self, data: np.ndarray) -> sp.csc_matrix:
+    def symmetric(self, values: np.ndarray) -> sp.csc_matrix:
         """Return the whole symmetric (3n, 3n) matrix."""
-        lower = sp.tril(self.lower(data), format="csc")
+        lower = sp.tril(self.lower(values), format="csc")
         return sp.csc_matrix(lower + sp.tril(lower, -1).T)
 
 

@@ -42,8 +42,7 @@ def simulate_files(options: Namespace) -> int:
     dt = options.dt or obstacle_dt or DEFAULT_DT
     if obstacle_dt and abs(dt - obstacle_dt) > 1e-6 * obstacle_dt:
         print_note(f"{options.obstacle} has {obstacle_dt:.4g} s between frames, and --dt is {dt:.4g}")
-    size = np.ptp(cloth.rest_positions, axis=0)
-    length = float(size[1] or size.max())
+    length = float(np.ptp(cloth.rest_positions, axis=0).max())
     stretch = cloth.material.self_weight_stretch(length)
     if stretch > LARGEST_STRETCH:
         print_note(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy, demand_not_negative
+from reference_sim.energies.energy import Energy, demand_not_negative, demand_positive
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -24,13 +24,14 @@ if TYPE_CHECKING:
 class AreaBarrier(Energy):
     """Barrier energy [J] of each face of `cloth`; stiffness kappa [J/m^2], threshold q0 [1].
 
-    Raises ValueError for one that is negative or not finite.
+    Raises ValueError for a stiffness that is negative, a threshold that is not above 0, or one not finite.
     """
 
     name = "area_barrier"
 
     def __init__(self, cloth: Cloth, *, stiffness: float = 100.0, threshold: float = 0.1) -> None:
-        demand_not_negative("AreaBarrier", stiffness=stiffness, threshold=threshold)
+        demand_not_negative("AreaBarrier", stiffness=stiffness)
+        demand_positive("AreaBarrier", threshold=threshold)
         self.cloth = cloth
         self.stencils = cloth.faces
         self.Dm_inverse = cloth.Dm_inverse

@@ -64,25 +64,25 @@ def read_arrays(
     members: set[str] = set()
     try:
         with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
-            for info in archive.infolist():
-                name = info.filename.removesuffix(".npy")
+            for member in archive.infolist():
+                name = member.filename.removesuffix(".npy")
                 if names is not None and name not in names:
                     continue
                 if name in members:
                     raise ValueError("is there twice")
                 members.add(name)
-                if name == info.filename:  # no array, though numpy calls it by the name of one
+                if name == member.filename:  # no array, though numpy calls it by the name of one
                     continue
-                if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                    raise ValueError(f"is packed by method {info.compress_type}, only 0 and 8 are read")
-                if info.file_size > limit:  # zipfile unpacks no more than that
-                    size, left = info.file_size / 1e6, limit / 1e6
+                if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                    raise ValueError(f"is packed by method {member.compress_type}, only 0 and 8 are read")
+                if member.file_size > limit:  # zipfile unpacks no more than that
+                    size, left = member.file_size / 1e6, limit / 1e6
                     raise ValueError(
                         f"has {size:.0f} MB unpacked, too large: {left:.0f} MB more are read at most"
                     )
-                limit -= info.file_size
-                with archive.open(info) as member:
-                    arrays[name] = _array(member)
+                limit -= member.file_size
+                with archive.open(member) as array:
+                    arrays[name] = _array(array)
         return arrays
     except Exception as error:
         raise _refusal(path, name, error) from None

@@ -15,7 +15,7 @@ LAST_SHIFT = 1e12  # in units of M/dt^2
 
 def convergence_check(
     run: FactorisedDescent,
-    data: np.ndarray,
+    values: np.ndarray,
     *,
     tolerance: float,
     step_tolerance: float,
@@ -28,7 +28,7 @@ def convergence_check(
 
     Args:
         run: the minimisation.
-        data: (nnz,) values of its true Hessian.
+        values: (nnz,) values of its true Hessian.
         tolerance: relative residual [1]; above it, round-off excuses the residual.
         step_tolerance: largest Newton step [m] that counts as none.
         round_off: of the residual [1]; where it is above the tolerance, the reason says so.
@@ -40,27 +40,27 @@ def convergence_check(
         why = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
     elif relaxed:
         why = f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"
-    if run.factorise(data, run.hessian.tiny_shift(data)):
+    if run.factorise(values, run.hessian.tiny_shift(values)):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
         small = step <= step_tolerance or residual == 0.0
-        if not small and run.factorise(data, 0.0):
+        if not small and run.factorise(values, 0.0):
             return None
         # Without curvature no step can be told from another.
         evidence = f"Newton step {step:.1e} m" if small else "a direction without curvature"
         return Stop("converged", f"{why}, {evidence}", relaxed)
-    if escape_saddle(run, data, FIRST_ESCAPE * step_tolerance):
+    if escape_saddle(run, values, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1
         run.show()
         return None
     return Stop("stalled", "a saddle: negative curvature, and no step along it lowers the energy")
 
 
-def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bool:
+def escape_saddle(run: FactorisedDescent, values: np.ndarray, length: float) -> bool:
     """Step along the direction of most negative curvature.
 
     length: of the first step tried [m]. Returns whether the energy fell.
     """
-    v = most_negative(run, data)
+    v = most_negative(run, values)
     if v is None:
         return False
     v *= -1.0 if dot(v, run.g) > 0 else 1.0
@@ -76,13 +76,13 @@ def escape_saddle(run: FactorisedDescent, data: np.ndarray, length: float) -> bo
     return False
 
 
-def most_negative(run: FactorisedDescent, data: np.ndarray) -> np.ndarray | None:
+def most_negative(run: FactorisedDescent, values: np.ndarray) -> np.ndarray | None:
     """Return the direction (3n,) of most negative curvature by inverse iteration.
 
     None if no shift outdoes it.
     """
     shift = 1.0
-    while not run.factorise(data, shift):
+    while not run.factorise(values, shift):
         shift *= 4
         if shift > LAST_SHIFT:
             return None

@@ -53,24 +53,28 @@ class FactorisedHessian:
             self._analyse()
         return pattern.assemble(x, changing, convexity=convexity)
 
-    def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
+    def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
         """Factorise the values plus shift M/dt^2; False if that is not positive definite."""
-        if np.any(shift):
-            data = data.copy()
-            data[self._pattern.diagonal] += shift * self.metric
-        return self._solver.factorise(data)
+        return self._solver.factorise(self._shifted(values, shift))
+
+    def _shifted(self, values: np.ndarray, shift: float | np.ndarray) -> np.ndarray:
+        if not np.any(shift):
+            return values
+        values = values.copy()
+        values[self._pattern.diagonal] += shift * self.metric
+        return values
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation: b (3n,)."""
         return self._solver.solve(b)
 
-    def stiffest(self, data: np.ndarray) -> float:
+    def stiffest(self, values: np.ndarray) -> float:
         """Return the largest entry of the diagonal [N/m]."""
-        return float(np.abs(data[self._pattern.diagonal]).max(initial=0.0))
+        return float(np.abs(values[self._pattern.diagonal]).max(initial=0.0))
 
-    def tiny_shift(self, data: np.ndarray) -> np.ndarray:
+    def tiny_shift(self, values: np.ndarray) -> np.ndarray:
         """Return the shift (3n,) in units of M/dt^2 below which curvature counts as none."""
-        return max(self.flat, 1e-13 * self.stiffest(data)) / self.metric
+        return max(self.flat, 1e-13 * self.stiffest(values)) / self.metric
 
 
 class FactorisedDescent(Descent):
@@ -94,9 +98,9 @@ class FactorisedDescent(Descent):
         with np.errstate(all="ignore"):
             return self.timed("assemble", self.hessian.assemble, self.x, convexity)
 
-    def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
+    def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
         """Factorise, as the Hessian does; False if not positive definite."""
-        self.factorised = self.timed("factorise", self.hessian.factorise, data, shift)
+        self.factorised = self.timed("factorise", self.hessian.factorise, values, shift)
         self.factorisations += 1
         return self.factorised
 

@@ -24,7 +24,7 @@ from reference_sim.minimise.descent import Descent, Observer
 from reference_sim.minimise.lbfgs_history import LBFGSHistory
 from reference_sim.minimise.loop import NOT_FINITE, iterate
 from reference_sim.minimise.newton import Newton
-from reference_sim.minimise.result import Result, Stop, check_tolerance
+from reference_sim.minimise.result import TOLERANCE, Result, Stop, check_tolerance
 from reference_sim.minimise.scalar_preconditioner import ScalarPreconditioner
 from reference_sim.potential import Potential
 
@@ -60,7 +60,7 @@ class LBFGS:
         self,
         potential: Potential,
         *,
-        tolerance: float = 1e-6,
+        tolerance: float = TOLERANCE,
         max_iterations: int = 500,
         memory: int = 10,
         finish: bool = True,
@@ -174,9 +174,9 @@ class LBFGSRun(Descent):
 
     def factorise(self) -> bool:
         """Factorise the preconditioner here; return whether it is positive definite."""
-        data = self.timed("assemble", self.preconditioner.assemble, self.x)
+        values = self.timed("assemble", self.preconditioner.assemble, self.x)
         self.factorisations += 1
-        return self.timed("factorise", self.preconditioner.factorise, data)
+        return self.timed("factorise", self.preconditioner.factorise, values)
 
     def solve(self, q: np.ndarray) -> np.ndarray:
         """Return the inverse of the preconditioner times q (3n,)."""

@@ -29,7 +29,7 @@ from reference_sim.minimise.descent import Descent, Observer, approximate_wolfe,
 from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian
 from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
 from reference_sim.minimise.loop import NOT_FINITE, iterate
-from reference_sim.minimise.result import Result, Stop, check_tolerance
+from reference_sim.minimise.result import TOLERANCE, Result, Stop, check_tolerance
 from reference_sim.potential import Potential
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
@@ -68,7 +68,7 @@ class Newton:
         self,
         potential: Potential,
         *,
-        tolerance: float = 1e-6,
+        tolerance: float = TOLERANCE,
         max_iterations: int = 300,
         timeout: float = float("inf"),
         reuse: bool = False,
@@ -116,25 +116,25 @@ class Newton:
         if small:
             self.potential.forget()
         projection = run.first_projection()
-        run.data = run.assemble(CONVEXITY[0 if small else projection])
-        if not np.isfinite(run.data).all():
+        run.values = run.assemble(CONVEXITY[0 if small else projection])
+        if not np.isfinite(run.values).all():
             return Stop("diverged", "the Hessian is not finite")
         round_off = self.round_off(run)
         run.target = max(self.tolerance, min(round_off, RESIDUAL_ROUND_OFF))
         if run.gradient_norm() > run.target:
             return None
         self.potential.forget()
-        data = run.data if small else run.assemble(0.0)
+        values = run.values if small else run.assemble(0.0)
         stop = convergence_check(
-            run, data, tolerance=self.tolerance, step_tolerance=self.step_tolerance, round_off=round_off
+            run, values, tolerance=self.tolerance, step_tolerance=self.step_tolerance, round_off=round_off
         )
         if stop is None:
-            run.predicting, run.data = False, run.assemble(CONVEXITY[projection])
+            run.predicting, run.values = False, run.assemble(CONVEXITY[projection])
         return stop
 
     def round_off(self, run: NewtonRun) -> float:
         """Return what round-off of the positions may do to the relative residual [1]."""
-        stiffest = self.hessian.stiffest(run.data)
+        stiffest = self.hessian.stiffest(run.values)
         return 8 * np.finfo(float).eps * stiffest * float(np.abs(run.x).max(initial=0.0)) / run.weight
 
     def step(self, run: NewtonRun) -> Stop | None:
@@ -148,7 +148,7 @@ class Newton:
             if stop := self.terminate(run):  # with a Hessian of this point
                 return stop
         x, g, predicted, projection = run.x, run.g, run.predicting, run.first_projection()
-        if not (run.full_steps(run.data, projection) or run.line_search_step(projection, predicted)):
+        if not (run.full_steps(run.values, projection) or run.line_search_step(projection, predicted)):
             return Stop("stalled", "no convexified Newton direction lowers the energy")
         if self.reuse and run.factorised and not run.predicting:
             run.history.clear()
@@ -161,7 +161,7 @@ class NewtonRun(FactorisedDescent):
     """State of one minimisation by Newton's method.
 
     Attributes:
-        data: (nnz,) values of the Hessian for the next step.
+        values: (nnz,) values of the Hessian for the next step.
         target: relative residual that counts as converged at the last Hessian.
         projection_level: index into CONVEXITY at the last step.
         raised: whether that step needed a higher one than it began with.
@@ -173,7 +173,7 @@ class NewtonRun(FactorisedDescent):
     def __init__(self, newton: Newton, x: np.ndarray, after: Descent | None) -> None:
         super().__init__(newton.potential, x, newton.hessian, after=after, observe=newton.observe)
         self.max_iterations, self.timeout = newton.max_iterations, newton.timeout
-        self.data, self.target = np.empty(0), newton.tolerance
+        self.values, self.target = np.empty(0), newton.tolerance
         self.quasi_newton_steps = self.iterations
         self.history = LBFGSHistory(REUSE_MEMORY)
         self.residuals: list[float] = []
@@ -191,14 +191,14 @@ class NewtonRun(FactorisedDescent):
             return False
         return len(norms) <= REUSE_WINDOW or norms[-1] <= REUSE_RATE * min(norms[:-REUSE_WINDOW])
 
-    def full_steps(self, data: np.ndarray, projection: int) -> bool:
+    def full_steps(self, values: np.ndarray, projection: int) -> bool:
         """Take full steps until one ends below the start; if none does, go back and take a part of the first.
 
         Returns whether there was a step.
         """
         start, value, g = self.x, self.value, self.g
         first, predicted, first_allowed = projection, self.predicting, 1.0
-        p, projection = first_p, first_projection = self.direction(data, projection)
+        p, projection = first_p, first_projection = self.direction(values, projection)
         slope = dot(g, p)
         # Every direction is an iteration, also one that is taken back: the loop counts the first.
         watchdog = self.iterations - self.quasi_newton_steps >= WATCHDOG_AFTER
@@ -235,19 +235,19 @@ class NewtonRun(FactorisedDescent):
         self.projection_level, self.raised = first_projection, first_projection > first
         return not predicted and slope < 0 and self.line_search(first_p, slope, first_allowed) > 0
 
-    def direction(self, data: np.ndarray, projection: int) -> tuple[np.ndarray, int]:
+    def direction(self, values: np.ndarray, projection: int) -> tuple[np.ndarray, int]:
         """Return -H^-1 g (3n,) with the first projection, then shift, that makes H positive definite.
 
-        data: (nnz,) the Hessian at level `projection`. The level that was taken comes second.
+        values: (nnz,) the Hessian at level `projection`. The level that was taken comes second.
         """
         shift = 0.0
         # A singular Hessian, as of cloth that may move rigidly, needs no projection. Inertia excludes it.
         while not self.factorise(
-            data, shift or (self.hessian.tiny_shift(data) if self.hessian.static else 0.0)
+            values, shift or (self.hessian.tiny_shift(values) if self.hessian.static else 0.0)
         ):
             if projection + 1 < len(CONVEXITY):
                 projection += 1
-                data = self.assemble(CONVEXITY[projection])
+                values = self.assemble(CONVEXITY[projection])
             elif shift > MAX_SHIFT:
                 return np.full_like(self.g, np.nan), projection
             else:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 STATUSES = ("converged", "stalled", "max_iterations", "diverged", "timeout")
+TOLERANCE = 1e-6  # of the relative residual, by default
 _SEVERITY = {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}
 
 

@@ -26,13 +26,13 @@ class ScalarPreconditioner:
 
     def assemble(self, x: np.ndarray) -> np.ndarray:
         """Return values (nnz,) [N/m] at x (V, 3) [m]."""
-        data = self._pattern.assemble(x)
-        data[self._pattern.diagonal] += self._floor
-        return data
+        values = self._pattern.assemble(x)
+        values[self._pattern.diagonal] += self._floor
+        return values
 
-    def factorise(self, data: np.ndarray) -> bool:
+    def factorise(self, values: np.ndarray) -> bool:
         """Factorise the matrix with these values (nnz,); False if it is not positive definite."""
-        return self._solver.factorise(data)
+        return self._solver.factorise(values)
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation: b (3n,)."""

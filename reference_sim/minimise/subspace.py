@@ -74,12 +74,10 @@ class SubspaceHessian(FactorisedHessian):
 
     basis: np.ndarray
 
-    def factorise(self, data: np.ndarray, shift: float | np.ndarray) -> bool:
+    def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
         """Factorise B^T (H + shift M/dt^2) B; False if that is not positive definite."""
-        if np.any(shift):
-            data = data.copy()
-            data[self._pattern.diagonal] += shift * self.metric
-        reduced = self.basis.T @ (self._pattern.symmetric(data) @ self.basis)
+        hessian = self._pattern.symmetric(self._shifted(values, shift))
+        reduced = self.basis.T @ (hessian @ self.basis)
         try:
             self._factors = cho_factor(reduced, lower=True, overwrite_a=True, check_finite=False)
         except LinAlgError:

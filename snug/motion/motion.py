@@ -138,7 +138,8 @@ def resample(motion: Motion, fps: float = 30.0) -> Motion:
     """Return the motion at another frame rate: rotations along the shortest arc, translations linearly.
 
     First and last pose stay. Where the rates do not divide, the clip is stretched by at most half a new frame
-    in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed).
+    in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed). A clip of
+    less than one new frame is stretched to one.
 
     Raises:
         MotionError: a rate that is not positive.

@@ -49,11 +49,11 @@ def remove_recording_errors(raw: RawMotion, *, repair: bool) -> RawMotion:
         _bridge(track, missing, turns)
         jumps = _jumps(track, turns, raw.fps)
         wrong |= missing
-        wrong[jumps] = True
         for first, last in _spans_around(jumps, raw.fps, len(track)):
             errors.setdefault(f"{name} jumps", []).append(f"{first}-{last}")
             around = np.zeros(len(track), dtype=bool)
             around[first : last + 1] = True
+            wrong |= around
             if not around.all():
                 _bridge(track, around, turns)
         for frame in _jumps(track, turns, raw.fps)[:1]:
@@ -71,8 +71,8 @@ def remove_recording_errors(raw: RawMotion, *, repair: bool) -> RawMotion:
     return replace(raw, poses=poses, translations=path, source=f"{raw.source}; repaired: {named}")
 
 
-def _short(items: list[str]) -> str:
-    return ", ".join(items[:MAX_NAMED]) + f" and {len(items) - MAX_NAMED} more" * (len(items) > MAX_NAMED)
+def _short(names: list[str]) -> str:
+    return ", ".join(names[:MAX_NAMED]) + f" and {len(names) - MAX_NAMED} more" * (len(names) > MAX_NAMED)
 
 
 def _check_units(file: Path, poses: np.ndarray, path: np.ndarray) -> None:

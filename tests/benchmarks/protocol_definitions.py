@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results import protocol as recorded
 from benchmarks.results.ensemble import LEAST_MEMBERS, MEMBERS
-from benchmarks.results.row import REFERENCE_TOLERANCE
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes
+from reference_sim.minimise.newton import Newton
 
 if TYPE_CHECKING:
     from snug.garments.templates import GarmentTemplate
@@ -152,7 +152,7 @@ def _reference() -> dict[str, Any]:
     from snug.recipes.recipe import DEFAULT
 
     return {
-        "ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": REFERENCE_TOLERANCE,
+        "ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": Newton.__init__.__kwdefaults__["tolerance"],
         "quasi-static": (ground_truth.SLOW, ground_truth.TOLERANCE), "skinning": DEFAULT.smoothing,
     }  # fmt: skip
 

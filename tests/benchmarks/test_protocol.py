@@ -56,7 +56,12 @@ def _metrics():
         ("materials", "reference_sim.material", "Material", lambda: Material(bending_stiffness=4e-5)),
         ("materials", "reference_sim.material", "GRAVITY", 9.8),
         ("metrics", "benchmarks.metrics", "declared", _metrics),
-        ("reference", "tests.benchmarks.protocol_definitions", "REFERENCE_TOLERANCE", 1e-5),
+        (
+            "reference",
+            "tests.benchmarks.protocol_definitions.Newton.__init__",
+            "__kwdefaults__",
+            {"tolerance": 1e-5},
+        ),
         ("sampling", "benchmarks.metrics.surface.surface_distance", "SAMPLED_FRAMES", 24),
         ("statistics", "benchmarks.results.protocol", "TIE", 0.1),
     ],

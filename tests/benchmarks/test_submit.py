@@ -177,6 +177,14 @@ def test_scores_edited_by_hand_are_refused(copy, capsys):
     assert "results.csv: is not as it was written" in capsys.readouterr().out
 
 
+def test_scores_that_are_gone_are_named_beside_the_other_faults(copy, capsys):
+    (copy / "scores" / "results.csv").unlink()
+    write_roll_out(copy / f"{SCENE}.npz", lifted=1e-6)
+    assert main(["check", str(copy)]) == 1
+    output = capsys.readouterr().out
+    assert "results.csv: no such file" in output and f"{SCENE}.npz: is not the file that was scored" in output
+
+
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
@@ -184,6 +192,7 @@ def test_scores_edited_by_hand_are_refused(copy, capsys):
         ('title = "Waving"\n', "", "field 'title' is absent"),
         ('title = "Waving"', "title = 3", "title = 3: give a text"),
         ("milliseconds = 2.5", "milliseconds = -1", "milliseconds = -1: give a number above 0"),
+        ("milliseconds = 2.5", "milliseconds = true", "milliseconds = True: give a number above 0"),
         ("milliseconds = 2.5", "milliseconds = nan", "milliseconds = nan: give a number above 0"),
         ("seeds = [0]", "seeds = [0, 1]", "roll-outs of one seed"),
         ("seeds = [0]", 'seeds = ["a"]', "give whole numbers"),

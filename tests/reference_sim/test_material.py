@@ -11,7 +11,7 @@ from reference_sim.material import MaterialError
 
 
 def test_the_numbers_of_later_methods_are_the_default_cotton():
-    given = {"lame_lambda": 44_400.0, "lame_mu": 23_600.0, "areal_density": 0.20022}
+    given = {"lame_lambda_pa": 44_400.0, "lame_mu_pa": 23_600.0, "areal_density": 0.20022}
     field = Material.from_lame(**given, thickness=0.47e-3, bending_stiffness=3.96e-5)
     cotton = Material()
     # Given with three digits; the density with all.
@@ -79,11 +79,16 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
     json.write_text('{"young_modulus": 5e4, "density": 300}')
     for path in (toml, json):
         assert Material.from_file(path) == Material(young_modulus=5e4, density=300)
-    lame = {"lame_lambda": 44_400.0, "lame_mu": 23_600.0, "thickness": 0.47e-3, "areal_density": 0.20022,
-            "bending_stiffness": 3.96e-5}  # fmt: skip
+    lame = {
+        "lame_lambda_pa": 44_400.0,
+        "lame_mu_pa": 23_600.0,
+        "thickness": 0.47e-3,
+        "areal_density": 0.20022,
+        "bending_stiffness": 3.96e-5,
+    }
     toml.write_text("".join(f"{name} = {value!r}\n" for name, value in lame.items()))
     assert Material.from_file(toml) == Material.from_lame(**lame)
-    for wrong in ({"thickness": 0.0}, {"lame_lambda": -47_200.0}):
+    for wrong in ({"thickness": 0.0}, {"lame_lambda_pa": -47_200.0}):
         with pytest.raises(ValueError, match=r"= 0\.0: must be above 0"):
             Material.from_lame(**lame | wrong)
 
@@ -100,7 +105,8 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
         ("a.toml", "density = true", "density = True is no number"),
         ("a.json", '{"density": 1' + 400 * "0" + "}", "int too large"),
         ("a.toml", "density = -1.0", "Material.density = -1.0: must be"),
-        ("a.toml", "lame_mu = 23600.0", "also need lame_lambda, thickness"),
+        ("a.toml", "lame_mu_pa = 23600.0", "also need lame_lambda_pa, thickness"),
+        ("a.toml", "lame_mu = 11.1", "unknown field 'lame_mu': use .*; or all of lame_lambda_pa, lame_mu_pa"),
         ("a.toml", "#" * (2 << 20), "too large for a material"),
     ],
 )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.meshes import in_space, right_grid
+from benchmarks.meshes import lying, right_grid
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim.cloth import Cloth
 from reference_sim.energies.contact_penalty.definition import (
@@ -147,7 +147,7 @@ def strip_over_drum(columns: int, stiffness: float) -> tuple[Cloth, np.ndarray, 
     radius = DRUM + DEFAULT_MARGIN - np.sqrt(PULL / DRUM / (3 * stiffness))
     length = np.pi * radius + 2 * SLACK
     points, faces = right_grid(2, columns, 2 * length / columns, length)
-    rest = in_space(points)[:, [0, 2, 1]]
+    rest = lying(points)
     ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > length - 1e-9))
     s = (rest[:, 0] - length / 2) * (1 + PULL / material.membrane_modulus)
     angle = np.clip(s / radius, -np.pi / 2, np.pi / 2)

@@ -75,7 +75,9 @@ def converged_budget(engine: Engine) -> Answer:
     """Return the least multiple of the default budget that is within CONVERGED of the engine's limit."""
     runs, remark = ladder(engine.name)
     factor = _within(runs, CONVERGED)
-    return factor, remark if factor is not None else f"no budget is within {CONVERGED:g} %{remark}"
+    if factor is not None:
+        return factor, remark
+    return None, "; ".join(filter(None, (f"no budget is within {CONVERGED:g} %", remark)))
 
 
 @measured
@@ -95,10 +97,10 @@ def reference_milliseconds(engine: Engine) -> Answer:
     """
     iterates = engine.grows == ITERATIONS
     runs = reference_ladder(engine.substeps if iterates else None)
-    count = _within(runs, CONVERGED)
+    count, of_budget = _within(runs, CONVERGED), "iterations a step" if iterates else "steps a frame"
     if count is None:
-        return None, f"the reference is not within {CONVERGED:g} % at {sorted(runs)[-2]} steps a frame"
-    return runs[count].milliseconds, f"{count} {'iterations a step' if iterates else 'steps a frame'}"
+        return None, f"the reference is not within {CONVERGED:g} % at {sorted(runs)[-2]} {of_budget}"
+    return runs[count].milliseconds, f"{count} {of_budget}"
 
 
 @cache

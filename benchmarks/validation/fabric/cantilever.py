@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.fabrics.elastica import exact_elastica
-from benchmarks.fabrics.fabric import FABRICS
+from benchmarks.fabrics.fabric import find_fabric
 from benchmarks.fabrics.strip import BENDING_LENGTH, OVERHANG, cantilever
 from benchmarks.validation.convergence import demand_converged
 from reference_sim.energies.bend_hinge.definition import BendHinge
@@ -35,7 +35,7 @@ def simulated_bending_length(columns: int, rate: int) -> tuple[float, float]:
         columns: cells along the strip.
         rate: time steps a second.
     """
-    material = next(known for known in FABRICS if known.name == "snug")
+    material = find_fabric("snug")
     strip = cantilever(material, columns)
     cloth = strip.cloth
     energies = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))

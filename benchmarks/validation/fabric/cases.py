@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.fabrics.fabric import FABRICS, Fabric
+from benchmarks.fabrics.fabric import FABRICS, Fabric, find_fabric
 from benchmarks.validation.case import Case, known_answer
 
 GAMMAS = tuple(round(10 ** (power / 2), 2) for power in range(-2, 7))  # four decades
@@ -148,12 +148,11 @@ def percentiles(fabrics: Sequence[Fabric]) -> tuple[Case, ...]:
     [100.0, 100.0]
     """
     lengths = tuple(fabric.bending_length for fabric in fabrics)
-    snug = {fabric.name: fabric for fabric in FABRICS}
     return tuple(
         _case(f"percentile_{fabric.name}",
             f"share of {len(fabrics)} measured fabrics whose bending length is below "
             f"{1e3 * fabric.bending_length:.1f} mm, SNUG's {title}",
             "fabric.measured", "percentile", unit="%", smoke=True, reason=REPORTED,
             options={"length": fabric.bending_length, "lengths": lengths})
-        for fabric, title in ((snug["snug"], "as scaled"), (snug["snug_printed"], "as printed"))
+        for fabric, title in ((find_fabric("snug"), "as scaled"), (find_fabric("snug_printed"), "as printed"))
     )  # fmt: skip

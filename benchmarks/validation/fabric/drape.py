@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks.fabrics.disc import DRAPE, Disc, disc
-from benchmarks.fabrics.fabric import FABRICS, isotropic
+from benchmarks.fabrics.fabric import find_fabric, isotropic
 from benchmarks.validation.bending.gaussian_curvature import GaussianCurvature
 from benchmarks.validation.convergence import demand_converged
 from reference_sim.energies.bend_hinge.definition import BendHinge
@@ -37,10 +37,12 @@ def drape(
         membrane_factor: times SNUG's membrane.
         poisson_ratio: "hinges" for that of the hinges, -1/3, or "zero".
     """
-    material = next(known for known in FABRICS if known.name == fabric)
+    material = find_fabric(fabric)
     specimen = disc(material, rings, membrane_factor)
-    further = [GaussianCurvature.without_poisson_effect(specimen.cloth, material.rigidity)]
-    return at_rest(specimen, rate, further if poisson_ratio == "zero" else ())
+    if poisson_ratio == "zero":
+        further = [GaussianCurvature.without_poisson_effect(specimen.cloth, material.rigidity)]
+        return at_rest(specimen, rate, further)
+    return at_rest(specimen, rate)
 
 
 def at_rest(specimen: Disc, rate: int = RATE, further: Sequence[Energy] = ()) -> float:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.meshes import in_space, right_grid
+from benchmarks.meshes import lying, right_grid
 from benchmarks.validation.contact.plane import box
 from benchmarks.validation.convergence import demand_converged
 from reference_sim.cloth import Cloth
@@ -107,7 +107,7 @@ def _patch(
 ) -> np.ndarray:
     """Return the path (T, 3) [m] of the middle of a patch on a turned plane moved by motion (T, 1, 3)."""
     points, faces = right_grid(2, 2, 0.1, 0.1)
-    flat = in_space(points)[:, [0, 2, 1]]
+    flat = lying(points)
     cloth = Cloth(flat, faces[:, ::-1], Material())
     x = slid(
         cloth, flat, frames=frames, dt=DT, speed=SPEED, turn=turn, motion=motion, velocity=velocity,

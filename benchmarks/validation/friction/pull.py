@@ -24,7 +24,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from benchmarks.meshes import in_space, right_grid
+from benchmarks.meshes import lying, right_grid
 from benchmarks.validation.friction.plane import MU, slid
 from benchmarks.validation.membrane.hanging_strip import MATERIAL, WEIGHT, string_stretch
 from reference_sim.cloth import Cloth
@@ -103,7 +103,7 @@ def _pulled_strip() -> tuple[np.ndarray, np.ndarray]:
     """Return the place of the pulled end [m], and the pull over mu times the weight, step by step."""
     width = LENGTH / COLUMNS
     points, faces = right_grid(1, COLUMNS, width, LENGTH)
-    rest = in_space(points)[:, [0, 2, 1]]
+    rest = lying(points)
     cloth = Cloth(rest, faces[:, ::-1], MATERIAL, pins=np.flatnonzero(points[:, 0] > LENGTH - 1e-9))
     step = np.array([_end(1.0) / 20, 0.0, 0.0])
     dt = 100.0  # s: inertia is nothing

@@ -19,7 +19,7 @@ from reference_sim.kernels.kernel_argument import kernel_argument
 from reference_sim.minimise.compiled import iteration
 from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern
 from reference_sim.minimise.descent import mean_weight
-from reference_sim.minimise.result import Result
+from reference_sim.minimise.result import TOLERANCE, Result
 from reference_sim.potential import Potential
 
 MEMORY = 10
@@ -36,7 +36,7 @@ class CompiledLBFGS:
         ValueError: a term that it has no kernel for, or no inertia.
     """
 
-    def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = 1e-6) -> None:
+    def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = TOLERANCE) -> None:
         self.potential, self.max_iterations = potential, max_iterations
         self._terms = terms = step_terms(potential, "float32_lanes", "CompiledLBFGS")
         self._lanes: tuple[Float32Lanes, ...] = terms.kernels

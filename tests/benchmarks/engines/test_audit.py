@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.engines import laws
-from benchmarks.engines.engine import EngineCloth
+from benchmarks.engines.engine import ITERATIONS, SUBSTEPS, EngineCloth
 from benchmarks.engines.registry import ENGINES, REFERENCE, find_engine
 from benchmarks.engines.roll_outs import EngineDiverged, roll_out
 from benchmarks.engines.specimens import specimen
@@ -151,6 +151,24 @@ def test_the_least_budget_is_one_from_which_all_are_near():
     far = dataclasses.replace(run, positions=run.positions + 0.5 * (run.positions - run.positions[:1]))
     assert audit._within({1: far, 4: run, 16: run}, 1.0) == 4
     assert audit._within({1: run, 4: far, 16: run}, 1.0) is None
+
+
+def test_a_budget_that_is_not_near_says_how_far_the_last_two_are_apart_and_what_was_counted(monkeypatch):
+    run = roll_out(fake(), specimen("falling"))
+    far = dataclasses.replace(run, positions=run.positions + 0.5 * (run.positions - run.positions[:1]))
+    monkeypatch.setattr(audit, "ladder", lambda name: ({1: far, 4: run}, "its last two budgets differ"))
+    monkeypatch.setattr(audit, "reference_ladder", lambda substeps: {1: run, 4: far, 16: run})
+    engine = find_engine("mujoco.euler")
+    assert audit.converged_budget.__wrapped__(engine) == (
+        None,
+        "no budget is within 1 %; its last two budgets differ",
+    )
+    for grows, unit in ((ITERATIONS, "iterations a step"), (SUBSTEPS, "steps a frame")):
+        engine = dataclasses.replace(engine, grows=grows)
+        assert audit.reference_milliseconds.__wrapped__(engine) == (
+            None,
+            f"the reference is not within 1 % at 4 {unit}",
+        )
 
 
 def test_an_absent_engine_is_skipped_with_its_command(monkeypatch):

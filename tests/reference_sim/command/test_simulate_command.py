@@ -217,6 +217,11 @@ def test_suspicious_but_possible_input_is_noted(folder, capsys):
     out = capsys.readouterr().out
     assert "note: mm.obj measures 400 m: is --units m right?" in out
     assert "note: a strip of 400 m stretches by about" in out
+    bent = 1000 * SHEET
+    bent[0, 1] += 0.1
+    write("bent.obj", bent, FACES)
+    assert main(["bent.obj", "--frames", "1", "-o", "c.vtkhdf"]) == 0
+    assert "note: a strip of 400 m stretches by about" in capsys.readouterr().out
 
 
 BAD = {

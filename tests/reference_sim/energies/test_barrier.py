@@ -216,16 +216,21 @@ def test_a_step_that_is_prepared_again_begins_where_the_body_had_stopped():
 
 
 class Clocked:
-    """Newton's method that says "timeout"; `rough` counts its minimisations on the way of the obstacle."""
+    """Newton's method that says "timeout".
 
-    rough = 0
+    `rough` counts its minimisations on the way of the obstacle, `work` the iterations of all.
+    """
+
+    rough = work = 0
 
     def __init__(self, potential: Potential, **options) -> None:
         self.newton, self.options = Newton(potential, **options | {"timeout": np.inf}), options
 
     def minimise(self, x0: np.ndarray) -> Result:
         Clocked.rough += self.options.get("max_iterations") == 8
-        return dataclasses.replace(self.newton.minimise(x0), status="timeout", reason="gave up")
+        result = self.newton.minimise(x0)
+        Clocked.work += result.iterations
+        return dataclasses.replace(result, status="timeout", reason="gave up")
 
 
 @pytest.mark.parametrize("timeout", [np.inf, 1e-9])
@@ -234,10 +239,11 @@ def test_a_timeout_is_not_hidden_by_a_body_that_stopped_and_ends_its_approach(ti
     terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
     stepper = TimeStepper(cloth, terms, dt=1 / 30, obstacle=press, method=Clocked, timeout=timeout)
     state, _ = stepper.advance(1, State(cloth.rest_positions, 0 * cloth.rest_positions), None)
-    Clocked.rough = 0
+    Clocked.rough = Clocked.work = 0
     _, (result,) = stepper.advance(2, state, None)
     assert result.status == "timeout" and "pins and obstacle came" in result.reason
     assert Clocked.rough == 1 if timeout < 1 else Clocked.rough >= 3
+    assert result.iterations == Clocked.work
 
 
 def test_a_run_cut_off_where_a_body_had_stopped_is_not_gone_on_with(tmp_path):

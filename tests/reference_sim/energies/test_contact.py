@@ -90,6 +90,7 @@ def test_no_contact_beyond_the_margin():
         lambda cloth: ContactFriction(ContactPenalty(cloth), speed=0.0),
         lambda cloth: StretchSpring(cloth, stiffness=-15.0),
         lambda cloth: AreaBarrier(cloth, threshold=float("nan")),
+        lambda cloth: AreaBarrier(cloth, threshold=0.0),
     ],
 )
 def test_numbers_that_would_push_or_do_nothing_are_refused(make):

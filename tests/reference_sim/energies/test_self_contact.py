@@ -72,6 +72,23 @@ def test_frames_in_which_nothing_is_near_are_those_without_it():
     assert list(beside.frame_fields["energy/barrier"][1:]) == [0.0] * 4
 
 
+def test_a_step_counts_the_iterations_without_late_terms_too(monkeypatch):
+    """Where the sheet comes near the other, an opening without the barrier is followed by one with it."""
+    work = []
+    minimise = Newton.minimise
+
+    def counted(newton, *args, **options):
+        result = minimise(newton, *args, **options)
+        work.append(result.iterations)
+        return result
+
+    monkeypatch.setattr(Newton, "minimise", counted)
+    cloth, _ = two_sheets()
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth, acceleration=40.0), self_contact(cloth)]
+    fall = simulate(cloth, terms, frames=4, quasi_static=True, method="newton")
+    assert len(work) > 3 and fall.frame_fields["iterations"].sum() == sum(work)
+
+
 def test_a_file_tells_how_steps_were_opened(tmp_path):
     """L-BFGS begins the steps by default, Newton's method if it is asked for; it ends them either way."""
     cloth = sheet(4, 0.2, (0.0, 0.0, 0.0), pins=[0, 4])

@@ -247,6 +247,11 @@ class TestGlitches:
         noise = np.random.default_rng(0).normal(0.0, 1.5, KICK.poses.shape)
         path = write(tmp_path / "clip.npz", replace(KICK, poses=noise))
         assert refused(path, "of the frames .* check frame rate and units", repair=True)
+        poses = KICK.poses.copy()
+        for frame in range(5, 34, 7):  # so near to each other that nothing between two of them is trusted
+            poses[frame, JOINT["right_elbow"]] = self.spoiled(frame).poses[frame, JOINT["right_elbow"]]
+        path = write(tmp_path / "spikes.npz", replace(KICK, poses=poses))
+        assert refused(path, "in 82 % of the frames .* check frame rate and units", repair=True)
         assert refused(
             write(tmp_path / "nan.npz", KICK, trans=np.full((40, 3), np.nan)), "not finite in any frame"
         )
