@@ -9,6 +9,8 @@ from typing import Any
 from benchmarks.results.row import DECLARED, Row
 from benchmarks.runner.rows import MOST_NAMED, SPREAD, first_of
 
+ABLATIONS = "--methods 'simulation,skinning,snug,snug-no-*'"
+
 
 def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str = "") -> str:
     """Return the answer, the text of page one if there is one, and one line of counts and times."""
@@ -43,6 +45,9 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
         differences = {remark.partition("; ")[2] for remark in pretrained.values()}
         same = differences.pop() if len(differences) == 1 else "the reasons of their rows say what differs"
         lines.append(f"pretrained, not trained here: {', '.join(pretrained)}; {same}")
+    methods = {row.method for row in rows}
+    if {"snug", "untrained"} <= methods and not any(name.startswith("snug-no-") for name in methods):
+        lines.append(f"not run here, SNUG with one energy of its loss left out: {ABLATIONS}")
     return lines
 
 

@@ -4,7 +4,7 @@
     python docs/notebook/held_out.py --networks snug pbns --steps 5300 --every 530
 
 Without --first it prints, for each validation, the step, the mean loss of the last 50 steps on training
-windows and the loss of whole roll-outs of the recorded validation motions [J a frame]. T-shirt of 1002
+windows and the loss of whole roll-outs of the ten validation motions [J a frame]. T-shirt of 1002
 vertices, seed 0.
 """
 

@@ -17,7 +17,7 @@ from reports.statistics.relative_excess import (
     excess_of,
     with_relative_excess,
 )
-from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, standing
+from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, standing, untested
 from reports.tables.number_texts import listed, number
 
 BY_CODE = "embedded library"  # how the source of a motion of the package that code makes begins
@@ -94,7 +94,7 @@ def _against_reference(label: str, excess: Excess) -> str:
         TIED: f"{label} ties with the reference",
         MORE: f"the excess of {label} is larger than the uncertainty of the reference",
         LESS: f"{label} has less energy than the reference, which is no better: still cloth has less",
-    }.get(stands, f"whether {label} differs from the reference is inconclusive")
+    }.get(stands, f"whether {label} differs from the reference is inconclusive{untested(excess.effect)}")
 
 
 def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> list[str]:

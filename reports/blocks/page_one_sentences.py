@@ -138,10 +138,8 @@ def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
     lines = paper_claims.judged(run)
     counted = paper_claims.counts(lines)
     if counted:
-        total = counted.total()
-        claims = f"{total} primary claim{'' if total == 1 else 's'}"
         failing = _claims_that_fail(run, lines)
-        sentences.append(f"of {claims} of the paper {paper_claims.in_words(counted)}{failing}")
+        sentences.append(f"of {_tests(lines)} {paper_claims.in_words(counted)}{failing}")
     where = in_scenes(set(timed[timed["method"] == run.reference]["scene"]))
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest and (left_out := _left_out_by_the_step(run, timed, finest)):
@@ -182,6 +180,14 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     )
 
 
+def _tests(lines: Sequence[paper_claims.Judged]) -> str:
+    """Return how many tests there are of how many primary claims; table 1 alone has one for each energy."""
+    primary = [line.claim.says for line in lines if line.claim.primary]
+    tests, claims = len(primary), len(set(primary))
+    of_claims = f"{claims} primary claim{'' if claims == 1 else 's'} of the paper"
+    return f"{tests} test{'' if tests == 1 else 's'} of {of_claims}"
+
+
 def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> str:
     """Return a clause that names the primary claims that do not hold, empty where there are none."""
     failed = []
@@ -213,7 +219,8 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     sentences = []
     if solver is not None:
         sentences.append(
-            "the fastest solver stopped early that comes at least as near to the minimum of each time step "
+            "of the solvers stopped early that start from no network, the fastest that comes at least as "
+            "near to the minimum of each time step "
             f"({run.label(solver.method)}: {number(solver.error)} J{solver.fewer} above it; {snug}: "
             f"{number(network.error)} J{network.fewer}) takes {number(solver.time)} ms, "
             f"{number(solver.time / network.time, 2)} times as long as {snug}"

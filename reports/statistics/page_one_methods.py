@@ -44,10 +44,11 @@ def leads(
 def subjects(run: Run, have: Collection[str]) -> list[str]:
     """Return the methods, of those in `have`, that page one is about: SNUG, and roll-outs of the user.
 
-    Another network takes the place of SNUG where there is none.
+    Where there is none, SNUG by another recipe takes its place, or another network.
     """
     networks = _networks(run, have)
-    first = NETWORK if NETWORK in networks else next(iter(networks), "")
+    recipes = [name for name in networks if name.startswith(NETWORK)]
+    first = NETWORK if NETWORK in networks else next(iter(recipes or networks), "")
     external = [name for name in run.with_role(EXTERNAL) if name in have]
     return [name for name in (first, *external[:MOST_EXTERNAL]) if name]
 

@@ -95,7 +95,9 @@ UNSEEN_DISTANCE = f"{UNSEEN}; tested by distance from the simulation"
 UNSEEN_EQUAL = "Section 1, both networks with as many frames and steps: generalises better than supervision"
 STRICTER = "; tested more strictly: "  # before a condition that the paper's words do not ask for
 CLOSE = f"Figure 7: close to offline simulation on unseen motion{STRICTER}no more energy than simulated cloth"
-OTHERS = "Figure 7: at least on par with other data-driven methods"
+OTHERS = (
+    "Figure 7: at least on par with other data-driven methods; here with more steps, and on augmented motions"
+)
 SPRINGS = "Figure 3: springs deform less expressively than StVK; here, networks trained on either"
 SIMULATED_SPRINGS = "Figure 3: the same as the paper draws it, simulated with either"
 LONGER = "Section 3.5: longer windows in training also minimise the inertia"

@@ -107,7 +107,7 @@ def error_rivals(run: Run) -> list[Table]:
     )
     caption = (
         f"SNUG and its rivals in {', '.join(scenes)}: the best method not slower beyond repeats, "
-        "and the fastest solver stopped early that is as accurate. A dash: none."
+        "and the fastest solver stopped early, without a network, that is as accurate. A dash: none."
     )
     return table("error_rivals", columns, lines, caption)
 

@@ -56,16 +56,16 @@ def claim_rows(claims: JudgedClaims, *, primary: bool) -> list[list[str]]:
 
 
 def claim_counts(claims: JudgedClaims) -> str:
-    """Return how many claims came out how, the primary ones first."""
+    """Return how many tests of claims came out how, those of the primary ones first."""
     lines = []
-    for name, family in (("Primary", PRIMARY), ("Exploratory", EXPLORATORY)):
+    for name, family in (("primary", PRIMARY), ("exploratory", EXPLORATORY)):
         counts = Counter(claims.verdicts[claim][1].verdict for claim in family if claim in claims.verdicts)
         absent = len(family) - counts.total()
         texts = [
             in_words(counts),
             f"{absent} {'is' if absent == 1 else 'are'} {NOT_MEASURED}" if absent else "",
         ]
-        lines.append(f"{name} claims: {', '.join(filter(None, texts))}.")
+        lines.append(f"Tests of {name} claims: {', '.join(filter(None, texts))}.")
     return "\n".join(lines)
 
 

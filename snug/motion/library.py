@@ -26,8 +26,8 @@ VALIDATION: tuple[str, ...] = (
     "sudden_stop", "05_02_a", "06_02_a", "kick", "07_08", "spin_jump", "punch", "05_02_b",
     "05_02_c", "06_02_b",
 )  # fmt: skip
-# Nobody chooses by them. Preset quick measures the first eight. Sword play, shots at a basket and the motions
-# made by code are kinds of which TRAIN and VALIDATION have none.
+# Nobody chooses by them. Preset quick measures the first eight. Sword play and shots at a basket are kinds of
+# which TRAIN and VALIDATION have none, motions made by code are a kind of which TRAIN has none.
 TEST: tuple[str, ...] = (
     "01_01_a", "push_recovery", "02_07_a", "dance_turn", "06_15", "05_03", "cartwheel_lean", "07_02",
     "climbing_steps", "sit_and_stand", "06_14",

@@ -156,6 +156,14 @@ def test_the_remarks_name_repeats_that_lie_apart_and_what_is_out_of_date():
     assert remarks([base], 0, {}) == []
 
 
+def test_a_default_run_says_how_to_leave_out_the_energies_of_the_loss():
+    rows = [Row("garments", "s", name, 0, "energy/total", "J", 1.0) for name in ("snug", "untrained")]
+    without = dataclasses.replace(rows[0], method="snug-no-strain")
+    (line,) = remarks(rows, 0, {})
+    assert line.endswith("--methods 'simulation,skinning,snug,snug-no-*'")
+    assert remarks(rows[:1], 0, {}) == remarks([*rows, without], 0, {}) == []
+
+
 def test_remarks_name_few_and_count_the_others():
     cells = [Row("speed", f"s{k}", "snug", 0, "cost/spread", "%", 30.0 + k) for k in range(5)]
     (line,) = remarks(cells, 0, {})

@@ -13,7 +13,7 @@ from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
 def test_run_times_on_page_one_are_of_the_garment_compared():
     rows = all_rows() + [row("skirt/stop", m, "cost/frame", 500.0, "ms") for m in ("snug", "simulation")]
     assert cost_sentence(run_of(rows)).startswith(
-        "On one core SNUG takes 0.250 ms a frame, the simulation 400 times as long, in 2 scenes. The fast"
+        "On one core SNUG takes 0.250 ms a frame, the simulation 400 times as long, in 2 scenes. Of the"
     )
 
 

@@ -49,7 +49,8 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     )
     assert (
         "where the reference has 0 % and skinning alone 100 %. These percentages are geometric means over "
-        "motions. Arithmetic means: SNUG 12 %; worst motions: SNUG 20 %. Whether SNUG differs" in sentences
+        "motions. Arithmetic means: SNUG 12 %; worst motions: SNUG 20 %. Whether SNUG differs "
+        "from the reference is inconclusive: one seed." in sentences
     )
     rows.append(row(SCENES[0], "pbns", "energy/total", 2.0))
     assert " and PBNS of 15 % (1 of 2 roll-outs), where the reference" in near(rows)
@@ -145,7 +146,7 @@ def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
     monkeypatch.setattr(paper_claims, "verdict", lambda claim, far, p: paper_claims.FAILS)
     certainty = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
     assert (
-        "Of 1 primary claim of the paper 1 does not hold; what does not hold is “Figure 7: close to"
+        "Of 1 test of 1 primary claim of the paper 1 does not hold; what does not hold is “Figure 7: close to"
         in certainty
     )
     tested = "unseen motion”, in a test stricter than these words: no more energy than simulated cloth."
@@ -304,6 +305,14 @@ def test_changed_networks_are_networks_where_a_run_has_no_others():
     assert "SNUG, springs has" in near(changed + on_two_scenes("skinning", 10.5, 17.0))
     both = run_of(changed + on_two_scenes("snug", 1.0, 9.0))
     assert leads(both, both.garment_rows) == ["simulation", "snug"]
+
+
+def test_snug_by_another_recipe_takes_the_place_of_snug_before_other_networks():
+    rows = [
+        line for name in ("pbns-paper", "snug-paper", "simulation") for line in on_two_scenes(name, 1.0, 9.0)
+    ]
+    run = run_of(rows)
+    assert leads(run, run.garment_rows) == ["simulation", "snug-paper", "pbns-paper"]
 
 
 def test_the_table_of_page_one_stays_short():

@@ -55,7 +55,8 @@ def test_garments_have_crossings_by_themselves():
 def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():
     run = run_of(all_rows())
     assert cost_sentence(run).endswith(
-        " The fastest solver stopped early that comes at least as near to the minimum of each time step "
+        " Of the solvers stopped early that start from no network, the fastest that comes at least as "
+        "near to the minimum of each time step "
         "(L-BFGS, 20 iterations: 0.0500 J above it; SNUG: 0.100 J) takes 16.0 ms, 64 times as long as SNUG. "
         "No method timed here is as fast with a smaller energy gap."
     )

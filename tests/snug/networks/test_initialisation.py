@@ -81,10 +81,13 @@ def test_a_last_layer_of_zero_starts_at_the_template(kind, narrow):
 
 
 def test_initial_strain_at_the_papers_size_is_of_the_authors_order(body):
-    """Hundreds of joules, as the authors report of their own training (391); by torch's rules 70,000."""
+    """Some 200 J, where the authors report 391 J of their own training; by torch's rules 70,000 J.
+
+    Seeds 0 and 1 of a whole batch have 218 and 193 J.
+    """
     shirt, strains = DressedBody(body, find_template("tshirt").tailor(body, vertices=4400)), {}
     for rules in ("keras", "torch"):
         recipe = replace(PAPER, initialisation=rules, terms=("strain",))
         trainer = Trainer("snug", shirt, [swaying(60)], steps=1, seed=0, recipe=recipe)
         strains[rules] = trainer.step(0)["strain"]
-    assert 100 < strains["keras"] < 400 and strains["torch"] > 30_000
+    assert 150 < strains["keras"] < 400 and strains["torch"] > 30_000
