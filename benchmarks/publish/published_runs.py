@@ -111,11 +111,8 @@ RUNS = {
         },
     ),
     "shapes": PublishedRun(
-        "the networks of the package on bodies of other shapes; one seed",
-        {
-            "": f"--suite shapes --trained --methods {REFERENCES},snug,pbns,fast-lbfgs-10,"
-            "snug+fast-lbfgs-1"
-        },
+        "SNUG and PBNS trained on the mean body, and SNUG trained on bodies of many shapes, on 12 others",
+        {"": f"--suite shapes {THREE} --methods {REFERENCES},snug,snug-shapes,pbns,fast-lbfgs-10"},
     ),
     "garments": PublishedRun(
         "SNUG and PBNS in three other garments, on eight validation motions; one seed",

@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 import pandas as pd
 
 from reports.run.finished_run import Run
+from reports.statistics.body_shapes import rows_of_other_shapes
 from reports.statistics.effects import RECORDING, Effect, recording_of
 from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads
 from reports.statistics.published import published_beside
@@ -56,6 +57,17 @@ def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
             f"{means}; worst motions: {worst}",
         ]
     return [*sentences, _against_reference(run.label(first), excess)]
+
+
+def on_other_bodies(run: Run) -> list[str]:
+    """Say which relative excess each network has on bodies of other shapes, in the one motion of them."""
+    rows = rows_of_other_shapes(run)
+    networks = [name for name in run.ordered(set(rows["method"])) if run.methods[name].role in LEARNED]
+    known = {name: excess for name in networks if (excess := excess_of(run, rows, name))}
+    shares = [f"{run.label(name)} {_share(excess)}" for name, excess in known.items()]
+    count = rows["scene"].nunique()
+    where = f"on {count} other {'body' if count == 1 else 'bodies'}, in one motion,"
+    return [f"{where} relative excesses are: {', '.join(shares)}"] if shares else []
 
 
 def _repeated(run: Run, scenes: Collection[str]) -> str:

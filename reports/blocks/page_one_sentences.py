@@ -8,11 +8,10 @@ from functools import lru_cache
 
 import pandas as pd
 
-from reports.blocks.excess_sentences import relative_excesses
+from reports.blocks.excess_sentences import on_other_bodies, relative_excesses
 from reports.blocks.suite_sentences import engines, textile_tests
 from reports.run.finished_run import Run
 from reports.statistics import paper_claims
-from reports.statistics.body_shapes import excess_energy, rows_of_other_shapes
 from reports.statistics.break_even import NETWORK, compared_scenes, reference_scenes
 from reports.statistics.means_and_spreads import mean_of, pair, value_of
 from reports.statistics.page_one_methods import subjects
@@ -44,7 +43,7 @@ def topics(run: Run) -> list[tuple[str, list[str]]]:
     sentences = {
         "How near": relative_excesses(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
         "At what cost": _cost(run, timed, compared), "How certain": _trust(run, beside),
-        "On other bodies": _on_other_bodies(run),
+        "On other bodies": on_other_bodies(run),
         "Textile tests": [textile_tests(run)], "Engines": [engines(run)],
     }  # fmt: skip
     finished = {
@@ -244,18 +243,6 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
             f"{best.fewer}, below the {number(network.error)} J{network.fewer} of {snug}{scatter}"
         )
     return [*sentences, gaps]
-
-
-def _on_other_bodies(run: Run) -> list[str]:
-    """Say how much energy networks, and skinning alone, have above the simulation."""
-    rows = rows_of_other_shapes(run)
-    parts = []
-    for name in run.ordered(set(rows["method"]) - set(run.reference_ensemble)):
-        if run.methods[name].role in ("baseline", "network", "ablation"):
-            above, fewer = excess_energy(run, rows, name)
-            parts += [] if above is None else [f"{run.label(name)} {number(above)}{fewer}"]
-    where = f"on {rows['scene'].nunique()} other bodies [J]"
-    return [f"Total energy above the simulation's {where}: {', '.join(parts)}"] if parts else []
 
 
 def unbroken(text: str) -> str:

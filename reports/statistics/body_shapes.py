@@ -1,4 +1,4 @@
-"""Total energy above the reference's on bodies of other shapes than the mean one."""
+"""Rows of a run on bodies of other shapes than the mean one."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 
 from reports.run.finished_run import Run
-from reports.statistics.means_and_spreads import pair
 
-SHAPE, TOTAL = "body/shape", "energy/total"
+SHAPE = "body/shape"
 
 
 def rows_of_shapes(run: Run) -> tuple[pd.DataFrame, pd.Series]:
@@ -27,14 +26,3 @@ def rows_of_other_shapes(run: Run) -> pd.DataFrame:
     """Return the rows of scenes whose body has not the mean shape."""
     rows, norms = rows_of_shapes(run)
     return rows[rows["scene"].isin(norms.index[norms > 0.0])]
-
-
-def excess_energy(run: Run, rows: pd.DataFrame, method: str) -> tuple[float | None, str]:
-    """Return total energy above the reference's [J], mean over the bodies that both have, and a remark.
-
-    The remark is on roll-outs that are missing; energy is None for the reference itself.
-    """
-    if method == run.reference:
-        return None, ""
-    one, other = pair(rows, method, run.reference, TOTAL)
-    return (one.value - other.value, one.fewer) if one and other else (None, "")

@@ -1,15 +1,11 @@
-"""Tables of body shapes: energies on the mean body and on others, and the excess over the reference."""
+"""Table of body shapes: relative excess and energies on the mean body and on others."""
 
 from __future__ import annotations
 
 from reports.run.finished_run import Run
-from reports.statistics.body_shapes import (
-    TOTAL,
-    excess_energy,
-    rows_of_other_shapes,
-    rows_of_shapes,
-)
+from reports.statistics.body_shapes import rows_of_other_shapes, rows_of_shapes
 from reports.statistics.means_and_spreads import means
+from reports.statistics.relative_excess import SKINNING, TOTAL, excess_of
 from reports.tables.table import METHOD, Cell, Column, Table, metric_column, table
 
 METRICS = (TOTAL, "energy/strain", "energy/collision", "penetration/vertices")
@@ -17,7 +13,7 @@ OTHERS, MEAN_BODY = "other shapes", "mean shape"
 
 
 def shapes(run: Run) -> list[Table]:
-    """Tabulate each method on all other bodies together and on the mean body, with its excess energy."""
+    """Tabulate each method on all other bodies together and on the mean body, with its relative excess."""
     rows, norms = rows_of_shapes(run)
     metrics = [run.metrics[name] for name in METRICS if name in run.metrics]
     if rows.empty or not metrics:
@@ -29,17 +25,16 @@ def shapes(run: Run) -> list[Table]:
         (MEAN_BODY, rows[rows["scene"].isin(norms.index[norms == 0.0])]),
     ):
         cells = means(part, "method", "metric")
-        lines += [
-            (
-                name,
-                method,
-                excess_energy(run, part, method)[0],
-                *(cells.get((method, m.name)) for m in metrics),
-            )
-            for method in methods
-        ]
+        for method in methods:
+            excess = None if method in (run.reference, SKINNING) else excess_of(run, part, method)
+            share = (excess.effect, excess.mean) if excess else (None, None)
+            lines.append((name, method, *share, *(cells.get((method, m.name)) for m in metrics)))
     columns = (
-        Column("scene", "Body", text=True), METHOD, Column("above", "Above the simulation", "J"),
-        *map(metric_column, metrics),
+        Column("scene", "Body", text=True), METHOD, Column("typical", "Typical", "%", digits=2),
+        Column("mean", "Mean", "%", digits=2), *map(metric_column, metrics),
     )  # fmt: skip
-    return table("shapes", columns, lines, "Body shapes: means over the others, and the mean body.")
+    caption = (
+        "Body shapes: the others together, and the mean body, in one motion. Typical (geometric, with its "
+        "interval over bodies and seeds) and mean: relative excess; energies and penetration: means."
+    )
+    return table("shapes", columns, lines, caption)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from reports.blocks.page_one_sentences import headline
@@ -10,7 +11,7 @@ from tests.reports.report_folder import row, run_of
 
 
 def on_other_bodies(run) -> str:
-    return dict(headline(run)).get("On other bodies", "")
+    return dict(headline(run)).get("On other bodies", "").replace("\u00a0", " ")
 
 
 def shaped(method, metric, values, **more):
@@ -24,28 +25,29 @@ def test_energies_are_listed_by_body_shape():
     rows += shaped("simulation", "energy/total", (0.3, 0.5, 0.4))
     twin = {"family": "simulation-perturbed", "level": 1e-4}
     rows += shaped("simulation-perturbed-1e-4", "energy/total", (0.3, 0.5, 0.4), **twin)
-    rows += shaped("snug", "energy/total", (0.35, 0.8, 0.6)) + shaped(
-        "snug", "energy/strain", (0.1, 0.4, 0.2)
-    )
+    rows += shaped("skinning", "energy/total", (0.8, 1.0, 1.4))  # 0.5, 0.5 and 1 J above the simulation
+    rows += shaped("snug", "energy/total", (0.35, 0.8, 0.6))  # 10, 60 and 20 %
+    rows += shaped("snug", "energy/strain", (0.1, 0.4, 0.2))
 
     (together,) = shapes(run_of(rows))
     names = [column.name for column in together.columns]
-    assert names == ["scene", "method", "above", "energy/total", "energy/strain"]
+    assert names == ["scene", "method", "typical", "mean", "energy/total", "energy/strain"]
     lines = {(line[0], line[1]): (None, *line[1:]) for line in together.rows}
-    assert list(lines) == [(s, m) for s in ("other shapes", "mean shape") for m in ("simulation", "snug")]
+    methods = ("simulation", "skinning", "snug")
+    assert list(lines) == [(s, m) for s in ("other shapes", "mean shape") for m in methods]
+    typical = np.sinh(np.arcsinh([60.0, 20.0]).mean())
     together = lines["other shapes", "snug"]
-    assert together[2] == pytest.approx(0.7 - 0.45) and together[3].value == pytest.approx(0.7)
-    assert (
-        lines["mean shape", "snug"][2] == pytest.approx(0.05) and lines["mean shape", "simulation"][2] is None
-    )
+    assert together[2].shown == pytest.approx(typical) and together[3] == pytest.approx(40.0)
+    assert together[4].value == pytest.approx(0.7)
+    assert lines["mean shape", "snug"][3] == pytest.approx(10.0)
+    assert lines["mean shape", "simulation"][2:4] == lines["mean shape", "skinning"][2:4] == (None, None)
 
-    sentence = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.250."
-    assert on_other_bodies(run_of(rows)) == sentence
+    sentence = on_other_bodies(run_of(rows))
+    assert sentence.startswith("On 2 other bodies, in one motion, relative excesses are: SNUG 35 % (95 % int")
     # A method that failed on a body is compared on the others, and the sentence says so.
     last = [row("shapes/1", "snug", "cost/frame", None, suite="shapes", status="diverged", reason="no end")]
     kept = [r for r in rows if (r.scene, r.method) != ("shapes/1", "snug")]
-    sentence = "Total energy above the simulation's on 2 other bodies [J]: SNUG 0.200 (1 of 2 roll-outs)."
-    assert on_other_bodies(run_of(kept + last)) == sentence
+    assert on_other_bodies(run_of(kept + last)).endswith(" are: SNUG 20 % (1 of 2 roll-outs).")
     one = [r for r in rows if r.scene == "shapes/0"]
     assert on_other_bodies(run_of(one)) == ""
     assert shapes(run_of(one)) == []
