@@ -113,7 +113,10 @@ def error_rivals(run: Run) -> list[Table]:
 
 
 def reference_uncertainty(run: Run) -> list[Table]:
-    """Tabulate how far equally valid references, and smaller time steps, lie from the reference."""
+    """Tabulate how far equally valid references, and smaller time steps, lie from the reference.
+
+    There is no table where a run has neither.
+    """
     frame = run.cells("speed", "garments")
     scenes = reference_scenes(run)
     rows = frame[frame["scene"].isin(scenes)]
@@ -123,6 +126,8 @@ def reference_uncertainty(run: Run) -> list[Table]:
     ]
     lines: list[tuple[Cell, ...]] = [("ensemble of the reference, root mean square", *ensemble)]
     steps = [m for m in run.methods.values() if m.family == SMALLER_STEPS and m.level]
+    if not (steps or any(value is not None for value in ensemble)):
+        return []
     for method in sorted(steps, key=lambda m: m.level or 0.0):
         distances = [value_of(rows, method.name, metric.name) for metric in metrics]
         lines.append((f"{method.level:g} steps a frame", *distances))

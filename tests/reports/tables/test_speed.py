@@ -76,6 +76,8 @@ def test_the_reference_has_its_uncertainty_and_its_error_in_time_in_a_table():
         ("ensemble of the reference, root mean square", None, 21.0), ("4 steps a frame", None, 30.0),
         ("SNUG", 5.0, 50.0),
     )  # fmt: skip
+    alone = [line for line in all_rows() if line.metric != "distance/rms" or line.method == "snug"]
+    assert reference_uncertainty(run_of(alone)) == []
 
 
 def test_a_run_of_suite_speed_alone_has_its_methods_on_page_one():
