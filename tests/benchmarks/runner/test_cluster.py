@@ -46,12 +46,6 @@ def two(tmp_path_factory):
         yield started
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "run").mkdir()
-    return RunFolder(tmp_path / "run")
-
-
 # --- what comes back ---------------------------------------------------------------------------------------
 
 

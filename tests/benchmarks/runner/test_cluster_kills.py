@@ -33,12 +33,6 @@ from tests.benchmarks.runner.cluster_by_hand import (
 KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "run").mkdir()
-    return RunFolder(tmp_path / "run")
-
-
 @pytest.mark.slow
 def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path):
     with cluster(tmp_path, 4) as four:
