@@ -210,8 +210,10 @@ def _checked(value: np.ndarray | None, default: np.ndarray, name: str) -> np.nda
     if value is None:
         return default.copy()
     value = np.array(value, dtype=np.float64)
-    if value.shape != default.shape or not np.isfinite(value).all():
-        raise ValueError(f"simulate: {name} has shape {value.shape}: expected finite {default.shape}")
+    if value.shape != default.shape:
+        raise ValueError(f"simulate: {name} has shape {value.shape}: expected {default.shape}")
+    if len(bad := np.flatnonzero(~np.isfinite(value).all(axis=1))):
+        raise ValueError(f"simulate: {name} of vertex {bad[0]} is {value[bad[0]]}: give finite numbers")
     return value
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -23,7 +22,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
 from benchmarks.scenes.textile_tests import textile_tests
 from reference_sim.files.atomic_files import demand_writable_folder
-from snug.garments.options import GarmentFile
+from snug.garments.options import GarmentFile, demand_usable_name
 
 if TYPE_CHECKING:
     from benchmarks.assets.inputs import UserBody
@@ -140,14 +139,14 @@ def choose_metrics(files: Sequence[str]) -> tuple[str, ...]:
 
 
 def check_garment_name(file: GarmentFile) -> None:
-    """Raise PlanError unless scenes can be named after the file of a garment."""
+    """Raise ValueError unless scenes can be named after the file of a garment, and none are."""
+    demand_usable_name(file.path)
     taken = {scene.split("/")[0] for scene in all_scenes((), ())} | {
         scenes.garment for scenes in GARMENT_SCENES
     }
-    if file.name in taken or not re.fullmatch(r"\w[\w.+-]*", file.name):
+    if file.name in taken:
         raise PlanError(
-            f"--garment {file.path}: '{file.name}' cannot name its scenes: give the file another name, of "
-            "letters, digits and '_'"
+            f"--garment {file.path}: the project has scenes of that name: give the file another name"
         )
 
 

@@ -27,11 +27,24 @@ class WrongWord(ValueError):
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser that answers a wrong word with one line; examples stay as they are written."""
+    """Argument parser that answers a wrong or empty word with one line; examples stay as they are written."""
 
     def __init__(self, **options: Any) -> None:
         plain = argparse.RawDescriptionHelpFormatter
         super().__init__(formatter_class=plain, allow_abbrev=False, **options)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse as the base class does. Raises WrongWord also for an empty value, as "$UNSET" leaves one."""
+        parsed, unknown = super().parse_known_args(args, namespace)
+        for action in self._actions:
+            value = getattr(parsed, action.dest, None)
+            if value is action.default:
+                continue
+            for word in value if isinstance(value, list) else [value]:
+                if isinstance(word, str) and not word.strip(", "):
+                    name = "/".join(action.option_strings) or action.metavar or action.dest
+                    self.error(f"argument {name}: '{word}' names nothing: give a value, or leave it out")
+        return parsed, unknown
 
     def error(self, message: str) -> NoReturn:
         """Raise WrongWord."""

@@ -33,13 +33,11 @@ def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
         return []
     first, *others = known
     excess = known[first]
-    kind = "validation " if run.config.get("split") == "validation" else "unseen "
-    unseen = "" if set(worn["scene"]) <= set(run.trained_on) else kind
     # Those in which skinning has an excess: a network that failed in one has a remark on it.
     scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
     count = len(scenes)
     beside = published_beside(run, first)
-    motions = f"{count} {unseen}motion{'' if count == 1 else 's'}"
+    motions = f"{count} {_kind(run, scenes)}motion{'' if count == 1 else 's'}"
     paired = [f"; {says}" for says in _paired(run, worn, first, others)]
     shares = [
         f"{run.label(first)} has a relative excess of {_share(excess)}{f' ({beside})' if beside else ''}",
@@ -68,6 +66,16 @@ def on_other_bodies(run: Run) -> list[str]:
     count = rows["scene"].nunique()
     where = f"on {count} other {'body' if count == 1 else 'bodies'}, in one motion,"
     return [f"{where} relative excesses are: {', '.join(shares)}"] if shares else []
+
+
+def _kind(run: Run, scenes: Collection[str]) -> str:
+    """Return what these scenes' motions are to the networks, before the word "motions"."""
+    if set(scenes) <= set(run.trained_on):
+        return ""
+    validation = set(run.with_motion("validation")) & set(scenes)
+    if not validation:
+        return "unseen "
+    return "validation " if validation == set(scenes) else "validation and other unseen "
 
 
 def _repeated(run: Run, scenes: Collection[str]) -> str:

@@ -125,8 +125,12 @@ class Run:
     @property
     def trained_on(self) -> list[str]:
         """Scenes whose motion networks trained on, as a user can name them."""
+        return self.with_motion("training")
+
+    def with_motion(self, role: str) -> list[str]:
+        """Return the scenes, as declared, whose motion has that role: training, validation or test."""
         scenes = self.config.get("scenes") or {}
-        return [name for name, scene in scenes.items() if scene.get("role") == "training"]
+        return [name for name, scene in scenes.items() if scene.get("role") == role]
 
     def garments(self, frame: pd.DataFrame) -> dict[str, list[str]]:
         """Return garment -> its scenes among these rows, in the order in which run.json declares them."""

@@ -91,8 +91,9 @@ class _File:
         dense = array.toarray() if scipy.sparse.issparse(array) else array
         with np.errstate(over="ignore"):
             dense = dense.astype(np.float64)
-        if not np.isfinite(dense).all():
-            raise self.error(f"{key} holds values that are not finite")
+        if len(bad := np.argwhere(~np.isfinite(dense))):
+            first, place = dense[tuple(bad[0])], ", ".join(map(str, bad[0]))
+            raise self.error(f"{key}[{place}] is {first}: not finite, as are {len(bad)} of its values")
         return dense
 
 

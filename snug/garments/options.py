@@ -6,6 +6,7 @@ Light to import; snug.garments.reading reads it.
 from __future__ import annotations
 
 import math
+import re
 from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,8 +87,22 @@ def demand_garment_file(options: Namespace) -> None:
             )
 
 
+def demand_usable_name(path: Path) -> None:
+    """Raise ValueError unless scenes and networks can be named after the file of a garment."""
+    if not re.fullmatch(r"\w[\w.+-]*", path.stem):
+        raise ValueError(
+            f"garment {path}: '{path.stem}' cannot name scenes and networks: give the file a name of letters "
+            "and digits"
+        )
+
+
 def make_garment_file(path: str, options: Namespace) -> GarmentFile:
-    """Return the file with the options of `add_garment_options`. Raises ValueError for a senseless one."""
+    """Return the file with the options of `add_garment_options`.
+
+    Raises:
+        ValueError: an option without sense, or a file whose name cannot name scenes and networks.
+    """
+    demand_usable_name(Path(path))
     try:
         shift = tuple(float(word) for word in options.garment_shift.split(","))
     except ValueError:

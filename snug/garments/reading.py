@@ -11,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.mesh_files import METRES, Surface, read_mesh, to_metres_y_up
@@ -24,6 +22,7 @@ from snug.garments.fit import DressForm, find_placement, pose_in_file
 from snug.garments.garment import Garment, GarmentError, smooth_weights
 from snug.garments.openings import name_openings
 from snug.garments.options import OPTION, GarmentFile
+from snug.garments.pieces import inside_out, open_seam, piece_of_faces
 from snug.garments.weights import find_weights, read_authored_weights
 
 Array = NDArray[np.float64]
@@ -34,7 +33,7 @@ SLIVERS = "slivers slow the simulation down: remesh"
 LOOSE = "a piece that is not sewn on falls off: merge the vertices along its seams"
 OK, NOTE, UNUSABLE = "ok", "note", "unusable"  # levels of a finding
 UNPOSED_SMOOTHING = 20  # rounds over borrowed weights at 1000 vertices, as recipes have it
-OUTWARD = 0.5  # share of the area that looks away from the skin, below which a garment is inside out
+AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2], lightest and heaviest cloth: beyond them a unit is mistaken
 
 
 @dataclass(frozen=True)
@@ -116,10 +115,11 @@ def examine_file(file: GarmentFile, form: DressForm) -> Examination:
     _describe_mesh(examination, raw, surface, kept)
     fits = _check_place(examination, file, form, raw)
     chart = _find_rest_shape(examination, file, surface)
-    surface = _wind_outward(examination, surface, form) if fits else surface
-    if chart is not None and surface is not examination.surface:
-        chart = chart[:, ::-1]
+    if fits:
+        surface, chart = _wind_outward(examination, surface, chart, form)
     examination.surface = surface
+    if file.material:
+        _check_material(examination, material)
     sound = _check_mesh(examination, surface, chart)
     if sound and fits and not examination.unusable:
         authored = None if authored is None else authored[kept]
@@ -183,19 +183,26 @@ def _find_rest_shape(examination: Examination, file: GarmentFile, surface: Surfa
     return chart if asked else None
 
 
-def _wind_outward(examination: Examination, surface: Surface, form: DressForm) -> Surface:
-    """Return the surface, turned where it is inside out."""
-    corners = surface.positions[surface.faces]
+def _wind_outward(
+    examination: Examination, surface: Surface, chart: Array | None, form: DressForm
+) -> tuple[Surface, Array | None]:
+    """Return surface and chart, with each piece turned that is inside out."""
+    faces, corners = surface.faces, surface.positions[surface.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    planes = form.skin.planes(corners.mean(axis=1), 0)
-    areas = np.linalg.norm(normals, axis=1)
-    outward = float(areas[np.einsum("fi,fi->f", normals, planes.normals) > 0].sum() / areas.sum())
-    if outward > OUTWARD:
-        examination.add("winding", f"outward, {outward:.0%} of the area")
-        return surface
-    examination.add("winding", "inside out", "turned as it is read", NOTE)
-    uv = None if surface.uv is None else surface.uv[:, ::-1]
-    return replace(surface, faces=np.ascontiguousarray(surface.faces[:, ::-1]), uv=uv)
+    outward = np.einsum("fi,fi->f", normals, form.skin.planes(corners.mean(axis=1), 0).normals) > 0
+    areas, pieces = np.linalg.norm(normals, axis=1), piece_of_faces(faces)
+    turned = inside_out(areas, outward, pieces)
+    if not turned.any():
+        examination.add("winding", f"outward, {areas[outward].sum() / areas.sum():.0%} of the area")
+        return surface, chart
+    some = f"{len(np.unique(pieces[turned]))} of {pieces.max() + 1} pieces " * (not turned.all())
+    examination.add("winding", f"{some}inside out", "turned as it is read", NOTE)
+    faces = np.ascontiguousarray(np.where(turned[:, None], faces[:, ::-1], faces))
+    uv, chart = (
+        corners if corners is None else np.where(turned[:, None, None], corners[:, ::-1], corners)
+        for corners in (surface.uv, chart)
+    )
+    return replace(surface, faces=faces, uv=uv), chart
 
 
 def _check_mesh(examination: Examination, surface: Surface, chart: Array | None) -> bool:
@@ -214,20 +221,29 @@ def _check_mesh(examination: Examination, surface: Surface, chart: Array | None)
         examination.add("faces", problem, remedy, UNUSABLE)
         return False
     angle = float(np.degrees(corner_angles(surface.positions, surface.faces).min()))
-    sharp, pieces = angle < SHARP, _count_pieces(surface)
+    sharp, pieces = angle < SHARP, int(piece_of_faces(surface.faces).max()) + 1
     examination.add(
         "triangles", f"smallest angle {angle:.1f} degrees", SLIVERS * sharp, NOTE if sharp else OK
     )
     examination.add("pieces", str(pieces), LOOSE * (pieces > 1), NOTE if pieces > 1 else OK)
+    seam, gap = open_seam(surface.positions, surface.faces)
+    if len(seam):
+        place = ", ".join(f"{x:.3f}" for x in surface.positions[seam[0]])
+        text = f"{len(seam)} vertices of a seam lie up to {1e3 * gap:.2g} mm apart, one at ({place}) m"
+        remedy = f"merge vertices closer than {1.1e3 * gap:.2g} mm; where a slit is meant, open it wider"
+        examination.add("seams", text, remedy, UNUSABLE)
     return True
 
 
-def _count_pieces(surface: Surface) -> int:
-    """Return the number of connected pieces."""
-    a, b = surface.faces[:, [0, 1]].T, surface.faces[:, [1, 2]].T
-    ends = np.concatenate([a, b], axis=1)
-    graph = coo_array((np.ones(ends.shape[1]), (ends[0], ends[1])), shape=(len(surface.positions),) * 2)
-    return int(connected_components(graph, directed=False)[0])
+def _check_material(examination: Examination, material: Material) -> None:
+    """Add what a material file says; a mass per area that no cloth has makes it unusable."""
+    lightest, heaviest = AREAL_DENSITIES
+    text = f"{material.areal_density:.3g} kg/m^2, {1e3 * material.thickness:.3g} mm thick"
+    if lightest <= material.areal_density <= heaviest:
+        examination.add("material", f"{text}, stiffness {material.membrane_modulus:.3g} N/m")
+        return
+    remedy = f"give thickness in m and density in kg/m^3; cloth has {lightest:g} to {heaviest:g} kg/m^2"
+    examination.add("material", f"its material is {text}", remedy, UNUSABLE)
 
 
 def _make_garment(

@@ -45,15 +45,16 @@ class Stored(Method):
 
     def _trajectory(self, positions: np.ndarray) -> Trajectory:
         stored = self.stored
-        finite, changes = bool(np.isfinite(positions).all()), "; ".join(self.done)
+        changes, bad = "; ".join(self.done), np.argwhere(~np.isfinite(positions).all(axis=2))
+        where = "" if not len(bad) else "frame {}, vertex {}".format(*bad[0])
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
         claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
         return Trajectory(
             positions=positions,
             faces=np.asarray(stored.faces if self.stated.other_mesh else self.scene.cloth.faces),
             times=np.arange(len(positions)) * self.scene.dt,
-            status="ok" if finite else "diverged",
-            reason=changes if finite else f"{self.path}: holds a position that is not finite",
+            status="diverged" if where else "ok",
+            reason=f"{self.path}: {where}: a position is not finite" if where else changes,
             provenance={"method": "stored roll-out", "file": Path(self.path).name, "changes": changes},
             frame_fields={"converged": claims},
         )

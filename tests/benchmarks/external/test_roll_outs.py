@@ -182,6 +182,16 @@ def test_what_does_not_belong_to_the_scene_is_refused_with_the_remedy(name, tmp_
     assert str(refused.value).count("mine.npz") == 1 and "\n" not in str(refused.value)
 
 
+def test_a_position_that_is_not_finite_is_named_by_frame_and_vertex(tmp_path):
+    exploded = X.copy()
+    exploded[5, 11:, 1] = np.inf
+    path = write("npz", tmp_path, exploded)
+    method = entry_of(RollOutOption("mine", path, FileConventions()), SCENE.name).make(models=Path(), seed=0)
+    method.prepare(SCENE)
+    assert method.run().status == "diverged"
+    assert method.run().reason == f"{path}: frame 5, vertex 11: a position is not finite"
+
+
 def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
     expected = direct(X)
     path = write("npz", tmp_path, Z_UP[:, ORDER], PLACE[FACES])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socketserver
 import sys
 import threading
 
@@ -188,6 +189,39 @@ def test_a_scheduler_that_does_not_answer_is_refused_in_one_line(tmp_path, monke
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert run.main([*options, "tcp://127.0.0.1:1"]) == 2
     assert "pip install" in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("answer", [b"HTTP/1.0 400 Bad Request\r\n\r\n", b""])
+def test_another_server_than_a_scheduler_is_refused_in_one_line(answer, tmp_path, monkeypatch, capsys):
+    """A web server, and one that waits for its caller to speak on."""
+    monkeypatch.setattr(scheduler, "FIRST", 1.0)
+    held = []
+
+    class Answer(socketserver.BaseRequestHandler):
+        def handle(self):
+            held.append(self.request)
+            self.request.sendall(answer)
+            asked.wait(5.0)
+
+    asked = threading.Event()
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Answer) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.server_address[1]}"
+        options = ["--scenes", "free_fall", "-o", str(tmp_path / "run"), "--scheduler", address]
+        assert run.main(options) == 2 and held
+        asked.set()
+        server.shutdown()
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and f"--scheduler {address}: " in error and "no " in error
+    assert "scheduler; start" in error or "within 1 s; start" in error
+
+
+def test_a_worker_is_no_scheduler(two, monkeypatch):
+    with scheduler.connect(two.address, seconds=5.0) as client:
+        client.wait_for_workers(1, timeout=30.0)
+        worker = next(iter(client.nthreads()))
+    with pytest.raises(scheduler.ClusterError, match="is a worker of dask; start a scheduler"):
+        scheduler.check_scheduler(worker)
 
 
 @pytest.mark.parametrize(("option", "value"), [("device", "cuda"), ("rollout", ["mine=out.npz"])])

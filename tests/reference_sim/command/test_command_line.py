@@ -30,6 +30,26 @@ def test_a_wrong_word_is_one_line_with_the_name_of_the_command(name, capsys, tmp
 
 
 @pytest.mark.parametrize(
+    ("name", "words", "option"),
+    [
+        ("benchmarks.run", ["--body", ""], "--body"),
+        ("benchmarks.run", ["--methods", "snug", "--methods", ","], "--methods"),
+        ("benchmarks.run", ["-o", " "], "-o/--out"),
+        ("snug.check", ["shirt.obj", ""], "FILE"),
+        ("snug.train", ["--garment", ""], "--garment"),
+    ],
+)
+def test_an_empty_value_as_of_an_unset_variable_is_refused(
+    name, words, option, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert importlib.import_module(name).main(words) == 2
+    message = capsys.readouterr().err
+    assert f"argument {option}: '{words[-1].strip()}" in " ".join(message.split()).replace("' '", "'")
+    assert "names nothing" in message and message.count("\n") == 1 and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
     ("met", "goes_on", "status", "message"),
     [
         (ValueError("a.obj: face 3\n has no area"), "", 2, "a.obj: face 3 has no area"),

@@ -157,7 +157,7 @@ def moved_joint(regressor):
         (lambda a: {k: v for k, v in a.items() if k != "weights"}, "no array weights or blend_weights"),
         (changed("weights", lambda w: w[:, :22]), "expected numbers of shape (1000, 24)"),
         (changed("weights", lambda w: 2 * w), "sum to one"),
-        (changed("v_template", lambda v: v * np.nan), "not finite"),
+        (changed("v_template", lambda v: np.where(v == v[7, 1], np.nan, v)), "v_template[7, 1] is nan"),
         (changed("v_template", lambda v: v * 1000), "in metres"),
         (changed("v_template", lambda v: v * [1000, 1, 1]), "in metres"),
         (changed("v_template", lambda v: v[:, [0, 2, 1]] * [1, 1, -1]), "in metres"),

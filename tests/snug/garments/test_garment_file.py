@@ -16,10 +16,10 @@ from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
-from snug.garments.fit import pose_in_file
+from snug.garments.fit import DressForm, pose_in_file
 from snug.garments.garment import GarmentError
 from snug.garments.options import GarmentFile, add_garment_options, demand_garment_file, make_garment_file
-from snug.garments.reading import read_garment
+from snug.garments.reading import examine_file, read_garment
 from snug.garments.templates import find_template
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
@@ -87,6 +87,26 @@ def test_a_garment_that_is_inside_out_is_turned_with_its_chart(tmp_path, body, t
     read = read_garment(GarmentFile(path=saved(tmp_path, tube, faces=turned, uv=uv), rest="uv"), body)
     np.testing.assert_array_equal(read.faces, tube.faces)
     assert energies(read) == pytest.approx(energies(tube), rel=1e-12)
+
+
+def test_each_piece_that_is_inside_out_is_turned(tmp_path, body, tube):
+    """Two halves of a tube, above and below, of which one is wound inward."""
+    low = tube.rest_positions[tube.faces, 1].max(axis=1) <= np.median(np.unique(tube.rest_positions[:, 1]))
+    high = tube.rest_positions[tube.faces, 1].min(axis=1) > np.median(np.unique(tube.rest_positions[:, 1]))
+    faces = tube.faces[low | high]
+    used, place = np.unique(faces, return_inverse=True)
+    faces, positions = place.reshape(-1, 3), tube.rest_positions[used]
+    wound = np.where(low[low | high][:, None], faces[:, ::-1], faces)
+    chart = own_chart(positions, wound)
+    path = saved(tmp_path, tube, positions=positions, faces=wound, uv=chart)
+    file = GarmentFile(path=path, rest="uv", uv_scale=1.0)
+    findings = {found.matter: found.text for found in examine_file(file, DressForm(body)).findings}
+    assert findings["winding"] == "1 of 2 pieces inside out" and findings["pieces"] == "2"
+    garment = read_garment(file, body)
+    np.testing.assert_array_equal(garment.faces, faces)
+    np.testing.assert_allclose(
+        garment.rest_uv, np.where((wound != faces).any(1)[:, None, None], chart[:, ::-1], chart)
+    )
 
 
 def test_doubled_vertices_are_joined_and_weights_are_those_of_the_file(tmp_path, body, tube):
@@ -207,6 +227,32 @@ def test_a_mesh_that_cannot_be_simulated_is_named(tmp_path, body, tube, spoil, m
         read_garment(GarmentFile(path=path), body)
 
 
+@pytest.mark.parametrize("gap", [1e-4, 1e-5])
+def test_a_seam_that_a_program_left_open_is_refused(tmp_path, body, tube, gap):
+    """Cut along x = 0 in front from neck to hem, its two sides apart: a tube that one long opening splits."""
+    front = np.flatnonzero((np.abs(tube.rest_positions[:, 0]) < 0.02) & (tube.rest_positions[:, 2] > 0))
+    positions, faces = doubled_along(tube.rest_positions, tube.faces, front)
+    positions[len(tube.rest_positions) :, 0] -= gap
+    path = saved(tmp_path, tube, positions=positions, faces=faces)
+    says = rf"{2 * len(front)} vertices of a seam lie up to {1e3 * gap:.2g} mm apart, one at \(.*\) m: merge"
+    with pytest.raises(GarmentError, match=says):
+        read_garment(GarmentFile(path=path), body)
+    positions[len(tube.rest_positions) :, 0] -= 0.02  # a slit
+    read_garment(GarmentFile(path=saved(tmp_path, tube, positions=positions, faces=faces)), body)
+
+
+@pytest.mark.parametrize(("thickness", "usable"), [("0.47e-3", True), ("0.47", False), ("0.47e-6", False)])
+def test_a_material_in_another_unit_is_refused(tmp_path, body, tube, capsys, thickness, usable):
+    material = tmp_path / "cotton.toml"
+    material.write_text(f"thickness = {thickness}\n")
+    file = GarmentFile(path=saved(tmp_path, tube), material=material)
+    if usable:
+        assert read_garment(file, body).material == Material()
+        return
+    with pytest.raises(GarmentError, match=r"its material is .* kg/m\^2, .* mm thick: give thickness in m"):
+        read_garment(file, body)
+
+
 @pytest.mark.parametrize(
     ("weights", "message"),
     [
@@ -252,6 +298,9 @@ def test_check_says_what_was_found_and_how_to_mend_it(tmp_path, capsys, tube):
     bad = saved(tmp_path, tube, positions=1000 * tube.rest_positions, name="bad.obj")
     assert check.main([str(good), str(bad)]) == check.UNUSABLE
     assert "--garment-units mm" in capsys.readouterr().out
+
+    assert check.main([str(tmp_path / "my shirt.obj")]) == check.UNREADABLE
+    assert "'my shirt' cannot name scenes" in capsys.readouterr().err
 
     (tmp_path / "broken.obj").write_text("v 0 0\n")
     assert check.main([str(tmp_path / "broken.obj"), str(bad)]) == check.UNREADABLE
