@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from snug.garments.garment import Garment
     from snug.motion.motion import Motion
 
+LONGEST_FRAME = 1.0  # [s]; a dt of 33.3 is in milliseconds
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
@@ -189,6 +191,11 @@ class BuiltScene:
         if self.warm_up < 2:
             raise ValueError(
                 f"scene {self.name}: warm_up {self.warm_up}: give 2 frames or more, see BuiltScene"
+            )
+        if not 0.0 < self.dt <= LONGEST_FRAME:
+            raise ValueError(
+                f"scene {self.name}: dt {self.dt:g}: give the duration of a frame in seconds, above 0 and at "
+                f"most {LONGEST_FRAME:g}"
             )
 
     @cached_property

@@ -76,9 +76,6 @@ class CheckScene(Task):
         declared, vertices = self.scene, scene.cloth.vertex_count
         findings.demand(scene.name == declared.name, f"is built as '{scene.name}': give name=scene.name")
         findings.demand(
-            0.0 < scene.dt < np.inf, f"has a time step of {scene.dt} s: give a positive number of seconds"
-        )
-        findings.demand(
             scene.frames >= FEWEST_FRAMES, f"has {scene.frames} frames: at least {FEWEST_FRAMES} are needed"
         )
         findings.demand(

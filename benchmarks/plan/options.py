@@ -27,7 +27,7 @@ PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
   python -m benchmarks.run                                    garments, and a part of three other suites
   python -m benchmarks.run --trained                          the same without training
-  python -m benchmarks.run --preset smoke                     everything once, tiny, about 3 minutes
+  python -m benchmarks.run --preset smoke                     everything once, tiny, about 2 minutes
   python -m benchmarks.run --suite garments -o reports/runs/mine
   python -m benchmarks.run --scenes hanging_sheet --methods simulation,newton-4
   python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2

@@ -147,6 +147,20 @@ def test_the_exact_fall_obeys_backward_euler():
     assert v[0] == pytest.approx(velocity - np.array([0, 9.81 * dt, 0]))
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "says"),
+    [
+        ("dt", 33.3, "dt 33.3: give the duration of a frame in seconds, above 0 and at most 1"),
+        ("dt", 0.0, "dt 0: give the duration"),
+        ("warm_up", 1, "warm_up 1: give 2 frames or more"),
+    ],
+)
+def test_a_scene_of_no_sensible_duration_is_refused(field, value, says):
+    built = SCENES[0].at(SMOKE).build()
+    with pytest.raises(ValueError, match=f"scene {built.name}: {says}"):
+        dataclasses.replace(built, **{field: value})
+
+
 def test_presets_grow():
     sizes = [preset.garment_vertices for preset in PRESETS]
     assert sizes == sorted(sizes) and [preset.name for preset in PRESETS] == ["smoke", "quick", "paper"]
