@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -24,10 +25,12 @@ from reports.statistics.pareto import (
     run_time,
     truncated,
 )
+from reports.statistics.spreads import ensemble_spread
 from reports.statistics.verdicts import compare_methods, measure_of
 from reports.tables.number_texts import in_scenes, listed, number
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
+FEW = 3  # scenes whose values are told one by one
 SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
 
 
@@ -42,7 +45,7 @@ def topics(run: Run) -> list[tuple[str, list[str]]]:
     beside = cells[cells["scene"].isin(reference_scenes(run))]
     sentences = {
         "How near": relative_excesses(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
-        "At what cost": _cost(run, timed, compared), "How certain": _trust(run, beside),
+        "At what cost": _cost(run, timed, compared), "How certain": _trust(run, beside, worn),
         "On other bodies": on_other_bodies(run),
         "Textile tests": [textile_tests(run)], "Engines": [engines(run)],
     }  # fmt: skip
@@ -131,25 +134,30 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> list[str]:
     ]
 
 
-def _trust(run: Run, timed: pd.DataFrame) -> list[str]:
-    """Say which claims hold, how uncertain the reference itself is, and what its time step leaves out."""
+def _trust(run: Run, timed: pd.DataFrame, worn: pd.DataFrame) -> list[str]:
+    """Say which claims hold, how uncertain the reference itself is, and what its time step leaves out.
+
+    Its uncertainty is that in all motions, where the run has its ensemble there, else that beside timed rows.
+    """
     sentences = []
     lines = paper_claims.judged(run)
     counted = paper_claims.counts(lines)
     if counted:
-        failing = _claims_that_fail(run, lines)
-        sentences.append(f"of {_tests(lines)} {paper_claims.in_words(counted)}{failing}")
+        sentences.append(f"{_tests(lines, counted)}{_claims_that_fail(run, lines)}")
     where = in_scenes(set(timed[timed["method"] == run.reference]["scene"]))
     finest = max(_smaller_steps(run, timed), key=lambda name: run.methods[name].level or 0.0, default="")
     if finest and (left_out := _left_out_by_the_step(run, timed, finest)):
         sentences.append(f"{left_out}, {where}")
-    apart = [indistinct(run, timed, metric) for metric in (DISTANCE, CURVATURE)]
-    if all(apart):
-        sentences.append(
-            "equally valid simulations (another start, contact search or tolerance) lie "
-            f"{number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean curvature from the reference, "
-            f"{where}: errors below that show no difference"
-        )
+    for rows in (worn, timed):
+        apart = [indistinct(run, rows, metric) for metric in (DISTANCE, CURVATURE)]
+        if all(apart):
+            where = in_scenes(set(ensemble_spread(run, rows, DISTANCE).index))
+            sentences.append(
+                "equally valid simulations (another start, contact search or tolerance) lie "
+                f"{number(apart[0], 2)} mm and {number(apart[1], 2)} 1/m of mean curvature from the "
+                f"reference, {where}: errors below that show no difference"
+            )
+            break
     return sentences
 
 
@@ -165,12 +173,11 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
         for what, (one, other) in (("strain", strain), ("hem amplitude", amplitude))
         if one and other and other.value
     ]
-    away = value_of(timed, finest, DISTANCE)
     network = _first_subject(run, timed)
-    far = value_of(timed, network, DISTANCE)
-    beside = "" if far is None else f", from which {run.label(network)} lies {number(far, 2)} mm"
+    away, far = (_in_each_scene(timed, name, DISTANCE) for name in (finest, network))
+    beside = f", from which {run.label(network)} lies {far} mm" if far else ""
     has = [f"has {' and '.join(ratios)}"] if ratios else []
-    distance = [] if away is None else [f"lies {number(away, 2)} mm from the reference{beside}"]
+    distance = [f"lies {away} mm from the reference{beside}"] if away else []
     if not (has or distance):
         return ""
     return (
@@ -179,12 +186,36 @@ def _left_out_by_the_step(run: Run, timed: pd.DataFrame, finest: str) -> str:
     )
 
 
-def _tests(lines: Sequence[paper_claims.Judged]) -> str:
-    """Return how many tests there are of how many primary claims; table 1 alone has one for each energy."""
-    primary = [line.claim.says for line in lines if line.claim.primary]
-    tests, claims = len(primary), len(set(primary))
+def _in_each_scene(rows: pd.DataFrame, method: str, metric: str) -> str:
+    """Return the method's values in few scenes as "26 and 49", in many their mean, empty without any."""
+    scenes = sorted(
+        set(rows[rows["usable"] & (rows["method"] == method) & (rows["metric"] == metric)]["scene"])
+    )
+    values = [value_of(rows, method, metric, [scene]) for scene in scenes]
+    if len(scenes) > FEW:
+        values = [value_of(rows, method, metric)]
+    return listed(list(dict.fromkeys(number(value, 2) for value in values if value is not None)))
+
+
+def _tests(lines: Sequence[paper_claims.Judged], counted: Counter[str]) -> str:
+    """Return how many tests there are of how many primary claims, and how they ended, also by claim.
+
+    Table 1 alone has several tests, one for each energy.
+    """
+    verdicts: dict[str, set[str]] = {}
+    for line in lines:
+        if line.claim.primary:
+            verdicts.setdefault(line.claim.says, set()).add(line.verdict)
+    tests, claims = counted.total(), len(verdicts)
     of_claims = f"{claims} primary claim{'' if claims == 1 else 's'} of the paper"
-    return f"{tests} test{'' if tests == 1 else 's'} of {of_claims}"
+    outcome = f"of {tests} test{'' if tests == 1 else 's'} of {of_claims} {paper_claims.in_words(counted)}"
+    if tests == claims:
+        return outcome
+    alike = Counter(next(iter(ends)) for ends in verdicts.values() if len(ends) == 1)
+    mixed = claims - alike.total()
+    differently = f"{mixed} {'has' if mixed == 1 else 'have'} tests that end differently" if mixed else ""
+    parts = [paper_claims.in_words(alike), differently]
+    return f"{outcome}; by claim, {', '.join(filter(None, parts))}"
 
 
 def _claims_that_fail(run: Run, lines: Sequence[paper_claims.Judged]) -> str:

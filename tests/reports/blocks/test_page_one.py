@@ -138,6 +138,30 @@ def test_a_simulation_with_smaller_steps_that_has_only_times_says_nothing_of_the
     far = [row(s, "simulation-dt-4", "distance/rms", 30.0, unit="mm", **more) for s in SCENES]
     certainty = dict(headline(run_of([*times, *far])))["How certain"].replace("\u00a0", " ")
     assert certainty.endswith("with 4 steps a frame lies 30 mm from the reference, in 2 scenes.")
+    far = [
+        row(s, "simulation-dt-4", "distance/rms", d, unit="mm", **more)
+        for s, d in zip(sorted(SCENES), (30.0, 45.0))
+    ]
+    near = [row(s, "snug", "distance/rms", d, unit="mm") for s, d in zip(sorted(SCENES), (20.0, 50.0))]
+    certainty = dict(headline(run_of([*times, *far, *near])))["How certain"].replace("\u00a0", " ")
+    says = "lies 30 and 45 mm from the reference, from which SNUG lies 20 and 50 mm, in 2 scenes."
+    assert certainty.endswith(says)
+
+
+def test_claims_of_several_tests_are_counted_by_claim_too(monkeypatch):
+    energies = ("strain", "bending", "inertia")
+    rows = on_two_scenes("snug", 1.0, 9.0) + BESIDE
+    rows += [row(s, m, f"energy/{e}", 1.0) for s in SCENES for m in ("snug", "pbns") for e in energies]
+
+    def verdict(claim, far, p):
+        return paper_claims.FAILS if claim.metric == "energy/bending" else paper_claims.HOLDS
+
+    monkeypatch.setattr(paper_claims, "verdict", verdict)
+    certainty = dict(headline(run_of(rows)))["How certain"].replace("\u00a0", " ")
+    counted = (
+        "Of 4 tests of 2 primary claims of the paper 3 hold, 1 does not hold; by claim, 1 holds, 1 has tests "
+    )
+    assert certainty.startswith(f"{counted}that end differently; what does not hold is ")
 
 
 def test_a_primary_claim_that_does_not_hold_is_named(monkeypatch):
