@@ -122,8 +122,8 @@ def _cost(run: Run, timed: pd.DataFrame, scenes: list[str]) -> list[str]:
     compared = compare_methods(run, timed, metric, run.reference, network) if metric else None
     if compared is None or compared.effect is None or compared.other is None or not compared.other.value:
         return []
-    ends = compared.effect.interval
-    times = " to ".join(number(end, 2) for end in ends) if ends else number(compared.effect.shown, 2)
+    ends = compared.effect.interval or (compared.effect.shown,)
+    times = " to ".join(dict.fromkeys(number(end, 2) for end in ends))
     milliseconds = number(compared.other.value)
     whole = " from pose to vertices" if compared.metric.name == "cost/whole" else ""
     where = f", {in_scenes(scenes)}" if scenes else ""

@@ -17,6 +17,15 @@ def test_run_times_on_page_one_are_of_the_garment_compared():
     )
 
 
+def test_a_range_that_rounding_closes_is_one_number():
+    rows = [
+        dataclasses.replace(r, value=r.value * (1 + 1e-3 * seed), seed=seed) if r.method == "snug" else r
+        for r in all_rows()
+        for seed in ((0, 1) if r.method == "snug" else (0,))
+    ]
+    assert "the simulation 400 times as long, in 2 scenes." in cost_sentence(run_of(rows))
+
+
 def test_nothing_is_nearer_of_those_that_were_looked_at():
     numbers = {"snug": ("a", "b"), "pbns": ("a",)}
     rows = [
