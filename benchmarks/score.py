@@ -21,9 +21,10 @@ from benchmarks.plan.plan_roll_out import plan_roll_out
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
-from reference_sim.command.command_line import Parser
+from reference_sim.command.command_line import INTERRUPTED, Parser
 
 PROGRAM = "benchmarks.score"
+MISSING = "missing"  # status of a roll-out that a run ended before
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
   python -m benchmarks.score mine.npz --scene tshirt/kick -o scored
@@ -113,7 +114,9 @@ def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
         What `numbers` returns.
 
     Raises:
-        ValueError: one line, where the roll-out cannot be read or does not belong to the scene.
+        ValueError: one line, where the roll-out cannot be read or does not belong to the scene, or where the
+            evaluation ended early.
+        KeyboardInterrupt: it was interrupted.
 
     >>> score("mine.npz", "--scene", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
     0.031
@@ -125,16 +128,20 @@ def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
     with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(message):
         status = carry_out(plan, program=PROGRAM, report=False)
     lines = message.getvalue().strip().splitlines()
-    if status not in (0, 1):
+    if status == INTERRUPTED:
+        raise KeyboardInterrupt
+    found = numbers(plan) if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file() else {}
+    if not found or found["status"] == MISSING:
         raise ValueError(lines[-1] if lines else "the run ended early")
-    return numbers(plan)
+    return found
 
 
 def numbers(plan: Plan) -> dict[str, Any]:
     """Return what was found of the roll-out, ready for JSON.
 
     Returns:
-        name, scene, status ("ok" or the first other one), reason, metrics (name -> value and unit), folder.
+        name, scene, status ("ok", the first other one, or "missing" where the run ended before), reason,
+        metrics (name -> value and unit), folder.
     """
     folder, name = RunFolder(plan.folder), plan.cells[-1].method
     rows = [row for row in folder.read_rows() if row.method == name]
@@ -143,8 +150,8 @@ def numbers(plan: Plan) -> dict[str, Any]:
     return {
         "name": name,
         "scene": plan.scenes[0].name,
-        "status": bad.status if bad else "ok",
-        "reason": bad.reason if bad else "",
+        "status": bad.status if bad else "ok" if rows else MISSING,
+        "reason": bad.reason if bad else "" if rows else "the run ended before it was evaluated",
         "metrics": {row.metric: {"value": row.value, "unit": row.unit} for row in known},
         "folder": str(plan.folder),
     }

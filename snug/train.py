@@ -53,6 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
     finally:
         leave_group()
+        stop.restore()
     return 0
 
 
@@ -61,8 +62,7 @@ class _StopRequest:
 
     def __init__(self) -> None:
         self.received = False
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._receive)
+        self._before = {n: signal.signal(n, self._receive) for n in (signal.SIGINT, signal.SIGTERM)}
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
         self.received = True
@@ -70,6 +70,11 @@ class _StopRequest:
 
     def __call__(self) -> bool:
         return self.received
+
+    def restore(self) -> None:
+        """Put back the handlers that were there before: `main` may be called by a longer program."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
 
 if __name__ == "__main__":

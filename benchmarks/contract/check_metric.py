@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -82,7 +83,7 @@ class CheckMetrics(Task):
                 any(_declares(metric.name, {name}) for metric in module.METRICS),
                 f"measures {name}, which METRICS does not declare",
             )
-            fine = isinstance(number, int | float) and not isinstance(number, bool)
+            fine = isinstance(number, Real) and not isinstance(number, bool)
             if not findings.demand(fine, f"{name} {on} is a {type(number).__name__}: give a float"):
                 continue
             findings.demand(math.isfinite(number), f"{name} {on} is {number}: leave out what does not apply")

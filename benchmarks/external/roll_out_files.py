@@ -156,8 +156,9 @@ def _floats(name: str, array: np.ndarray) -> np.ndarray:
 def _triangles(name: str, array: np.ndarray, vertices: int | None) -> np.ndarray:
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu" or not len(array):
         raise ValueError(f"{name} is {array.dtype} {array.shape}: whole numbers of shape (triangles, 3)")
-    if array.min() < 0 or (vertices is not None and array.max() >= vertices):
-        raise ValueError(f"{name} names vertex {array.max()} of {vertices}")
+    wrong = array[(array < 0) | (array >= (np.inf if vertices is None else vertices))]
+    if len(wrong):
+        raise ValueError(f"{name} names vertex {wrong[0]}" + (f" of {vertices}" if vertices else ""))
     return array.astype(np.int64)
 
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.merge import MergeError, merge
+from benchmarks.merge import merge
 from benchmarks.process.timing import one_thread
 from benchmarks.provenance import commit
 from benchmarks.publish.published_runs import RUNS, PublishedRun
@@ -80,7 +80,7 @@ def _published(name: str, out: Path, into: Path, head: str, more: Sequence[str])
     """Return whether a run is published; where it is not, the next is done all the same."""
     try:
         publish(name, RUNS[name], out, into, head, more)
-    except (PublishError, MergeError) as error:
+    except ValueError as error:  # of the run's command, of merging, of files of results
         print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
         return False
     return True

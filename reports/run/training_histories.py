@@ -64,11 +64,13 @@ def read_history(path: Path, method: str) -> History | None:
 
     try:
         with safe_open(path, "numpy") as stored:
-            data: dict[str, Any] = json.loads((stored.metadata() or {}).get("snug", "{}"))
-    except (OSError, ValueError, SafetensorError) as error:
+            header: Any = json.loads((stored.metadata() or {}).get("snug", "{}"))
+    except (OSError, ValueError, RecursionError, SafetensorError) as error:
         raise ValueError(f"{path}: no safetensors header ({error})") from None
-    rows, unit = data.get("history") or [], data.get("unit", "")
-    summary = data.get("summary") or {}
+    if not isinstance(header, dict):
+        raise ValueError(f"{path}: its entry 'snug' is a {type(header).__name__}, no table")
+    rows, unit = header.get("history") or [], header.get("unit", "")
+    summary = header.get("summary") or {}
     best = (summary.get("validation") or {}).get("best_step", np.nan)
     frames = summary.get("training_frames")
     return History(method, unit, rows, frames=frames, best_step=best) if len(rows) > 1 else None

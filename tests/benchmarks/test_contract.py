@@ -215,6 +215,9 @@ def test_the_command_checks_what_files_declare(in_process, tmp_path, capsys):
     out = capsys.readouterr().out
     assert "lift: fine\n" in out and "highest.py in hanging_sheet: fine\n" in out
     assert "nothing is wrong" in out
+    (tmp_path / "narrow.py").write_text("import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("))
+    assert check.main([str(tmp_path / "narrow.py")]) == 0  # as a run takes it
+    capsys.readouterr()
     askew = SCENE_FILE.replace("-self.cloth.masses[:, None] *", "-2.0 * self.cloth.masses[:, None] *")
     (tmp_path / "askew.py").write_text(askew)
     (tmp_path / "loose.py").write_text(METRIC_FILE.replace("float(", "").replace(".max())", ".max(axis=1)"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,27 @@ def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, cap
     with pytest.raises(ValueError, match="no such file"):
         score.score(tmp_path / "absent.npz", *options, "-o", str(tmp_path / "none"))
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize(
+    ("status", "rows", "error", "says"),
+    [
+        (130, [], KeyboardInterrupt, None),
+        (1, None, ValueError, "the disk is full"),
+        (1, [], ValueError, "the disk is full"),
+    ],
+)
+def test_an_evaluation_that_broke_off_is_no_result(made, tmp_path, monkeypatch, status, rows, error, says):
+    def broken(plan, **_):
+        if rows is not None:
+            RunFolder(plan.folder).write_rows(rows)
+        print("the disk is full", file=sys.stderr)
+        return status
+
+    monkeypatch.setattr(score, "carry_out", broken)
+    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "-o", str(tmp_path / "out")]
+    with pytest.raises(error, match=says):
+        score.score(made.trajectory_path("hanging_sheet", "newton-1"), *options)
 
 
 def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_path, monkeypatch, capsys):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors.numpy import save_file
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.row import COLUMNS
@@ -217,6 +218,13 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
     assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
     (heat,) = (column for column in tables["energies"].columns if column.name == "energy/heat")
     assert (heat.title, heat.unit) == ("Heat", "J")
+
+
+@pytest.mark.parametrize("text", ["[1]", "[" * 100_000])
+def test_a_header_that_is_no_table_is_a_value_error(text, tmp_path):
+    save_file({"w": np.zeros(1, np.float32)}, tmp_path / "a.safetensors", metadata={"snug": text})
+    with pytest.raises(ValueError, match=r"a\.safetensors: (its entry|no safetensors header)"):
+        training.read_history(tmp_path / "a.safetensors", "snug")
 
 
 def test_histories_come_from_the_models_headers(made, tmp_path):

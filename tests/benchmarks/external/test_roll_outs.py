@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 from pathlib import Path
 
@@ -251,6 +252,25 @@ def test_another_mesh_has_to_be_in_the_scenes_place_and_time(given, remedy, tmp_
         rows(str(tmp_path / "mine.npz"), other_mesh=True)
     with pytest.raises(RollOutFileError, match="give one"):
         FileConventions(match_vertices=True, other_mesh=True)
+
+
+def test_a_rate_that_is_the_scenes_own_up_to_rounding_changes_nothing(tmp_path):
+    scene = dataclasses.replace(SCENE, dt=1 / 29.97)
+    assert 1 / scene.dt != 29.97
+    method = Stored(write("npz", tmp_path), FileConventions(fps=29.97))
+    method.prepare(scene)
+    assert method.run().reason == ""
+    method = Stored(write("npz", tmp_path), FileConventions(fps=30.0 + 1e-9))
+    method.prepare(SCENE)
+    assert method.run().reason == ""
+
+
+@pytest.mark.parametrize(("wrong", "says"), [(-1, "faces names vertex -1 of 49"), (60, "vertex 60 of 49")])
+def test_the_vertex_that_triangles_name_wrongly_is_said(wrong, says, tmp_path):
+    faces = np.where(np.arange(len(FACES))[:, None] == 3, wrong, FACES)
+    np.savez(tmp_path / "mine.npz", positions=X, faces=faces)
+    with pytest.raises(RollOutFileError, match=says):
+        read_roll_out(tmp_path / "mine.npz")
 
 
 def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):

@@ -14,6 +14,7 @@ from benchmarks.provenance import commit
 from benchmarks.publish import __main__ as command
 from benchmarks.publish.__main__ import PublishError, all_usable, keep, publish
 from benchmarks.publish.published_runs import RUNS, PublishedRun
+from benchmarks.results.json_file import ResultsError
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks import FIGURES
@@ -111,12 +112,13 @@ def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, c
     assert all(f"{name}: {run.question}" in shown for name, run in RUNS.items())
 
 
-def test_a_run_that_lacks_a_picture_is_left_and_the_next_is_done(monkeypatch, capsys):
+@pytest.mark.parametrize("error", [PublishError, ResultsError])
+def test_a_run_that_lacks_a_picture_is_left_and_the_next_is_done(error, monkeypatch, capsys):
     done = []
 
     def without_picture(name, *_):
         done.append(name)
-        raise PublishError(f"{name}/figures/none.png: not there, and the documents show it")
+        raise error(f"{name}/figures/none.png: not there, and the documents show it")
 
     monkeypatch.setattr(command, "commit", lambda: "abc")
     monkeypatch.setattr(command, "publish", without_picture)

@@ -35,6 +35,7 @@ from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.training.train_network import untrained_model
+from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 SMOKE = find_preset("smoke")
 CASES = [scene for scene in OUT_OF_DISTRIBUTION if not scene.networks_only and scene.name != ORDINARY]
@@ -150,6 +151,14 @@ def roll_outs(positions, name):
         group.roll_outs.append(RollOut(group, entry, trajectory_of(scene, x), suites=("extremes",)))
         group.roll_outs[-1].counterpart = walk[method]
     return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
+
+
+def test_a_scene_without_a_body_has_none_of_these_metrics():
+    scene = small_scene("hanging_sheet", cells=3, frames=4)
+    group = SceneRollOuts(scene)
+    x = np.repeat(scene.start[None], 4, axis=0)
+    fallen = RollOut(group, find_method("snug"), trajectory_of(scene, x), suites=("extremes",))
+    assert extrapolation.measure(fallen) == {} and extrapolation.judge(fallen, {}) is None
 
 
 def test_a_glitch_is_forgotten_or_not(positions):

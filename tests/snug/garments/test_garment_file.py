@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -319,7 +320,9 @@ def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_pa
     monkeypatch.setattr(train_to_file, "train_network", stop)
     arguments = ["--garment", str(path), "--garment-rest", "uv", "--garment-uv-scale", "0.01"]
     arguments += ["--garment-material", str(tmp_path / "silk.toml"), "-o", str(tmp_path / "a.safetensors")]
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     assert train_command.main(arguments) == 2
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
     (dressed,) = seen
     assert dressed.cloth.material == Material(density=300.0) and dressed.vertices == 150
     np.testing.assert_allclose(dressed.cloth.rest_uv, own_chart(tube.rest_positions, tube.faces))
