@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
@@ -48,7 +47,7 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
         yield path, path.read_text(encoding="utf-8") if path.is_file() else "", page
 
 
-@command("reports.docs", goes_on="the same command begins again", bad_input=(ResultsError, ValueError))
+@command("reports.docs", goes_on="the same command begins again")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = Parser(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
@@ -21,7 +20,7 @@ Entries without scores are left out and named: python -m benchmarks.submit score
 exit status: 0 written; 1 written without some entry; 2 a folder cannot be read."""
 
 
-@command("reports.entries", bad_input=(ResultsError, ValueError))
+@command("reports.entries")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = Parser(
