@@ -130,10 +130,10 @@ def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
     lines = message.getvalue().strip().splitlines()
     if status == INTERRUPTED:
         raise KeyboardInterrupt
-    found = numbers(plan) if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file() else {}
-    if not found or found["status"] == MISSING:
+    evaluated = numbers(plan) if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file() else None
+    if evaluated is None or evaluated["status"] == MISSING:
         raise ValueError(lines[-1] if lines else "the run ended early")
-    return found
+    return evaluated
 
 
 def numbers(plan: Plan) -> dict[str, Any]:

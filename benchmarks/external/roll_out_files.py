@@ -76,6 +76,19 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
     return _read(str(path), _state(str(path)))
 
 
+def first_not_finite(positions: np.ndarray) -> tuple[int, int] | None:
+    """Return the first frame with a position that is not finite, and its vertex; None without one.
+
+    Args:
+        positions: (T, V, 3).
+
+    >>> first_not_finite(np.array([[[0.0, 0.0, 0.0]], [[0.0, np.nan, 0.0]]]))
+    (1, 0)
+    """
+    bad = np.argwhere(~np.isfinite(positions).all(axis=-1))
+    return (int(bad[0, 0]), int(bad[0, 1])) if len(bad) else None
+
+
 def read_rest_mesh(path: str | Path) -> Surface:
     """Read the mesh of a cloth at rest; a process reads it once, until it changes. Raises MeshError."""
     return _read_mesh(str(path), _state(str(path)))

@@ -296,8 +296,9 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: FileConventions) 
             f"states {stated_rate:g} frames a second, the scene has {rate:g}: give --fps {stated_rate:g} to "
             "re-time it"
         )
-    same = stated.fps is None or abs(stated.fps - rate) <= RATE_TOLERANCE * rate
-    file_rate = rate if same or stated.fps is None else stated.fps
+    file_rate = rate if stated.fps is None else stated.fps
+    if abs(file_rate - rate) <= RATE_TOLERANCE * rate:
+        file_rate = rate
     places = np.arange(scene.frames) * file_rate / rate
     places = np.where(np.abs(places - np.round(places)) < 1e-6, np.round(places), places)
     spare = frames - 1 - places[-1]  # frames of the file behind the scene's last; up to one of the scene's

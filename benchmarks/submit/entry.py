@@ -10,9 +10,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from benchmarks.external.roll_out_files import read_roll_out
+from benchmarks.external.roll_out_files import first_not_finite, read_roll_out
 from benchmarks.external.roll_out_option import PLACE, FileConventions, RollOutFileError, RollOutOption
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.methods.outside.stored_roll_out import Stored
@@ -252,9 +250,8 @@ def _faults_of_files(entry: Entry, folder: Path) -> Iterator[str]:
             yield str(error)
             continue
         readable.append((scene, path))
-        bad = np.argwhere(~np.isfinite(positions).all(axis=-1))
-        if len(bad):
-            frame, vertex = bad[0]
+        if place := first_not_finite(positions):
+            frame, vertex = place
             yield f"{path}: vertex {vertex} of frame {frame} is not finite: a roll-out is whole"
     if not readable:
         return

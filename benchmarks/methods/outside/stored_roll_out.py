@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import read_roll_out
+from benchmarks.external.roll_out_files import first_not_finite, read_roll_out
 from benchmarks.external.roll_out_option import MODULE, FileConventions, RollOutFileError, RollOutOption
 from benchmarks.external.scene_fit import fit_to_scene
 from benchmarks.fingerprint.digest import digest
@@ -45,8 +45,8 @@ class Stored(Method):
 
     def _trajectory(self, positions: np.ndarray) -> Trajectory:
         stored = self.stored
-        changes, bad = "; ".join(self.done), np.argwhere(~np.isfinite(positions).all(axis=2))
-        where = "" if not len(bad) else "frame {}, vertex {}".format(*bad[0])
+        changes, place = "; ".join(self.done), first_not_finite(positions)
+        where = "frame {}, vertex {}".format(*place) if place else ""
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
         claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
         return Trajectory(

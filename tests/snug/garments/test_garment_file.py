@@ -243,7 +243,7 @@ def test_a_seam_that_a_program_left_open_is_refused(tmp_path, body, tube, gap):
 
 
 @pytest.mark.parametrize(("thickness", "usable"), [("0.47e-3", True), ("0.47", False), ("0.47e-6", False)])
-def test_a_material_in_another_unit_is_refused(tmp_path, body, tube, capsys, thickness, usable):
+def test_a_material_in_another_unit_is_refused(tmp_path, body, tube, thickness, usable):
     material = tmp_path / "cotton.toml"
     material.write_text(f"thickness = {thickness}\n")
     file = GarmentFile(path=saved(tmp_path, tube), material=material)
