@@ -27,7 +27,7 @@ EXAMPLES = """examples:
       --obstacle-rest tpose.ply --pc2 shirt_walk.pc2 -o shirt_walk.vtkhdf
   python -m reference_sim.simulate shirt.obj --obstacle walk/ -o out.vtkhdf --resume     # after a kill
   python -m reference_sim.simulate shirt.obj --rest uv --material silk.toml -o shirt.vtkhdf
-  python -m reference_sim.simulate skirt.obj --pins top --self-contact --friction 0.3 -o skirt.vtkhdf
+  python -m reference_sim.simulate skirt.obj --pins top --self-contact -o skirt.vtkhdf
 
 The output is in metres with y up, whatever the input was in. ParaView opens the .vtkhdf as it is; Blender
 takes the .obj beside the .pc2 and a Mesh Cache modifier.
@@ -94,7 +94,7 @@ def _add_material(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_contact(parser: argparse.ArgumentParser) -> None:
-    """Add penalty, friction, barrier and self-contact."""
+    """Add penalty with friction, barrier and self-contact."""
     add = parser.add_argument_group("contact").add_argument
     add("--contact-stiffness", type=_positive, metavar="J_M5", help="of the penalty [J/m^5] (default 3.4e6)")
     add("--contact-margin", type=_positive, metavar="M", help="of the penalty [m] (default 0.004)")
@@ -102,7 +102,7 @@ def _add_contact(parser: argparse.ArgumentParser) -> None:
         help="all: vertices, edge midpoints and centroids (default)",
     )  # fmt: skip
     add("--friction", type=_not_negative, default=0.0, metavar="MU",
-        help="coefficient (default 0); with --self-contact beside the penalty, of the obstacle alone",
+        help="coefficient of the penalty's friction, of cloth on the obstacle (default 0)",
     )  # fmt: skip
     add("--barrier", action="store_true",
         help="IPC's barrier in place of the penalty: nothing passes, twelve times the time (needs ipctk)",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -27,10 +26,11 @@ def check_terms(options: Namespace) -> None:
     barrier = options.barrier or options.self_contact
     penalty = options.obstacle is not None and not options.barrier
     penalty_only = ["--contact-" + name for name in _given(options, PENALTY_FLAGS)]
+    penalty_only += ["--friction"] * bool(options.friction)
     barrier_only = ["--barrier-" + name for name in _given(options, BARRIER_FLAGS)]
     if options.obstacle is None:
-        if options.obstacle_rest or (options.friction and not options.self_contact):
-            raise BadInput("--obstacle-rest and --friction need an --obstacle, or --friction --self-contact")
+        if options.obstacle_rest:
+            raise BadInput("--obstacle-rest needs an --obstacle")
         if options.barrier:
             raise BadInput("--barrier needs an --obstacle; without one give --self-contact")
         if penalty_only:
@@ -60,7 +60,7 @@ def make_terms(cloth: Cloth, options: Namespace) -> list[Energy]:
     if options.obstacle and not options.barrier:
         declared += _penalty(cloth, options)
     if options.barrier or options.self_contact:
-        declared += _barrier(cloth, options)
+        declared.append(_barrier(cloth, options))
     return declared
 
 
@@ -73,8 +73,7 @@ def _penalty(cloth: Cloth, options: Namespace) -> list[Energy]:
     return [contact, *friction]
 
 
-def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
-    from reference_sim.energies.barrier_friction import BarrierFriction
+def _barrier(cloth: Cloth, options: Namespace) -> Energy:
     from reference_sim.energies.contact_barrier import ContactBarrier
 
     beside_penalty = options.obstacle is not None and not options.barrier
@@ -87,12 +86,7 @@ def _barrier(cloth: Cloth, options: Namespace) -> list[Energy]:
         )
     except ImportError as error:
         raise ValueError(str(error)) from None
-    rubs = options.friction and not beside_penalty  # the penalty's friction is that on the body
-    friction = [BarrierFriction(contact, coefficient=options.friction)] if rubs else []
-    if options.friction and beside_penalty:
-        note = "is that of the obstacle; cloth slides on cloth without friction"
-        print(f"note: --friction {options.friction:g} {note}", file=sys.stderr, flush=True)
-    return [contact, *friction]
+    return contact
 
 
 def _given(options: Namespace, names: Iterable[str]) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from reference_sim.energies.area_barrier import AreaBarrier as AreaBarrier
-    from reference_sim.energies.barrier_friction import BarrierFriction as BarrierFriction
     from reference_sim.energies.bend_hinge.definition import BendHinge as BendHinge
     from reference_sim.energies.contact_barrier import ContactBarrier as ContactBarrier
     from reference_sim.energies.contact_friction import ContactFriction as ContactFriction
@@ -38,7 +37,6 @@ MODULE_OF = {
     "ContactPenalty": "contact_penalty.definition",
     "ContactFriction": "contact_friction",
     "ContactBarrier": "contact_barrier",
-    "BarrierFriction": "barrier_friction",
     "AreaBarrier": "area_barrier",
     "Energy": "energy",
     "Step": "energy",

@@ -1,4 +1,4 @@
-"""The barrier and its friction, an energy at a time: derivatives, patterns, line search, refusals."""
+"""The barrier alone: derivatives, patterns, line search, refusals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 
 from reference_sim import Cloth, Material, Obstacle, Potential, TrajectoryError, minimise, simulate
 from reference_sim.energies import (
-    BarrierFriction,
     BendHinge,
     ContactBarrier,
     Energy,
@@ -43,24 +42,18 @@ def crumpled(distance: float = 3e-3) -> tuple[ContactBarrier, Obstacle, np.ndarr
     return ContactBarrier(cloth, distance=distance), Obstacle(ball, ball_faces), y
 
 
-def with_pairs() -> tuple[ContactBarrier, BarrierFriction, np.ndarray]:
+def with_pairs() -> tuple[ContactBarrier, np.ndarray]:
     barrier, obstacle, x = crumpled()
-    friction = BarrierFriction(barrier, coefficient=0.7, speed=0.05)
-    step = still(x, obstacle)
-    for energy in (barrier, friction):
-        energy.prepare(step)
+    barrier.prepare(still(x, obstacle))
     kinds = barrier.collisions.pairs(x)[0]
     assert min(map(len, (kinds.fv_collisions, kinds.ee_collisions, kinds.ev_collisions))) > 0
-    # 0.8 mm is the slip at which friction is fully grown: some pairs have slipped less, some more.
-    return barrier, friction, x + np.random.default_rng(5).normal(0, 3e-4, x.shape)
+    return barrier, x + np.random.default_rng(5).normal(0, 3e-4, x.shape)
 
 
-@pytest.mark.parametrize(("which", "force", "stiffness"), [(0, 1e-3, 1.0), (1, 1e-4, 0.1)])
-def test_derivatives_are_those_of_finite_differences(which, force, stiffness):
-    *energies, x = with_pairs()
-    energy = energies[which]
+def test_derivatives_are_those_of_finite_differences():
+    energy, x = with_pairs()
     gradient, hessian = energy.value_and_gradient(x)[1], energy.sparse_hessian(x)
-    assert np.abs(gradient).max() >= force and np.abs(hessian.data).max() >= stiffness
+    assert np.abs(gradient).max() >= 1e-3 and np.abs(hessian.data).max() >= 1.0
     assert abs(hessian - hessian.T).max() <= 1e-12 * np.abs(hessian.data).max()
     h = 1e-9  # [m]: a hundred-thousandth of the smallest distance
     for seed in range(3):
@@ -73,34 +66,31 @@ def test_derivatives_are_those_of_finite_differences(which, force, stiffness):
 
 
 def test_convexity_takes_out_the_negative_curvature_and_nothing_else():
-    barrier, friction, x = with_pairs()
+    barrier, x = with_pairs()
     true, half, convex = (barrier.sparse_hessian(x, c).toarray() for c in (0.0, 0.5, 1.0))
     scale = np.abs(true).max()
     assert np.linalg.eigvalsh(true)[0] < -1e-3 * scale
     assert np.linalg.eigvalsh(convex)[0] > -1e-12 * scale
     assert np.linalg.eigvalsh(convex - true)[0] > -1e-12 * scale
     assert np.abs(half - (true + convex) / 2).max() <= 1e-12 * scale
-    hessian = friction.sparse_hessian(x).toarray()
-    assert np.linalg.eigvalsh(hessian)[0] > -1e-12 * np.abs(hessian).max()
 
 
 def test_there_is_no_definition_in_torch_and_it_says_so():
-    for energy in with_pairs()[:2]:
-        with pytest.raises(NotImplementedError, match="no definition in torch"):
-            energy.energy(None)
+    with pytest.raises(NotImplementedError, match="no definition in torch"):
+        with_pairs()[0].energy(None)
 
 
 def test_hessian_of_a_potential_holds_pairs_that_no_other_term_couples():
-    barrier, friction, x = with_pairs()
+    barrier, x = with_pairs()
     others: list[Energy] = [StretchStVK(barrier.cloth), BendHinge(barrier.cloth)]
-    whole = Potential([*others, barrier, friction]).hessian(x)
-    parts = Potential(others).hessian(x) + barrier.sparse_hessian(x) + friction.sparse_hessian(x)
+    whole = Potential([*others, barrier]).hessian(x)
+    parts = Potential(others).hessian(x) + barrier.sparse_hessian(x)
     assert abs(whole - parts).max() <= 1e-12 * np.abs(whole.data).max()
     assert whole.nnz > Potential(others).hessian(x).nnz
 
 
 def test_a_wider_pattern_is_kept_while_it_serves():
-    barrier, _, x = with_pairs()
+    barrier, x = with_pairs()
     potential = Potential([StretchStVK(barrier.cloth), barrier])
     fixed = potential.pattern(np.ones(barrier.cloth.vertex_count, dtype=bool))
     wide = fixed.covering(fixed.changing(x))
@@ -270,21 +260,6 @@ def test_a_run_cut_off_where_a_body_had_stopped_is_not_gone_on_with(tmp_path):
 def test_impossible_barriers_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         ContactBarrier(sheet(3, 0.1, (0, 0, 0)), **options)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"), [({"coefficient": -0.1}, "not negative"), ({"speed": 0.0}, "above 0")]
-)
-def test_impossible_friction_is_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        BarrierFriction(ContactBarrier(sheet(3, 0.1, (0, 0, 0))), **options)
-
-
-def test_friction_listed_before_its_barrier_is_refused():
-    cloth = sheet(3, 0.1, (0, 0, 0))
-    barrier = ContactBarrier(cloth)
-    with pytest.raises(ValueError, match="list the barrier first"):
-        simulate(cloth, [BarrierFriction(barrier), barrier], frames=2)
 
 
 def test_areas_that_weigh_pairs_are_the_rest_state_of_the_cloth():
