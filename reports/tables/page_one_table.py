@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pandas as pd
 
 from reports.run.finished_run import Run
@@ -20,8 +22,12 @@ ANSWERS = ("distance/rms", "penetration/surface", "dynamics/amplitude", "dynamic
 GAP = "gap/energy"
 
 
-def overview(run: Run) -> list[Table]:
+def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     """Tabulate reference, baselines and networks of the first garment, and the solvers as good as SNUG.
+
+    Args:
+        run: the run.
+        methods: rows in place of these.
 
     Relative excess, penetration and dynamics are means over its motions, energy gaps and times over the
     scenes in which solvers were timed.
@@ -41,7 +47,7 @@ def overview(run: Run) -> list[Table]:
     chosen += [m for m in last.values() if m not in chosen]
     why = rivals(run, cells, scenes) if scenes else {}
     solvers = [m for m in why if m not in chosen]
-    chosen = run.ordered([*chosen[: ROWS - len(solvers)], *solvers])
+    chosen = run.ordered(methods or [*chosen[: ROWS - len(solvers)], *solvers])
     wanted = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
     wanted += [("cost/train", rows_of_garment)]
     asked = [(run.metrics[name], rows) for name, rows in wanted if name in run.metrics]

@@ -1,9 +1,9 @@
 """Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
 
-`headline of RUN`, `answer of RUN` (two sentences of each topic of the headline), `table NAME of RUN;
-COLUMN, ...; METHOD, ...` (all where none is named), `claims primary of RUN, ...`, `claims exploratory of RUN,
-...`, `counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of reports/published, and the first run that
-has both methods of a claim judges it. `attributes of MODULE.CLASS`, `docstring of MODULE` (its table),
+`front of RUN` (the answer of README), `table NAME of RUN; COLUMN, ...; METHOD, ...` (all where none is named;
+of table `overview`, METHODs of several runs), `claims primary of RUN, ...`, `claims exploratory of RUN, ...`,
+`counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of reports/published, and the first run that has
+both methods of a claim judges it. `attributes of MODULE.CLASS`, `docstring of MODULE` (its table),
 `recipes of NAME, ...`, `sources of the library` and the parts that `code_parts.PARTS` names come from the
 code, `evaluations of published runs` from the run.json of each run; `attributes` and `options of
 benchmarks.run` take names after a semicolon, whose rows alone are shown, in that order.
@@ -20,22 +20,22 @@ from itertools import chain
 from pathlib import Path
 
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks.page_one_sentences import headline, topics
 from reports.statistics.published import PUBLISHED, read_published
 from reports.tables import TABLES
+from reports.tables.page_one_table import overview
 from reports.tables.pivot import metric_tables
 from reports.tables.table import Table
 from reports.text.claim_rows import JudgedClaims, claim_counts, claim_rows, judge_in_first
 from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows
+from reports.text.front_sentences import front_sentences
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.motion.composition import clip_rows, distance_rows, source_rows
 
 FORMS = (
-    "headline of RUN; answer of RUN; table NAME of RUN; COLUMN, ...; METHOD, ...; claims primary of RUN, "
-    "...; claims exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; attributes of MODULE.CLASS; "
-    "NAME, ...; docstring of MODULE; recipes of NAME, ...; sources of the library; evaluations of published "
-    "runs; "
+    "front of RUN; table NAME of RUN; COLUMN, ...; METHOD, ...; claims primary of RUN, ...; claims "
+    "exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; attributes of MODULE.CLASS; NAME, ...; "
+    "docstring of MODULE; recipes of NAME, ...; sources of the library; evaluations of published runs; "
     f"{'; '.join(PARTS)}"
 )
 
@@ -65,11 +65,10 @@ def published_part(request: str) -> str:
         return markdown_table(list(source_rows()))
     if request == "evaluations of published runs":
         return markdown_table(evaluation_rows(PUBLISHED))
-    if kind == "headline":
-        return "\n".join(f"- {topic}: {sentence}" for topic, sentence in headline(read_published(folders[0])))
-    if kind == "answer":
-        answers = [(topic, " ".join(texts[:2])) for topic, texts in topics(read_published(folders[0]))]
-        return "\n".join(f"- **{topic}.** {text}" for topic, text in answers)
+    if kind == "front":
+        return front_sentences(read_published(folders[0]))
+    if what == "table overview":
+        return _overview(folders, wanted, methods)
     if kind == "table":
         table = _of_methods(_table(folders[0], name), methods)
         rows = text_rows(read_published(folders[0]), table, wanted)
@@ -105,6 +104,20 @@ def evaluation_rows(published: Path) -> list[tuple[str, ...]]:
         runs.setdefault(group, []).append(f"`{path.parent.name}`")
     lines = [(*group, ", ".join(runs[group])) for group in sorted(runs)]
     return [("Protocol", "Split", "Test-set evaluations", "Runs"), *lines]
+
+
+def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[str]) -> str:
+    """Return the table of page one with these methods, each from the first run that has it."""
+    tables: list[list[list[str]]] = []
+    places: dict[str, list[str]] = {}
+    for run in map(read_published, folders):
+        own = [name for name in methods if name in run.methods and name not in places]
+        rows = text_rows(run, overview(run, own)[0], wanted)
+        tables.append(rows)
+        places |= dict(zip(run.ordered(own), rows[1:]))
+    if any(rows[0] != tables[0][0] for rows in tables):
+        raise ValueError(f"runs {', '.join(folder.name for folder in folders)} have other columns")
+    return markdown_table([tables[0][0], *(places[name] for name in methods)])
 
 
 @cache

@@ -48,9 +48,9 @@ def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys)
 
 def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
     with pytest.raises(ValueError, match="needs an"):
-        fill(BEGIN.format("headline of quick"), lambda request: "")
+        fill(BEGIN.format("front of quick"), lambda request: "")
     for request, message in (
-        ("everything of quick", "known: headline"),
+        ("everything of quick", "known: front"),
         ("table nothing of quick", "no table nothing; it has"),
         ("table overview of quick; colour", "no column colour; it has"),
     ):
