@@ -67,7 +67,7 @@ def published_part(request: str) -> str:
         return markdown_table(evaluation_rows(PUBLISHED))
     if kind == "front":
         return front_sentences(read_published(folders[0]))
-    if what == "table overview":
+    if what == "table overview" and methods:
         return _overview(folders, wanted, methods)
     if kind == "table":
         table = _of_methods(_table(folders[0], name), methods)
