@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from benchmarks.process.timing import one_thread
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from snug.garments.options import add_garment_options
 from snug.motion.options import add_motion_options
 

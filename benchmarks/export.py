@@ -13,7 +13,7 @@ from benchmarks.plan.options import add_scene_options
 from benchmarks.plan.plan import PlanError
 from benchmarks.plan.plan_scene import plan_scene
 from benchmarks.process.timing import one_thread
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 
 PROGRAM = "benchmarks.export"
 EXAMPLES = """examples:

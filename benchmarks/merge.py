@@ -24,7 +24,7 @@ from benchmarks.results.run_config import OF_SCENES
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import read_entry
 from benchmarks.tasks.training import TrainNetwork
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
 
 PROGRAM = "benchmarks.merge"

@@ -17,7 +17,7 @@ from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
 from benchmarks.tasks.task import RunStopped
-from reference_sim.command.command_line import heeded_interrupts, print_text
+from reference_sim.command_line import heeded_interrupts, print_text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -21,7 +21,7 @@ from benchmarks.plan.plan_roll_out import plan_roll_out
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
-from reference_sim.command.command_line import INTERRUPTED, Parser
+from reference_sim.command_line import INTERRUPTED, Parser
 
 PROGRAM = "benchmarks.score"
 MISSING = "missing"  # status of a roll-out that a run ended before

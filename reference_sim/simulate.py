@@ -1,16 +1,13 @@
-"""Command `python -m reference_sim.simulate`. It is run, never imported.
-
-Importing it would hide the function `reference_sim.simulate` behind this module of the same name.
-"""
+"""Command `python -m reference_sim.simulate`; imported, the name stays that of the function."""
 
 import sys
 
-from reference_sim.command.simulate_command import main
+from reference_sim.simulate_command import main
 
-if __name__ != "__main__":
-    raise ImportError(
-        "reference_sim.simulate is a command (python -m reference_sim.simulate); "
-        "the function is `from reference_sim import simulate`"
-    )
+if __name__ == "__main__":
+    sys.exit(main())
 
-sys.exit(main())
+from reference_sim.time_loop import simulate
+
+# An import would put this module in the place of the function `reference_sim.simulate`.
+sys.modules[__name__] = simulate  # type: ignore[assignment]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 
 
 @dataclass(frozen=True)

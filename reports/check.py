@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
 from reports.statistics.pareto import REPEATS, TIME

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from reports.comparison.change import BETTER, FAILING, GONE, OTHER, TIME_TOLERANCE, WORSE
 from reports.comparison.compare_runs import Comparison, compare
 from reports.run.finished_run import Run

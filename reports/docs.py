@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
 
 ROOT = Path(__file__).resolve().parents[1]

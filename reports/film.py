@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder, replacing
 from reports.pictures.render import camera_axes
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from snug.garments.options import GarmentFile, add_garment_options, make_garment_file
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
 
-from reference_sim.command.command_line import command
+from reference_sim.command_line import command
 from snug.training.command.options import check_options, parse_options
 
 

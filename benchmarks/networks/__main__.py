@@ -17,7 +17,7 @@ from benchmarks.plan.request import Request
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.task import RunStopped
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
 
 PROGRAM = "benchmarks.networks"

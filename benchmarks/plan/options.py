@@ -18,7 +18,7 @@ from benchmarks.external.roll_out_option import parse_roll_out
 from benchmarks.plan.plan import PlanError
 from benchmarks.plan.request import Request
 from benchmarks.presets import PRESETS, find_preset
-from reference_sim.command.command_line import Parser
+from reference_sim.command_line import Parser
 from snug.garments.options import add_garment_options, demand_garment_file, make_garment_file
 from snug.motion.options import add_motion_options, parse_motion_options
 from snug.trained import FOLDER

@@ -16,7 +16,7 @@ from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.execute_plan import accepted
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
 
 PROGRAM = "benchmarks.publish"

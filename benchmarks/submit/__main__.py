@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from benchmarks.process.timing import one_thread
-from reference_sim.command.command_line import Parser, command
+from reference_sim.command_line import Parser, command
 
 PROGRAM = "benchmarks.submit"
 SHOWN = 5  # differences that are printed

@@ -22,7 +22,7 @@ ALLOWED = {
         "reports",
         "benchmarks.results",
         "benchmarks.metrics.surface.curvature",
-        "reference_sim.command.command_line",
+        "reference_sim.command_line",
         "reference_sim.trajectory.trajectory",
         "reference_sim.files.array_file",
         "reference_sim.trajectory.point_cache",

@@ -17,7 +17,6 @@ import pytest
 import torch
 
 from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, minimise, simulate
-from reference_sim.command.summary import summarise
 from reference_sim.energies import (
     BendHinge,
     ContactBarrier,
@@ -29,6 +28,7 @@ from reference_sim.energies import (
 )
 from reference_sim.minimise import Newton
 from reference_sim.progress import progress_bar
+from reference_sim.simulate_command import summarise
 from tests.reference_sim.meshes import box, grid, random_rotation, sphere
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)

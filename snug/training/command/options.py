@@ -6,7 +6,7 @@ import argparse
 import os
 from collections.abc import Sequence
 
-from reference_sim.command.command_line import Parser
+from reference_sim.command_line import Parser
 from snug.garments.options import add_garment_options
 from snug.motion.options import add_motion_options
 from snug.recipes.named import RECIPES

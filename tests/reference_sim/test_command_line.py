@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reference_sim.command.command_line import command
+from reference_sim.command_line import command
 
 COMMANDS = (
     "snug.check", "snug.train", "benchmarks.check", "benchmarks.dataset",
@@ -71,7 +71,7 @@ def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, message, 
 
 SWALLOWED = """
 import signal, sys, time
-from reference_sim.command.command_line import command
+from reference_sim.command_line import command
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever starts tests in the background has it off
 
@@ -124,7 +124,7 @@ def test_a_fault_of_the_program_is_raised():
 
 
 def test_a_text_may_be_read_no_further_than_its_first_line():
-    code = "from reference_sim.command.command_line import print_text; print_text('line\\n' * 1_000_000)"
+    code = "from reference_sim.command_line import print_text; print_text('line\\n' * 1_000_000)"
     with subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as writing:
