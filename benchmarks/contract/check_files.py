@@ -22,7 +22,7 @@ from benchmarks.plan.plan import Motions, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scene import Scene
@@ -113,8 +113,8 @@ def check_files(
     of_methods = dataclasses.replace(plan, cells=tuple(c for c in plan.cells if c.entry.declared_in))
     before = [t for t in Schedule(of_methods).tasks() if t.stage in ("ground truth", "training")]
     runner = Runner(before, Cache(run))
-    runner.run(LocalExecutor(run, assets, 1))
-    executor = LocalExecutor(run, assets, 1)
+    runner.run(Executor(run, assets, 1))
+    executor = Executor(run, assets, 1)
     try:
         hung = set[str]()
         for name, task in _tasks(declared, plan, schedule, seconds):
@@ -172,7 +172,7 @@ def _tasks(
         yield home, CheckMetrics(name=home, label=sheet.name, process=home, scene=sheet, home=home, **fields)
 
 
-def _check_one(name: str, task: Task, runner: Runner, executor: LocalExecutor) -> tuple[str, bool, bool]:
+def _check_one(name: str, task: Task, runner: Runner, executor: Executor) -> tuple[str, bool, bool]:
     """Return lines on an entry, whether it is fine, and whether its process had to be ended."""
     failed = next((runner.outcomes[id] for id in task.needs if runner.outcomes[id].failed), None)
     outcome = failed or executor.alone(task, {})

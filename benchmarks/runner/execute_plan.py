@@ -11,7 +11,7 @@ from benchmarks.process.errors import one_line
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.console import named, remarks, summary
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog, now
@@ -67,15 +67,15 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     return 0 if answer is not None and not (failed or broken) else 1
 
 
-def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> LocalExecutor:
+def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
     """Return the executor of the plan's tasks. Raises RunStopped where its cluster is gone."""
     if not plan.scheduler:
-        return LocalExecutor(folder, assets, plan.workers)
+        return Executor(folder, assets, plan.workers)
     from benchmarks.process.cluster_address import ClusterError
-    from benchmarks.runner.cluster_executor import ClusterExecutor
+    from benchmarks.runner.cluster import Cluster  # loads dask
 
     try:
-        return ClusterExecutor(folder, assets, plan.workers, plan.scheduler)
+        return Executor(folder, assets, plan.workers, Cluster(folder, assets, plan.scheduler))
     except ClusterError as error:
         raise RunStopped(str(error)) from None
 

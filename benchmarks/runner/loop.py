@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.cell import TaskId
 from benchmarks.runner.cache import Cache, Cached
-from benchmarks.runner.local_executor import Batch, LocalExecutor
+from benchmarks.runner.executor import Batch, Executor
 from benchmarks.tasks.task import Outcome, Task, failure
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Runner:
 
     # --- running -------------------------------------------------------------------------------------------
 
-    def run(self, executor: LocalExecutor, log: RunLog | None = None) -> None:
+    def run(self, executor: Executor, log: RunLog | None = None) -> None:
         """Do all tasks: the timed ones one by one, the others side by side before, between and after them.
 
         log: follows the stages.
@@ -72,7 +72,7 @@ class Runner:
         finally:
             executor.close()
 
-    def _side_by_side(self, tasks: Sequence[Task], later: Sequence[Task], executor: LocalExecutor) -> None:
+    def _side_by_side(self, tasks: Sequence[Task], later: Sequence[Task], executor: Executor) -> None:
         """Do tasks, each as soon as its needs have outcomes; a worker that would wait begins later ones."""
         for task in tasks:
             if self._is_ready([task]):
@@ -110,7 +110,7 @@ class Runner:
         ids = (id for task in batch for id in (*task.needs, *task.reads))
         return all(id in self.outcomes or id not in self.titles for id in ids)
 
-    def _alone(self, tasks: Sequence[Task], executor: LocalExecutor) -> None:
+    def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do timed tasks one by one; the next few begin together, each in its process."""
         begun: set[str] = set()  # processes
         with _bar(tasks, sum(task.expected_seconds for task in tasks), 1) as bar:

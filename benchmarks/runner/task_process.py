@@ -29,6 +29,7 @@ class TaskProcess:
 
     def __init__(self, begin: Callable[..., None], *arguments: Any) -> None:
         self._begin = (begin, *arguments)
+        self._batch = ""
         self._renew()
 
     def _renew(self) -> None:
@@ -37,16 +38,14 @@ class TaskProcess:
         self.process = IsolatedProcess(*self._begin, self.progress)
         self.warm: set[tuple[str, str]] = set()
 
-    def forget(self) -> None:
-        """Empty the memo, so that nothing of the batch before is there for the next."""
-        try:
-            if self.process.alive:
+    def do(self, task: Task, needed: Needed, batch: str) -> Outcome:
+        """Return the task's outcome; what it leaves in the memo is there for the next of its batch."""
+        if batch != self._batch and self.process.alive:
+            try:
                 self.process.call(forget, seconds=None)
-        except WorkerDied:
-            self._renew()
-
-    def do(self, task: Task, needed: Needed) -> Outcome:
-        """Return the task's outcome; what it leaves in the memo is there for the next."""
+            except WorkerDied:
+                self._renew()
+        self._batch = batch
         outcome = self._warm(task) or call(self.process, perform, task, needed, seconds=task.deadline)
         if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
             self.process.close()
@@ -62,6 +61,10 @@ class TaskProcess:
         if trouble is None:
             self.warm.add((task.kind, task.modules[0]))
         return trouble
+
+    def stop(self) -> None:
+        """End the process from another thread: the task that it is at has died."""
+        self.process.stop()
 
     def told(self) -> float:
         """Return the progress since the last call, in seconds that it was expected to take."""

@@ -204,7 +204,7 @@ def test_the_check_says_what_is_skipped_everywhere(tmp_path):
 @pytest.fixture
 def in_process(monkeypatch):
     monkeypatch.setattr(
-        "benchmarks.contract.check_files.LocalExecutor", lambda run, assets, workers: InProcess(run, assets)
+        "benchmarks.contract.check_files.Executor", lambda run, assets, workers: InProcess(run, assets)
     )
 
 

@@ -170,7 +170,7 @@ def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatc
         stopped = limited(100_000, "benchmarks.run", *arguments, str(folder.path), cwd=ROOT)
         status, errors = stopped.returncode, stopped.stderr
     else:
-        monkeypatch.setattr(execution, "LocalExecutor", in_process)
+        monkeypatch.setattr(execution, "Executor", in_process)
         with files_up_to(100_000):
             status = run.main([*arguments, str(folder.path)])
         errors = capsys.readouterr().err

@@ -20,8 +20,8 @@ from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.cluster_executor import ClusterExecutor
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.cluster import Cluster
+from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.tasks.task import Outcome, Task
 from tests.benchmarks.runner.tasks_by_hand import Bar
@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[3]
 PATH = str(ROOT)
 
 
-class Cluster:
+class Dask:
     """Processes of a scheduler and its workers. Each leads a session of its own."""
 
     def __init__(self, folder: Path, *, port: int = 0) -> None:
@@ -59,12 +59,11 @@ class Cluster:
             worker.wait(30)
         self.start_scheduler(int(self.address.rpartition(":")[2]))
 
-    def add(self, *options: str, **environment: str) -> subprocess.Popen:
-        """Start a worker of one thread."""
+    def add(self, *options: str) -> subprocess.Popen:
+        """Start a worker of one thread, without a nanny that starts another in its place."""
+        options = options or ("--no-nanny",)
         options = (self.address, "--nthreads", "1", "--local-directory", str(self.folder), *options)
-        self.workers.append(self._start(
-            "worker", *(options if "--nanny" in options else (*options, "--no-nanny")), **environment,
-        ))  # fmt: skip
+        self.workers.append(self._start("worker", *options))
         return self.workers[-1]
 
     def _start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen:
@@ -82,9 +81,9 @@ class Cluster:
 
 
 @contextmanager
-def cluster(folder: Path, workers: int) -> Iterator[Cluster]:
+def cluster(folder: Path, workers: int) -> Iterator[Dask]:
     """So many workers of one thread."""
-    started = Cluster(folder)
+    started = Dask(folder)
     try:
         for _ in range(workers):
             started.add()
@@ -155,30 +154,27 @@ def chain(**fields) -> list[Write]:
     ]
 
 
-def finish(folder: Path, executor: LocalExecutor, **fields) -> Runner:
+def executor(folder: RunFolder, address: str = "") -> Executor:
+    """Of a cluster, or without an address of two processes here."""
+    return Executor(folder, None, 2, Cluster(folder, None, address) if address else None)
+
+
+def finish(folder: Path, address: str = "", **fields) -> Runner:
     """The chain, run or reused; what has failed is tried again."""
     RunFolder(folder).remove_parts()
     cache = Cache(RunFolder(folder), only=(*DEFAULT_ONLY, "failed"), origin={"commit": "c", "hardware": "h"})
     runner = Runner(chain(**fields), cache)
-    runner.run(executor)
+    runner.run(executor(RunFolder(folder), address))
     return runner
 
 
-def main(folder: str, address: str, seconds: str, mark: str) -> None:
-    """The chain on a cluster, or without an address on two processes here."""
-    run = RunFolder(folder)
-    executor = ClusterExecutor(run, None, 1, address) if address else LocalExecutor(run, None, 2)
-    finish(Path(folder), executor, seconds=float(seconds), mark=mark)
-
-
 def together(folder: RunFolder, address: str, *batches, needed=None) -> dict[str, Outcome]:
-    executor = ClusterExecutor(folder, None, 1, address)
-    left = [(batch, needed or {}) for batch in reversed(batches)]
+    left, cluster = [(batch, needed or {}) for batch in reversed(batches)], executor(folder, address)
     try:
-        outcomes = executor.together(lambda: left.pop() if left else None, Bar())
+        outcomes = cluster.together(lambda: left.pop() if left else None, Bar())
         return {task.name: outcome for task, outcome in outcomes}
     finally:
-        executor.close()
+        cluster.close()
 
 
 def files(folder: Path) -> dict[str, str]:
@@ -211,7 +207,9 @@ def alive(pid: int) -> bool:
 
 def start_runner(folder: Path, address: str, *, seconds: float, mark: Path) -> subprocess.Popen:
     program = (
-        "import sys; from tests.benchmarks.runner import cluster_by_hand; cluster_by_hand.main(*sys.argv[1:])"
+        "import sys; from pathlib import Path; from tests.benchmarks.runner.cluster_by_hand import finish\n"
+        "folder, address, seconds, mark = sys.argv[1:]\n"
+        "finish(Path(folder), address, seconds=float(seconds), mark=mark)"
     )
     return subprocess.Popen(
         [sys.executable, "-c", program, str(folder), address, str(seconds), str(mark)],

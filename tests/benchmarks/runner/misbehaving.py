@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.method import Method
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.executor import Executor
 from reference_sim.trajectory.trajectory import Trajectory
 
 # No other test starts a process by this text, so that the test which looks for it finds its own alone.
@@ -105,11 +105,11 @@ def make(*, models: Path, seed: int, how: str) -> Misbehaving:
 
 def interrupt_at(method: str, monkeypatch) -> None:
     """Whoever runs cells is interrupted from the keyboard when that method's turn has come."""
-    alone = LocalExecutor.alone
+    alone = Executor.alone
 
     def interrupted(self, task, needed):
         if task.cell.method == method:
             raise KeyboardInterrupt
         return alone(self, task, needed)
 
-    monkeypatch.setattr(LocalExecutor, "alone", interrupted)
+    monkeypatch.setattr(Executor, "alone", interrupted)

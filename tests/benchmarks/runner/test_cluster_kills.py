@@ -6,19 +6,14 @@ import os
 import random
 import signal
 import subprocess
+import threading
 import time
 from contextlib import nullcontext, suppress
 
 import pytest
 
-pytest.importorskip("distributed")
-
-from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cluster_executor import ClusterExecutor
-from benchmarks.runner.local_executor import LocalExecutor
-from benchmarks.tasks.task import RunStopped
 from tests.benchmarks.runner.cluster_by_hand import (
-    Cluster,
+    Dask,
     alive,
     cluster,
     files,
@@ -30,10 +25,11 @@ from tests.benchmarks.runner.cluster_by_hand import (
     write,
 )
 
+distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.slow
 KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
 
 
-@pytest.mark.slow
 def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path):
     with cluster(tmp_path, 4) as four:
         batch = [write("deadly", how="die with the worker"), write("after")]
@@ -44,49 +40,71 @@ def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folde
     assert outcomes["after"].status == outcomes["beside"].status == "ok"
 
 
-@pytest.mark.slow
 def test_an_outcome_that_goes_with_its_worker_keeps_nobody_waiting(folder, tmp_path, monkeypatch):
     killed: list[float] = []
-    take = ClusterExecutor._take
+    take = distributed.Future.result
 
-    def taken(self, future):
+    def result(self):
         if not killed:
-            (address,) = self._client.nthreads()
+            until(self.done)
+            (address,) = self.client.nthreads()
             one.workers[0].kill()
             killed.append(time.monotonic())
             one.add()
-            until(lambda: address not in self._client.nthreads())
-        return take(self, future)
+            until(lambda: address not in self.client.nthreads())
+        return take(self)
 
-    monkeypatch.setattr(ClusterExecutor, "_take", taken)
+    monkeypatch.setattr(distributed.Future, "result", result)
     with cluster(tmp_path, 1) as one:
         assert together(folder, one.address, [write("one")])["one"].status == "ok"
         assert time.monotonic() - killed[0] < 55.0
 
 
-@pytest.mark.slow
-def test_workers_behind_a_nanny_need_a_setting_and_then_come_back(folder, tmp_path):
+def test_workers_behind_a_nanny_come_back(folder, tmp_path):
     with cluster(tmp_path, 0) as none:
         none.add("--nanny")
-        with pytest.raises(RunStopped, match="DASK_DISTRIBUTED__WORKER__DAEMON=False"):
-            together(folder, none.address, [write("one")])
-        none.workers[0].terminate()
-        none.workers[0].wait(30)
-        none.add("--nanny", DASK_DISTRIBUTED__WORKER__DAEMON="False")
-        outcomes = together(
-            folder, none.address, [write("deadly", how="die with the worker"), write("after")]
-        )
+        batch = [write("deadly", how="die with the worker"), write("after")]
+        outcomes = together(folder, none.address, batch)
     assert outcomes["deadly"].failed and outcomes["after"].status == "ok"
+
+
+def test_an_interrupt_ends_what_the_cluster_does_and_leaves_the_cluster(folder, tmp_path, request):
+    mark = tmp_path / "mark"
+
+    def interrupt():
+        until(lambda: len(lines(mark)) == 2)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+    threading.Thread(target=interrupt).start()
+    batches = [[write(f"{n}", seconds=60.0, mark=str(mark))] for n in range(4)]
+    with cluster(tmp_path, 2) as two:
+        with pytest.raises(KeyboardInterrupt):
+            together(folder, two.address, *batches)
+        until(lambda: not any(alive(task) for _, task in lines(mark)), 10.0)
+        assert len(lines(mark)) == 2 and not list(folder.path.rglob(".*"))
+        assert together(folder, two.address, [write("after")])["after"].status == "ok"
+
+
+def test_what_a_killed_runner_had_begun_is_ended(folder, tmp_path):
+    mark = tmp_path / "mark"
+    with cluster(tmp_path, 2) as two:
+        runner = start_runner(folder.path, two.address, seconds=60.0, mark=mark)
+        until(lambda: len(lines(mark)) == 2)
+        runner.kill()
+        runner.wait()
+        until(lambda: not any(alive(task) for _, task in lines(mark)), 10.0)
+        assert together(folder, two.address, [write("after")])["after"].status == "ok"
 
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("expected")
-    finish(folder, LocalExecutor(RunFolder(folder), None, 1))
+    finish(folder)
     return files(folder)
 
 
-@pytest.mark.slow
 def test_with_a_worker_killed_and_the_scheduler_restarted_the_files_are_the_same(folder, tmp_path, expected):
     with cluster(tmp_path, 2) as two:
         mark = tmp_path / "mark"
@@ -102,7 +120,6 @@ def test_with_a_worker_killed_and_the_scheduler_restarted_the_files_are_the_same
     assert files(folder.path) == expected
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("workers", [0, 2])
 def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
     """The runner, or a worker; here a task's process. What was finished is done no second time."""
@@ -125,15 +142,12 @@ def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expec
             if files(folder.path) == expected:  # begin again: there are kills left
                 for path in folder.path.rglob("*.json"):
                     path.unlink()
-        last = ClusterExecutor(folder, None, 1, address) if dask_cluster else LocalExecutor(folder, None, 2)
-        finish(folder.path, last)
+        finish(folder.path, address)
     assert files(folder.path) == expected
     until(lambda: not any(alive(task) for _, task in lines(mark)), 15.0)
 
 
-def kill_one(
-    chance: random.Random, dask_cluster: Cluster | None, runner: subprocess.Popen, task: int
-) -> None:
+def kill_one(chance: random.Random, dask_cluster: Dask | None, runner: subprocess.Popen, task: int) -> None:
     if chance.random() < 0.5:
         runner.kill()
         runner.wait()

@@ -15,7 +15,7 @@ from benchmarks.plan.plan import Motions, Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.task import Outcome, Task
@@ -54,7 +54,7 @@ def task(name: str, *, dies: bool = False, value: int = 0, **ties) -> Written:
 
 def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
     runner = Runner(tasks, Cache(RunFolder(folder), only=only))
-    runner.run(LocalExecutor(RunFolder(folder), None, 1))
+    runner.run(Executor(RunFolder(folder), None, 1))
     return runner
 
 

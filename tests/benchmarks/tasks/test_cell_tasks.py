@@ -22,7 +22,7 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.schedule import Schedule, tasks_of
@@ -64,7 +64,7 @@ def finish(plan: Plan, *stages: str) -> Runner:
     """All tasks of these stages, run or reused."""
     tasks = [task for task in tasks_of(plan) if task.stage in (stages or ("cells",))]
     runner = Runner(tasks, Cache(RunFolder(plan.folder), only=plan.only))
-    runner.run(LocalExecutor(RunFolder(plan.folder), None, 1))
+    runner.run(Executor(RunFolder(plan.folder), None, 1))
     return runner
 
 

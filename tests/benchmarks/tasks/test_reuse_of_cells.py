@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.dry_run import describe
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.executor import Executor
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.tasks.task import Outcome
 from tests.benchmarks.tasks.test_cell_tasks import (
@@ -82,13 +82,13 @@ def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
     names = ("simulation", "newton-1", "newton-4")
     preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
     plan = plan_of(tmp_path, *names, preset=preset, how="still")
-    order, alone = [], LocalExecutor.alone
+    order, alone = [], Executor.alone
 
     def watched(self, task, needed):
         order.append((task.kind, task.cell.method))
         return alone(self, task, needed)
 
-    monkeypatch.setattr(LocalExecutor, "alone", watched)
+    monkeypatch.setattr(Executor, "alone", watched)
     runner = finish(plan)
     repeats = [method for kind, method in order if kind == "repeat"]
     assert repeats[:3] == ["newton-1", "newton-4", "simulation"]
@@ -109,13 +109,13 @@ def test_a_process_ends_when_none_of_its_cells_repeats_will_come(tmp_path, monke
     plan = plan_of(tmp_path, "simulation", "newton-1", preset=preset)
     order = []
     for name in ("alone", "release"):
-        inner = getattr(LocalExecutor, name)
+        inner = getattr(Executor, name)
 
         def watched(self, first, *rest, name=name, inner=inner):
             order.append((name, getattr(first, "process", first)))
             return inner(self, first, *rest)
 
-        monkeypatch.setattr(LocalExecutor, name, watched)
+        monkeypatch.setattr(Executor, name, watched)
     finish(plan)
     names = [cell.name for cell in plan.cells]
     assert order[:2] == [("alone", names[0]), ("release", names[0])]

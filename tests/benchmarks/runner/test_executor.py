@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import task_process
-from benchmarks.runner.local_executor import LocalExecutor
+from benchmarks.runner.executor import Executor
 from benchmarks.tasks.task import Outcome, RunStopped, Task
 from tests.benchmarks.runner.tasks_by_hand import Bar
 from tests.project.own_memory import needs_proc, own_memory
@@ -72,7 +72,7 @@ def add(name: str, **fields) -> Add:
 def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Bar]:
     bar = Bar()
     left = [(batch, {}) for batch in reversed(batches)]
-    executor = LocalExecutor(RunFolder(folder), None, workers)
+    executor = Executor(RunFolder(folder), None, workers)
     done = executor.together(lambda: left.pop() if left else None, bar)
     return {task.name: outcome for task, outcome in done}, bar
 
@@ -111,11 +111,41 @@ def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
 
 def test_what_was_finished_is_kept_where_the_run_stops(tmp_path):
     batches = [([add("one"), add("stops", how="stop"), add("after")], {})]
-    executor, kept = LocalExecutor(RunFolder(tmp_path), None, 1), []
+    executor, kept = Executor(RunFolder(tmp_path), None, 1), []
     with pytest.raises(RunStopped, match="the disk is full"):
         for task, _ in executor.together(lambda: batches.pop() if batches else None, Bar()):
             kept.append(task.name)
     assert kept == ["one"]
+
+
+def test_a_worker_has_its_next_batch_before_outcomes_of_others_are_kept(tmp_path):
+    """The one thread that keeps outcomes holds up no worker: of many, all would wait for it."""
+    left, handed_out = [([add(name)], {}) for name in "dcba"], []
+
+    class Instant:
+        slots = 2
+
+        def worker(self):
+            return self
+
+        def do(self, task, needed, batch):
+            return Outcome()
+
+        def told(self):
+            return 0.0
+
+        def dismiss(self):
+            pass
+
+    def ready():
+        if left:
+            handed_out.append(left[-1][0][0].name)
+        return left.pop() if left else None
+
+    executor = Executor(RunFolder(tmp_path), None, 1, Instant())
+    for number, _ in enumerate(executor.together(ready, Bar()), 1):
+        time.sleep(0.05)  # until those at work have ended
+        assert len(handed_out) >= min(number + 1, 4)
 
 
 @needs_proc
@@ -133,7 +163,7 @@ def test_what_hangs_in_a_batch_costs_the_others_nothing(tmp_path):
 
 
 def test_a_named_process_is_kept_until_it_is_released(tmp_path):
-    alone = LocalExecutor(RunFolder(tmp_path), None, 1)
+    alone = Executor(RunFolder(tmp_path), None, 1)
     try:
         first, second = (add(name, process="own") for name in ("first", "second"))
         assert alone.alone(first, {}).result["memo"] == ["first"]
@@ -145,7 +175,7 @@ def test_a_named_process_is_kept_until_it_is_released(tmp_path):
 
 
 def test_timed_tasks_begin_side_by_side_and_what_goes_wrong_there_is_their_outcome(tmp_path):
-    two = LocalExecutor(RunFolder(tmp_path), None, 2)
+    two = Executor(RunFolder(tmp_path), None, 2)
     tasks = [
         add("one", process="a"), add("other", process="b"),
         add("dies", process="c", how="die at once"), add("raises", process="d", how="raise", terms=(1, "x")),

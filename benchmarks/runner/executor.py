@@ -1,16 +1,16 @@
-"""Executor of tasks on this machine. cluster_executor extends it.
+"""Executor of tasks: untimed ones side by side on a back end, timed ones alone in processes of this machine.
 
 A task that raises, exceeds a deadline of its own, or whose process dies is an outcome, not an end of the run.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import queue
 import threading
-from collections.abc import Callable, Collection, Iterator, Sequence
+import uuid
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from benchmarks.assets.assets import Assets
 from benchmarks.process.isolated_process import IsolatedProcess
@@ -22,30 +22,83 @@ if TYPE_CHECKING:
     from tqdm import tqdm
 
 POLL = 0.2  # [s] between looks at the progress
+MOST = 4096  # threads of this process, each of which waits for a worker
 
 Batch = tuple[Sequence[Task], Needed]
 Done = tuple[Task, Outcome]
 Ready = Callable[[], Batch | None]
 
 
-class LocalExecutor:
-    """Executes tasks whose needs are there, in single-threaded processes of this machine.
+class Worker(Protocol):
+    """Does one untimed task after another; what a task leaves in the memo is there for its batch alone."""
 
-    At most `workers` are at work side by side; outcomes come in any order.
-    Workers stay for the next batch, which then loads and compiles nothing again; none is there beside a timed
-    task.
+    def do(self, task: Task, needed: Needed, batch: str) -> Outcome:
+        """Return the outcome of a task, however it ends."""
+
+    def told(self) -> float:
+        """Return the progress since the last call, in seconds that it was expected to take."""
+
+    def stop(self) -> None:
+        """End the task from another thread: `do` comes back."""
+
+
+class BackEnd(Protocol):
+    """Where untimed tasks are done: by processes of this machine, or by a cluster."""
+
+    @property
+    def slots(self) -> int:
+        """Number of tasks that are done at once."""
+
+    def worker(self) -> Worker:
+        """Return a further worker."""
+
+    def dismiss(self) -> None:
+        """End all processes; others begin where they are needed."""
+
+    def close(self) -> None:
+        """End everything that was begun."""
+
+
+class LocalProcesses:
+    """Single-threaded processes of this machine, of which `slots` are at work side by side."""
+
+    def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:
+        self._context, self.slots = Context(folder, assets), slots
+        self._processes: list[TaskProcess] = []
+
+    def worker(self) -> TaskProcess:
+        """Return a further process."""
+        self._processes.append(TaskProcess(begin_tasks, self._context))
+        return self._processes[-1]
+
+    def dismiss(self) -> None:
+        """End all processes."""
+        while self._processes:
+            self._processes.pop().process.close()
+
+    close = dismiss
+
+
+class Executor:
+    """Executes tasks whose needs are there; outcomes come in any order.
+
+    Workers stay for the next batch, which then loads and compiles nothing again; no process of them is there
+    beside a timed task.
     """
 
-    def __init__(self, folder: RunFolder, assets: Assets | None, workers: int) -> None:
+    def __init__(
+        self, folder: RunFolder, assets: Assets | None, workers: int, back_end: BackEnd | None = None
+    ) -> None:
         self.folder, self.assets, self.workers = folder, assets, workers
+        self.back_end = back_end or LocalProcesses(folder, assets, workers)
+        self._crew: list[Worker] = []
         self._named: dict[str, IsolatedProcess] = {}
         self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
-        self._crew: list[TaskProcess] = []
 
     @property
     def side_by_side(self) -> int:
         """The number of untimed tasks that are expected to be at work at once."""
-        return self.workers
+        return self.back_end.slots
 
     def together(self, ready: Ready, bar: tqdm) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
@@ -56,47 +109,49 @@ class LocalExecutor:
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
         stopped = threading.Event()
 
-        def do(worker: TaskProcess, batch: Batch) -> None:
-            worker.forget()
+        def do(worker: Worker, batch: Batch) -> None:
             tasks, needed = batch
+            key = uuid.uuid4().hex
             for task in tasks:
-                outcome = worker.do(task, dict(needed))
+                outcome = worker.do(task, dict(needed), key)
                 if stopped.is_set():  # the process was killed at it, and would be started for the next
                     return
                 finished.put((task, outcome))
 
-        at_work: dict[Future[None], TaskProcess] = {}
-        with ThreadPoolExecutor(self.workers) as threads:  # one waits for each worker
+        at_work: dict[Future[None], Worker] = {}
+        with ThreadPoolExecutor(MOST) as threads:  # one waits for each worker
             try:
                 while True:
-                    while len(at_work) < self.workers and (batch := ready()):
-                        worker = self._idle(at_work.values())
-                        at_work[threads.submit(do, worker, batch)] = worker
-                    if not at_work:
-                        break
-                    ended, _ = wait(at_work, timeout=POLL, return_when=FIRST_COMPLETED)
+                    ended = [future for future in at_work if future.done()]
                     for worker in at_work.values():
                         bar.update(min(worker.told(), bar.total - bar.n))
                     for future in ended:
-                        del at_work[future]
                         future.result()
-                    while not finished.empty():
+                        del at_work[future]
+                    while len(at_work) < self.back_end.slots and (batch := ready()):
+                        worker = self._idle(at_work.values())
+                        at_work[threads.submit(do, worker, batch)] = worker
+                    if not finished.empty():
                         yield finished.get()
+                    elif at_work:
+                        wait(at_work, timeout=POLL, return_when=FIRST_COMPLETED)
+                    else:
+                        break
             except BaseException as error:
                 stopped.set()
-                _end(set(at_work))
-                self._crew.clear()
+                _end(at_work)
+                self._dismiss()
                 if not isinstance(error, GeneratorExit):  # what was finished by then is kept
                     while not finished.empty():
                         yield finished.get()
                 raise
 
-    def _idle(self, at_work: Collection[TaskProcess]) -> TaskProcess:
+    def _idle(self, at_work: Collection[Worker]) -> Worker:
         """Return a worker that does nothing, a new one where all are at work."""
         for worker in self._crew:
             if worker not in at_work:
                 return worker
-        self._crew.append(TaskProcess(begin_tasks, Context(self.folder, self.assets)))
+        self._crew.append(self.back_end.worker())
         return self._crew[-1]
 
     def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
@@ -115,7 +170,7 @@ class LocalExecutor:
             try:
                 self._troubles |= {name: died for name, future in begun.items() if (died := future.result())}
             except BaseException:
-                _end(set(begun.values()))
+                _end({future: self._named[name] for name, future in begun.items()})
                 raise
 
     def alone(self, task: Task, needed: Needed) -> Outcome:
@@ -140,18 +195,19 @@ class LocalExecutor:
     def close(self) -> None:
         """End all processes."""
         self._dismiss()
+        self.back_end.close()
         for name in list(self._named):
             self.release(name)
 
     def _dismiss(self) -> None:
-        while self._crew:
-            self._crew.pop().process.close()
+        self._crew.clear()
+        self.back_end.dismiss()
 
 
-def _end(futures: set[Future[Any]]) -> None:
+def _end(at_work: Mapping[Future[Any], Worker | IsolatedProcess]) -> None:
     """Begin no other batch, and end the workers until none is left that a thread waits for."""
-    left = {future for future in futures if not future.cancel()}
+    left = {future for future in at_work if not future.cancel()}
     while left:
-        for child in multiprocessing.active_children():
-            child.kill()
+        for future in left:
+            at_work[future].stop()
         _, left = wait(left, timeout=POLL)
