@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from benchmarks.scene import BuiltScene, Dressed, Scene
     from benchmarks.training import Training
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
 
 
 class Method:

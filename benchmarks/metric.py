@@ -37,7 +37,7 @@ from benchmarks.results.row import USABLE
 if TYPE_CHECKING:
     from benchmarks.method import MethodEntry
     from benchmarks.scene import BuiltScene
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
 
 Made = TypeVar("Made")
 NUMBERS_OF = ("answer", "method", "machine")

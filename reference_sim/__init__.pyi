@@ -7,9 +7,8 @@ from .minimise.result import Result as Result
 from .obstacle import Obstacle as Obstacle
 from .potential import Potential as Potential
 from .time_loop import simulate as simulate
-from .trajectory.trajectory import Trajectory as Trajectory
-from .trajectory.trajectory import TrajectoryError as TrajectoryError
-from .trajectory.writer import TrajectoryWriter as TrajectoryWriter
+from .trajectory import Trajectory as Trajectory
+from .trajectory import TrajectoryError as TrajectoryError
 
 __all__ = [
     "GRAVITY",
@@ -21,7 +20,6 @@ __all__ = [
     "Result",
     "Trajectory",
     "TrajectoryError",
-    "TrajectoryWriter",
     "minimise",
     "simulate",
 ]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from reference_sim.cloth import Cloth
     from reference_sim.energies.energy import Energy
     from reference_sim.obstacle import Obstacle
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
 
 PROGRAM = "simulate"
 DONE, NOT_CONVERGED = 0, 1  # exit status
@@ -35,7 +35,7 @@ EXAMPLES = """examples:
   python -m reference_sim.simulate skirt.obj --pins top --self-contact --material silk.toml -o skirt.vtkhdf
 
 The output is in metres with y up, whatever the input was in. ParaView opens it as it is; for Blender see
-reference_sim.trajectory.write_point_cache.
+reference_sim.point_cache.write_point_cache.
 Exit status: 0 all frames converged, 1 some frame did not, 2 bad input (nothing is written)."""
 _PENALTY, _BARRIER = "ContactPenalty(cloth, stiffness=, margin=, samples=)", "ContactBarrier(cloth, ...)"
 REPLACED = {
@@ -120,7 +120,7 @@ def _count(text: str) -> int:
     return int(text)
 
 
-@command(PROGRAM, goes_on="finished frames, if any, are in the output")
+@command(PROGRAM, goes_on="the output has the frames of the last save, a minute ago at most")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with these arguments; return the exit status."""
     options = make_parser().parse_args(arguments)
@@ -160,7 +160,7 @@ def simulate_files(options: argparse.Namespace) -> int:
 
 def _check_options(options: argparse.Namespace) -> None:
     """Refuse what could not be written, or has no meaning, before any work."""
-    from reference_sim.trajectory.trajectory import TRAJECTORY_SUFFIXES
+    from reference_sim.trajectory import TRAJECTORY_SUFFIXES
 
     path = options.output
     if path.suffix.lower() not in TRAJECTORY_SUFFIXES:
@@ -253,7 +253,7 @@ def read_obstacle(cloth: Cloth, options: argparse.Namespace) -> tuple[Obstacle |
     from reference_sim.cloth import MeshError
     from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
     from reference_sim.obstacle import Obstacle  # its search for contact serves no cloth that meets nothing
-    from reference_sim.trajectory.trajectory import TRAJECTORY_SUFFIXES, Trajectory
+    from reference_sim.trajectory import TRAJECTORY_SUFFIXES, Trajectory
 
     axes = {"units": options.units, "up": options.up}
     dt = None

@@ -4,13 +4,14 @@
 
 (SNUG, eq. 4; Martin et al. 2011; Gast et al. 2015). The velocity of the next step is (x_{t+1} - x_t) / dt.
 With sub-steps a stored frame is n such steps of dt / n, pins and obstacle moving linearly in between.
-time_step.py takes one frame; here frames are counted, timed, recorded and resumed.
+time_step.py takes one frame; here frames are counted, timed and recorded.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,15 +20,16 @@ import numpy as np
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.fingerprint import fingerprint
-from reference_sim.minimise.result import Result
+from reference_sim.minimise.result import Result, severity
 from reference_sim.progress import progress_bar
 from reference_sim.time_step import FirstGuess, State, TimeStepper
-from reference_sim.trajectory.recorder import Recorder
-from reference_sim.trajectory.resume import recover
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
+
+BETWEEN_SAVES = 60.0  # [s]
+UNFINISHED = "unfinished", "the run that wrote this did not end"  # status and reason
 
 
 def simulate(
@@ -45,7 +47,6 @@ def simulate(
     substeps: int = 1,
     refreeze: int = 0,
     path: str | Path | None = None,
-    resume: bool = False,
     progress: str | None = None,
     **options: Any,
 ) -> Trajectory:
@@ -63,21 +64,17 @@ def simulate(
         guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
             along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated");
             or a function of the step's number, 1 for the first of a run, and its start (V, 3) [m] that
-            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there. A
-            step may be asked for twice, where a start is checked or a run is resumed, so its answer should
-            depend on its arguments alone; a resumed run knows the function by its name.
+            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there. The
+            first step is asked for twice where a start is checked, so the answer should depend on the
+            arguments alone.
         quasi_static: set the velocity to zero after every step, sub-steps included; for settling.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
         refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
             ended, and the step solved again from there. A step in which a barrier stopped the obstacle on its
-            way is not solved again. Such a run cannot be resumed.
-        path: write the VTKHDF file there, frame by frame.
-        resume: go on after the last whole frame of `path`, where a run with the same arguments left it (more
-            frames may be asked for); without such a file start at the beginning. The same bits come out as
-            without the interruption, but for what a minimiser has learned in earlier steps: CompiledLBFGS
-            begins with another length of its first step, and after pairs that came and went, a barrier's,
-            Newton's method sums in another order.
+            way is not solved again.
+        path: write the VTKHDF file there: at the end, also of a run that an exception ends, and with the
+            frames so far and status "unfinished" about once a minute.
         progress: label of a progress bar with time left; None for silence.
         options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
             that makes one of a potential and the other options), tolerance, max_iterations, timeout [s] of
@@ -94,9 +91,9 @@ def simulate(
 
     Raises:
         ValueError: unknown guess, wrong shapes (of a guess too), fewer than 1 frame or sub-step, a step of no
-            size, a tolerance that is no number above 0, refreeze with resume, a function as method beside a
-            term that joins a step late (self-contact alone), which Newton's method ends.
-        TrajectoryError: `path` cannot be resumed: unreadable, or made by another run.
+            size, a tolerance that is no number above 0, a function as method beside a term that joins a step
+            late (self-contact alone), which Newton's method ends.
+        OSError: no room for the file, or no such folder.
 
     Example: a triangle that one corner holds falls by g dt^2 in the first step.
 
@@ -124,7 +121,7 @@ def simulate(
     )
     return simulate_with(
         stepper, frames=frames, start=start, velocity=velocity, pin_positions=pin_positions, path=path,
-        resume=resume, progress=progress,
+        progress=progress,
     )  # fmt: skip
 
 
@@ -136,7 +133,6 @@ def simulate_with(
     velocity: np.ndarray | None = None,
     pin_positions: Callable[[int], np.ndarray] | None = None,
     path: str | Path | None = None,
-    resume: bool = False,
     progress: str | None = None,
 ) -> Trajectory:
     """Simulate with a stepper that is set up, which `simulate` makes anew for each run.
@@ -148,33 +144,26 @@ def simulate_with(
         velocity: (V, 3) [m/s] at frame 0; default zero.
         pin_positions: frame -> (P, 3) [m], for handles that move.
         path: of the VTKHDF file.
-        resume: whether to go on after the last whole frame of `path`.
         progress: label of a progress bar.
 
     Raises:
-        ValueError: wrong shapes, fewer than 1 frame, refreeze with resume.
-        TrajectoryError: `path` cannot be resumed.
+        ValueError: wrong shapes, fewer than 1 frame.
+        OSError: no room for the file, or no such folder.
     """
     cloth = stepper.cloth
     if frames < 1:
         raise ValueError(f"simulate: frames = {frames}: must be at least 1")
-    if stepper.refreeze and resume:
-        raise ValueError("simulate: a run with refreeze cannot be resumed: start it again without resume")
     x = _checked(start, cloth.rest_positions, "start")
     v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
-    provenance = stepper.provenance() | {"start": fingerprint(x, v)}
-    earlier = recover(path, provenance, frames=frames) if resume and path else None
-    if earlier and earlier.complete(frames):
-        return earlier.trajectory
-    if earlier is None:
-        stepper.check_start(x, v)
-    state = State(x, v) if earlier is None else stepper.resumed(earlier, v, pin_positions)
-    with Recorder(cloth, provenance, path) as record:
-        if earlier is None:
-            record.start(x, _fields_of_start(stepper.potential.energies))
-        else:
-            record.replay(earlier)
-        for frame in _with_bar(range(record.frames, frames), progress):
+    record = _Record(cloth, stepper.provenance() | {"start": fingerprint(x, v)})
+    stepper.check_start(x, v)
+    state = State(x, v)
+    record.add(x, 0.0, 0.0, _fields_of_start(stepper.potential.energies))
+    if path:  # what cannot be written is to be known before the work
+        record.trajectory(*UNFINISHED).save(path)
+    saved, ended = time.monotonic(), False
+    try:
+        for frame in _with_bar(range(1, frames), progress):
             clock = time.perf_counter()
             after, results = stepper.advance(frame, state, pin_positions and pin_positions(frame))
             seconds = time.perf_counter() - clock
@@ -182,8 +171,61 @@ def simulate_with(
             if after is None:
                 break
             state = after
-            record.add(state.x, frame * stepper.frame_dt, seconds, _fields(results), state.before)
+            record.add(state.x, frame * stepper.frame_dt, seconds, _fields(results))
+            if path and time.monotonic() - saved > BETWEEN_SAVES:
+                record.trajectory(*UNFINISHED).save(path)
+                saved = time.monotonic()
+        ended = True
+    finally:
+        if path:
+            record.trajectory(*(() if ended else UNFINISHED)).save(path)
     return record.trajectory()
+
+
+@dataclass
+class _Record:
+    """Frames of one simulation so far, and the status of the whole."""
+
+    cloth: Cloth
+    provenance: dict[str, Any]
+    positions: list[np.ndarray] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    fields: list[dict[str, float]] = field(default_factory=list)
+    status: str = "converged"
+    reason: str = ""
+
+    def note(self, frame: int, results: Sequence[Result]) -> None:
+        """Take the status of the whole from the minimisations on the way to `frame`.
+
+        The worst counts, and of equally bad ones the first: a solver that is stopped early gives up in frame
+        1, which must not hide a later divergence. Until one did not converge, the reason is that of the first
+        that converged within round-off alone.
+        """
+        for result in results:
+            worse = severity(result.status) > severity(self.status)
+            if worse or (result.relaxed and not self.reason):
+                self.status, self.reason = result.status, f"frame {frame}: {result.reason}"
+
+    def add(self, x: np.ndarray, time: float, seconds: float, fields: dict[str, float]) -> None:
+        """Add a frame: positions (V, 3) [m], its time [s], [s] on the clock, further numbers."""
+        self.positions.append(x)
+        self.times.append(time)
+        self.seconds.append(seconds)
+        self.fields.append(fields)
+
+    def trajectory(self, status: str = "", reason: str = "") -> Trajectory:
+        """Return all frames so far, by default with their own status."""
+        return Trajectory(
+            positions=np.array(self.positions),
+            faces=self.cloth.faces,
+            times=np.array(self.times),
+            frame_seconds=np.array(self.seconds),
+            status=status or self.status,
+            reason=reason or self.reason,
+            provenance=self.provenance,
+            frame_fields={k: np.array([f[k] for f in self.fields]) for k in self.fields[0]},
+        )
 
 
 def _fields_of_start(energies: Sequence[Energy]) -> dict[str, float]:

@@ -16,8 +16,6 @@ from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 from reference_sim.step_minimiser import StepMinimiser
-from reference_sim.trajectory.resume import PartialRun
-from reference_sim.trajectory.trajectory import TrajectoryError
 
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
 LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
 GUESSES = ("previous", "extrapolated", "body_transported")
 # First guess (V, 3) [m] of the end of a step, from its number, 1 for the first, and its start (V, 3) [m]. The
-# first step is asked for again where a start is checked, and the last one when a run is resumed.
+# first step is asked for again where a start is checked.
 FirstGuess = Callable[[int, np.ndarray], np.ndarray]
 
 
@@ -36,12 +34,10 @@ class State:
     Attributes:
         x: (V, 3) [m].
         v: (V, 3) [m/s].
-        before: (2, V, 3) both one step earlier, where a resumed run needs them stored.
     """
 
     x: np.ndarray
     v: np.ndarray
-    before: np.ndarray | None = None
 
 
 class TimeStepper:
@@ -146,9 +142,8 @@ class TimeStepper:
             y = results[-1].positions
             if results[-1].status == "diverged" or not np.isfinite(y).all():
                 return None, results
-            before = np.stack([x, v])
             x, v = y, self.velocity(y, x)
-        return State(x, v, before if self.substeps > 1 else None), results
+        return State(x, v), results
 
     def velocity(self, x: np.ndarray, before: np.ndarray) -> np.ndarray:
         """Return the velocity (V, 3) [m/s] that a step from `before` to x (V, 3) [m] ends with."""
@@ -179,41 +174,10 @@ class TimeStepper:
         """Freeze every term for the step from x with velocity v (V, 3), as it is at the guess (V, 3)."""
         self.potential.prepare(Step(x, v, guess, self.dt, self.obstacle, step))
 
-    def resumed(
-        self, earlier: PartialRun, v0: np.ndarray, pin_positions: Callable[[int], np.ndarray] | None
-    ) -> State:
-        """Return the state at the last frame of an earlier run that began with velocity v0 (V, 3).
-
-        Raises:
-            TrajectoryError: the pins are elsewhere, or what the next step needs is not in the file.
-        """
-        positions, before = earlier.trajectory.positions, earlier.before
-        last = len(positions) - 1
-        x = positions[last]
-        if last == 0:
-            return State(x, v0)
-        if self.substeps == 1:
-            v = v0 if last == 1 else self.velocity(positions[last - 1], positions[last - 2])
-            before = np.stack([positions[last - 1], v])
-        pins = self.cloth.pins
-        if pin_positions is not None and not np.array_equal(pin_positions(last), x[pins]):
-            raise TrajectoryError(f"simulate: pins at frame {last} are not where the earlier run had them")
-        if self.potential.impassable and not earlier.trajectory.frame_fields["converged"][last]:
-            raise TrajectoryError(
-                f"simulate: at frame {last} the obstacle may have stopped on its way, no file says where: "
-                "start again"
-            )
-        if before is None:
-            raise TrajectoryError(f"simulate: the sub-step before frame {last} is lost: start again")
-        # Terms may remember the step before, and an obstacle what it was asked about.
-        self.prepare(last * self.substeps, before[0], before[1], x[pins])
-        return State(x, self.velocity(x, before[0]), before if self.substeps > 1 else None)
-
     def provenance(self) -> dict[str, Any]:
-        """Return JSON values of everything that decides the result: a resumed run must have the same."""
+        """Return JSON values of everything that decides the result."""
         cloth, obstacle, minimiser = self.cloth, self.obstacle, self.minimiser
-        # The options have "newton" by default as well as by request, but L-BFGS opens a step by default. Runs
-        # without an opening have no such key: they can go on with the files of earlier versions.
+        # The options have "newton" by default as well as by request, but L-BFGS opens a step by default.
         opening = {"opening": minimiser.opening_method} if minimiser.opening_method else {}
         return {
             "method": "backward Euler",

@@ -13,7 +13,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
 
 EXAMPLES = """examples:
   python -m reports.export reports/runs/NAME --scene tshirt/kick --method snug -o kick.usdc
@@ -118,7 +118,7 @@ def demand_writable(path: Path) -> None:
 def write(path: Path, meshes: Meshes) -> None:
     """Write the meshes, each whole or not at all. Raises OSError."""
     from reference_sim.files.atomic_files import new_folder, replacing
-    from reference_sim.trajectory.point_cache import write_obj, write_point_cache
+    from reference_sim.point_cache import write_obj, write_point_cache
 
     if path.suffix in ARCHIVES:
         with replacing(path) as temporary:

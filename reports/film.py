@@ -19,7 +19,7 @@ from reference_sim.files.atomic_files import demand_writable_folder, replacing
 from reports.pictures.render import camera_axes
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
     from reports.run.selected_roll_outs import SelectedRollOuts
 
 EXAMPLES = """examples:

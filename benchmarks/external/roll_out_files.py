@@ -194,7 +194,7 @@ def _pickle(path: str) -> dict[str, Any]:
 
 
 def _point_cache(path: str) -> dict[str, Any]:
-    from reference_sim.trajectory.point_cache import read_point_cache
+    from reference_sim.point_cache import read_point_cache
 
     mesh = Path(path).with_suffix(".obj")
     positions = read_point_cache(path)
@@ -207,7 +207,7 @@ def _meshes(path: str) -> dict[str, Any]:
 
 
 def _trajectory(path: str) -> dict[str, Any]:
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
 
     trajectory = Trajectory.load(path, guarded=True)
     claims = trajectory.frame_fields.get("converged")

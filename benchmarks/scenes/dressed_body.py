@@ -22,7 +22,7 @@ from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.obstacle import Obstacle
 from reference_sim.time_loop import simulate
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug.garments.garment import Garment
 from snug.motion.motion import Motion, transition
 

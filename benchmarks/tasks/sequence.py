@@ -19,7 +19,7 @@ class SimulateSequence(SimulateMotion):
 
     def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
         """Simulate the motion and write what networks learn from beside it."""
-        from reference_sim.trajectory.trajectory import Trajectory
+        from reference_sim.trajectory import Trajectory
         from snug.training.simulated_data import write_motion, write_vertices
 
         outcome, folder, assets = super().run(context, needed), context.folder, context.assets

@@ -97,7 +97,7 @@ class TrainNetwork(Task):
         """Train the network and write its model."""
         import torch
 
-        from reference_sim.trajectory.trajectory import Trajectory
+        from reference_sim.trajectory import Trajectory
         from snug.networks.dressed_body import DressedBody
         from snug.training.checkpoint import Checkpoint
         from snug.training.train_network import train_network, untrained_model

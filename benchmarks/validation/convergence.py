@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from reference_sim.minimise.result import Result
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 Solved = TypeVar("Solved", Result, Trajectory)
 

@@ -41,7 +41,7 @@ RUNS = {
 }
 PLACES = {
     "trainings": ("benchmarks.methods.catalogue.trainings:TRAININGS",),
-    "trajectory": ("reference_sim.trajectory.trajectory:Trajectory",),
+    "trajectory": ("reference_sim.trajectory:Trajectory",),
     "template": ("snug.garments.templates:find_template",),
     "motion": ("snug.motion.library:make_motion",),
     "kept": ("tests.snug.training.test_kept_energies:trained",),

@@ -76,7 +76,7 @@ class Collisions:
         """Begin a step in which an obstacle (faces (Fb, 3)) moves from before to after (B, 3) [m].
 
         It is put at the end. Nothing is kept from the step before but the mesh of a cloth alone, so that sums
-        over pairs have one order, whatever was asked earlier: energies of a resumed run have the same bits.
+        over pairs have one order, whatever was asked earlier.
         """
         if len(faces) or len(self._obstacle_faces):
             self._near = None

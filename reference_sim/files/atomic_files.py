@@ -85,36 +85,3 @@ def disk_full(error: BaseException) -> str:
     free = shutil.disk_usage(folder).free / 1e6
     name = error.filename or "a file"
     return f"{name}: {error.strerror} ({free:.3g} MB are free there); what was finished is kept"
-
-
-def create(path: Path) -> None:
-    """Create an empty file in place of what lies there; a link is removed, not followed.
-
-    Raises:
-        OSError: it cannot be made; or another program made one in this moment.
-    """
-    path.unlink(missing_ok=True)
-    path.open("xb").close()
-
-
-def reserve(path: Path, size: int) -> None:
-    """Have the file system set room aside for a file to grow to `size` bytes; it then has that size.
-
-    For libraries in C that crash where they find no room. Where the system cannot promise room, the room that
-    is free is compared.
-
-    Raises:
-        OSError: no room; it names the file.
-    """
-    present = path.stat().st_size
-    if size <= present:
-        return
-    if not hasattr(os, "posix_fallocate"):
-        if shutil.disk_usage(path.parent).free < size - present:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-        return
-    with path.open("rb+") as file:
-        try:
-            os.posix_fallocate(file.fileno(), present, size - present)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(path)) from None

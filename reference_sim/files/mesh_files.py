@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import glob
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, Polygon, read_parts, try_poly_data
+from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, Polygon, read_parts
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
@@ -53,18 +53,26 @@ def read_mesh(path: str | Path) -> Surface:
             a vertex that is not finite; the message names the file.
 
     >>> import tempfile
-    >>> from reference_sim.trajectory.point_cache import write_obj
+    >>> from reference_sim.point_cache import write_obj
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_obj(Path(folder, "a.obj"), np.eye(3), np.array([[0, 1, 2]]))
     ...     read_mesh(f"{folder}/a.obj").faces
     array([[0, 1, 2]])
     """
-    path = Path(path)
-    if not path.is_file():
-        raise MeshError(f"{path}: no such file")
-    if path.suffix.lower() not in MESH_SUFFIXES:
-        raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
-    parts = read_parts(path)
+    return next(_read([Path(path)]))
+
+
+def _read(paths: Sequence[Path]) -> Iterator[Surface]:
+    for path in paths:
+        if not path.is_file():
+            raise MeshError(f"{path}: no such file")
+        if path.suffix.lower() not in MESH_SUFFIXES:
+            raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
+    yield from map(_surface, paths, read_parts(paths))
+
+
+def _surface(path: Path, parts: Parts) -> Surface:
+    """Check the contents of a file, and cut its quads into triangles."""
     positions, polygons = np.asarray(parts.points, dtype=np.float64), parts.polygons
     if not polygons:
         raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
@@ -84,9 +92,8 @@ def read_mesh(path: str | Path) -> Surface:
     bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
     if bad.size:
         raise MeshError(f"{path}: triangle {bad[0]} names a vertex beyond the {len(positions)} there are")
-    return Surface(
-        positions, faces, int((corners == 4).sum()), _corner_uv(path, parts, faces), parts.vertex_data
-    )
+    uv = _corner_uv(path, parts, faces)
+    return Surface(positions, faces, int((corners == 4).sum()), uv, parts.vertex_data)
 
 
 def _halved(polygons: Sequence[Polygon]) -> list[tuple[int, int, int]]:
@@ -136,7 +143,7 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
         MeshError: as `read_mesh`; no files; vertices or faces that do not correspond to the first file's.
 
     >>> import tempfile
-    >>> from reference_sim.trajectory.point_cache import write_obj
+    >>> from reference_sim.point_cache import write_obj
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     for frame in range(2):
     ...         write_obj(Path(folder, f"{frame}.obj"), np.eye(3) + frame, np.array([[0, 1, 2]]))
@@ -144,19 +151,17 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     >>> positions.shape
     (2, 3, 3)
     """
-    paths = mesh_paths(str(pattern))
-    if paths[1:] and paths[0].suffix.lower() in (".vtk", ".vtp"):
-        try_poly_data(*paths)  # all in one process, for one takes a second to start
-    first = read_mesh(paths[0])
+    paths = _paths(str(pattern))
+    surfaces = _read(paths)
+    first = next(surfaces)
     frames = [first.positions]
-    for path in paths[1:]:
-        surface = read_mesh(path)
+    for path, surface in zip(paths[1:], surfaces, strict=True):
         _check_corresponds(path, surface, paths[0], first)
         frames.append(surface.positions)
     return np.stack(frames), first
 
 
-def mesh_paths(pattern: str) -> list[Path]:
+def _paths(pattern: str) -> list[Path]:
     """Return the files that `read_sequence` reads, in its order.
 
     Raises:

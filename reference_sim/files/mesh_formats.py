@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
+import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,23 @@ from typing import Any
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.mesh_header import check_header
+from reference_sim.files.array_file import MOST_PACKED
 from reference_sim.files.trial import try_out
 
 UV_OF_VTK = "UV"  # what the texture coordinates of a VTK file are called here
-
+EXPORT_AGAIN = "export it again, as OBJ or PLY"
+SECTIONS = (
+    b"POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA|"
+    rb"DIMENSIONS|[XYZ]_COORDINATES|FIELD\s+\S+|LOOKUP_TABLE\s+\S+|COLOR_SCALARS\s+\S+"
+)
+# Suffix -> where a header has numbers of elements, and how many may lie in a byte.
+COUNTS = {
+    ".ply": (rb"^[ \t]*element[ \t]+\w+((?:[ \t]+\d+)+)", 1),
+    ".off": (rb"^[ \t]*(\d+[ \t]+\d+[ \t]+\d+)[ \t]*$", 1),
+    ".vtk": (rb"^[ \t]*(?:" + SECTIONS + rb")((?:[ \t]+\d+)+)", 1),
+    ".vtp": (rb"NumberOf\w+\s*=\s*[\"']\s*(\d+)", MOST_PACKED),
+    ".vtu": (rb"NumberOf\w+\s*=\s*[\"']\s*(\d+)", MOST_PACKED),
+}
 
 Polygon = Sequence[int] | np.ndarray  # indices of its corners
 
@@ -43,13 +56,32 @@ class Parts:
     vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
-def read_parts(path: Path) -> Parts:
-    """Read everything of a file that exists.
+def read_parts(paths: Sequence[Path]) -> Iterator[Parts]:
+    """Read everything of files that exist, one after the other.
+
+    meshio does not know the PolyData of VTK. VTK does, and may crash: a process of its own tries all files
+    first, for it takes a second to start.
 
     Raises:
         MeshError: not understood; the message names the file.
     """
-    return _read_obj(path) if path.suffix.lower() == ".obj" else _read_with_meshio(path)
+    tried = False
+    for path in paths:
+        if path.suffix.lower() == ".obj":
+            yield _read_obj(path)
+            continue
+        _check_header(path)
+        try:
+            yield _read_with_meshio(path)
+        except MeshError:
+            if path.suffix.lower() not in (".vtk", ".vtp"):
+                raise
+            tried = tried or not try_out(read_poly_data, *paths)
+            if not (tried or (paths[1:] and not try_out(read_poly_data, path))):
+                raise
+            if (parts := _poly_data(path)) is None:
+                raise
+            yield parts
 
 
 def _read_obj(path: Path) -> Parts:
@@ -93,11 +125,35 @@ def _counted(text: str, count: int) -> int:
     return number - 1 if number > 0 else count + number
 
 
+def _check_header(path: Path) -> None:
+    """Refuse a file shorter than its header says, and a PLY or OFF file without a header.
+
+    meshio reads a header that does not end for ever; meshio and VTK make room for as many vertices as a file
+    claims, and look for all of them.
+
+    Raises:
+        MeshError: the message names file and line.
+    """
+    kind = path.suffix.lower()
+    if kind not in COUNTS:
+        return
+    (pattern, dense), data = COUNTS[kind], path.read_bytes()
+    end = re.search(rb"^\s*end_header\s*$", data, re.MULTILINE) if kind == ".ply" else None  # in no comment
+    head = data[: end.start()] if end else data
+    lines = list(re.finditer(pattern, head, re.MULTILINE | re.IGNORECASE))
+    if (kind == ".ply" and not end) or (kind == ".off" and not lines):
+        raise MeshError(f"{path}: cannot be read (its header does not end): {EXPORT_AGAIN}")
+    for line in lines[:1] if kind == ".off" else lines:  # vertices of OFF may be whole numbers too
+        for count in line[1].split():
+            if len(count) > 20 or int(count) > dense * len(data):
+                text = " ".join(line[0].decode(errors="replace").split())[:60]
+                raise MeshError(f"{path}: cannot be read (shorter than '{text}' says): {EXPORT_AGAIN}")
+
+
 def _read_with_meshio(path: Path) -> Parts:
-    """Read points and polygons through meshio; PolyData of VTK, which it cannot read, through VTK."""
+    """Read points, polygons and data of the vertices."""
     import meshio
 
-    check_header(path)
     printed = io.StringIO()
     try:
         # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
@@ -108,35 +164,16 @@ def _read_with_meshio(path: Path) -> Parts:
         ):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
-        if path.suffix.lower() in (".vtk", ".vtp") and (parts := _read_with_vtk(path)):
-            return parts
         message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
         reason = " ".join(message.split())[:300] or type(error).__name__
-        raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY") from None
+        raise MeshError(f"{path}: cannot be read ({reason}): {EXPORT_AGAIN}") from None
     kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
     data = {name: np.asarray(values) for name, values in mesh.point_data.items()}
     return Parts(mesh.points, [polygon for block in kinds for polygon in block.data], vertex_data=data)
 
 
-def try_poly_data(*paths: Path) -> bool:
-    """Return whether VTK can read the files; a process tries each once, until it changes."""
-    new = [path for path in paths if _state(path) not in _TRIED]
-    if new and try_out(read_poly_data, *new):
-        return False
-    _TRIED.update(map(_state, new))
-    return True
-
-
-_TRIED: set[tuple[str, int, int]] = set()  # files that VTK could read
-
-
-def _state(path: Path) -> tuple[str, int, int]:
-    stat = path.stat()
-    return str(path.absolute()), stat.st_mtime_ns, stat.st_size
-
-
 def read_poly_data(path: Path) -> Any:
-    """Return what VTK makes of a file. Raises an exception of pyvista, or crashes: see `try_poly_data`."""
+    """Return what VTK makes of a file. Raises an exception of pyvista, or crashes."""
     import pyvista
 
     try:
@@ -152,10 +189,8 @@ def read_poly_data(path: Path) -> Any:
         logging.disable(logging.NOTSET)
 
 
-def _read_with_vtk(path: Path) -> Parts | None:
-    """Read points and triangles of a file of PolyData; None if it holds none, or VTK cannot read it."""
-    if not try_poly_data(path):
-        return None
+def _poly_data(path: Path) -> Parts | None:
+    """Return points and triangles of a file of PolyData that VTK can read; None if it holds none."""
     import pyvista
 
     surface = read_poly_data(path)

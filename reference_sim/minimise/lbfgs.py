@@ -146,7 +146,7 @@ class LBFGS:
         """
         if not run.finite:
             return False
-        compiled.start_again()  # a resumed run has to give the same bits
+        compiled.start_again()  # a frame has the same bits whatever went before
         result = compiled.minimise(run.x)
         start, run.x = run.value, result.positions
         run.value, run.g = run.evaluate(run.x)

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from reports.figures.method_styles import leading
 from reports.run.finished_run import STEP, Run, shown_seeds
 from reports.statistics.page_one_methods import leads

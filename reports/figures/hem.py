@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from reports.figures.chosen_roll_outs import SceneRollOuts, long_motion
 from reports.figures.figure import Drawing
 from reports.figures.method_styles import leading, style

@@ -17,7 +17,7 @@ from reports.statistics.vertex_values import area_change, mean_curvature
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
 
 EVERY = 3  # of a roll-out's frames
 RARE = 0.01  # [%] the lowest share that is shown

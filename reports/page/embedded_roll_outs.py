@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.obstacle import Obstacle
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from reports.page.packed_arrays import Pack
 from reports.page.roll_out_choice import groups
 from reports.run.finished_run import STEP, Run

@@ -15,7 +15,7 @@ from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row
 from reports.run.training_histories import History
 
 if TYPE_CHECKING:
-    from reference_sim.trajectory.trajectory import Trajectory
+    from reference_sim.trajectory import Trajectory
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster

@@ -13,7 +13,7 @@ from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import one_protocol
 from benchmarks.results.run_folder import RunFolder, model_path
 from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
-from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
+from reference_sim.trajectory import Trajectory, TrajectoryError
 from reports.run.finished_run import NoRollOuts, Run, make_run
 from reports.run.training_histories import History, read_history
 

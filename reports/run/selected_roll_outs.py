@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
 

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug.body.skinning import skin
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import FEATURE_SETS, DressedBody

@@ -229,4 +229,4 @@ def test_interrupted_by_hand(folder, capsys, monkeypatch):
 
     monkeypatch.setattr("reference_sim.time_loop.simulate", interrupt)
     assert main(["sheet.obj", "-o", "out.vtkhdf"]) == 130
-    assert "finished frames, if any, are in the output" in capsys.readouterr().err
+    assert "the frames of the last save" in capsys.readouterr().err

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
-from reference_sim.trajectory.point_cache import read_point_cache
+from reference_sim.point_cache import read_point_cache
 from reports import export
 from tests.reports.report_folder import row, run_folder, sheet, write_mesh
 
@@ -147,7 +147,7 @@ def test_a_roll_out_that_fails_to_be_written_leaves_nothing(run, tmp_path, monke
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("reference_sim.trajectory.point_cache.write_obj", full)
+    monkeypatch.setattr("reference_sim.point_cache.write_obj", full)
     with pytest.raises(OSError, match="No space"):
         export.write(tmp_path / "frames", {"garment": truth(run)})
     assert list(tmp_path.iterdir()) == []

@@ -28,7 +28,7 @@ from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
 from reference_sim.minimise.minimisers import make_minimiser
 from reference_sim.potential import Potential
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.recipes.recipe import DEFAULT
 

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.method import Method
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import prepare_batch, prepare_frame_inputs, prepare_roll_out, roll_out
 from snug.networks.trained_model import TrainedModel

@@ -13,7 +13,7 @@ from benchmarks.methods.networks.collision_post_processing import MARGIN, Collis
 from benchmarks.methods.networks.network import Network
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import collect_frames, prepare_frame_inputs, prepare_skinned_frames
 from snug.recipes.recipe import DEFAULT

@@ -24,7 +24,7 @@ from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.process.isolated_process import WorkerDied
 from benchmarks.scene import BuiltScene
 from reference_sim.files.array_file import read_arrays
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 TIME_LIMIT = 100.0  # after which it is ended
 PLACES = ("{scene}", "{out}")

@@ -14,7 +14,7 @@ from benchmarks.external.scene_fit import fit_to_scene
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import Method, MethodEntry
 from benchmarks.scene import BuiltScene
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 
 @dataclass

@@ -17,7 +17,7 @@ from benchmarks.engines.engine import FAR
 from benchmarks.engines.newton_cloth import NewtonCloth
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 
 @dataclass

@@ -10,7 +10,7 @@ from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
 from reference_sim.time_loop import simulate_with
 from reference_sim.time_step import TimeStepper
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 
 @dataclass

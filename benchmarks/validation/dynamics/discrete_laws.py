@@ -21,7 +21,7 @@ from reference_sim.material import Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 from reference_sim.time_loop import simulate
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 DT = 1.0 / 30.0
 SPACING = 0.015  # [m] of the sheet that takes one step

@@ -31,7 +31,7 @@ from reference_sim.energies.stretch_stvk.definition import StretchStVK
 from reference_sim.obstacle import Obstacle
 from reference_sim.potential import Potential
 from reference_sim.time_loop import simulate
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 COLUMNS = 60  # cells along the strip
 CLAMPED_AND_HINGED = 4.4934  # tan k = k: the column's buckling load is k^2 D / L^2

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.training.simulated_data import INDEX

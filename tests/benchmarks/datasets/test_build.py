@@ -15,7 +15,7 @@ import pytest
 from benchmarks import dataset
 from benchmarks.datasets import build as build_dataset
 from benchmarks.fingerprint.digest import damaged
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug.training.simulated_data import INDEX, MISSING, DataSet, DataSetError
 from tests.benchmarks.datasets.data_by_hand import FRAMES, changed_index, words
 from tests.project.own_memory import children, needs_proc, own_memory

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from snug import train as train_command
 from snug.networks.tensor_file import TensorFileError
 from snug.recipes.named import RECIPE_OF_KIND

@@ -25,8 +25,8 @@ from benchmarks.scenes.from_roll_out import declared
 from benchmarks.tasks.cell_task import judge
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
-from reference_sim.trajectory.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
-from reference_sim.trajectory.trajectory import TrajectoryError
+from reference_sim.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
+from reference_sim.trajectory import TrajectoryError
 from tests.benchmarks.runner.tasks_by_hand import small_scene, thirds
 
 SCENE = small_scene("hanging_sheet", cells=6, frames=8)

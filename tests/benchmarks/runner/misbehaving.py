@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.method import Method
 from benchmarks.runner.executor import Executor
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 
 # No other test starts a process by this text, so that the test which looks for it finds its own alone.
 HANGING_CHILD = "import time; time.sleep(61.5)"

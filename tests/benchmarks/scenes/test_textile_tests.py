@@ -17,7 +17,7 @@ from benchmarks.scenes.textile_tests import TEXTILE_TESTS
 from benchmarks.validation.fabric.cases import DRAPE
 from benchmarks.validation.fabric.cases import TEXTILE_TESTS as CASES
 from reference_sim import simulate
-from reference_sim.trajectory.trajectory import Trajectory
+from reference_sim.trajectory import Trajectory
 from tests.benchmarks.fabrics.gauge_folder import make_folder
 from tests.benchmarks.plan.planned import planned
 

@@ -31,8 +31,7 @@ from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.files.mesh_files import read_mesh
-from reference_sim.trajectory.point_cache import read_point_cache
-from reference_sim.trajectory.resume import recover
+from reference_sim.point_cache import read_point_cache
 from snug.body.parametric_body import Body
 from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import BodyError
@@ -95,10 +94,6 @@ def read_asf(path: Path) -> None:
     clip = path.with_suffix(".amc")
     clip.write_bytes(samples.clip_text())
     read_clip(clip)
-
-
-def read_resumed(path: Path) -> None:
-    recover(path, {}, frames=9)
 
 
 def read_header(path: Path) -> None:
@@ -166,7 +161,6 @@ READERS: tuple[Reader, ...] = (
     Reader("VTP", ".vtp", samples.polydata(".vtp"), read_cloth, MESH, bytes_of),
     Reader("VTU", ".vtu", samples.mesh(".vtu"), read_cloth, MESH, bytes_of),
     Reader("trajectory", ".vtkhdf", samples.trajectory, Trajectory.load, (TrajectoryError,), bytes_of),
-    Reader("resumed", ".vtkhdf", samples.trajectory, read_resumed, (TrajectoryError,), bytes_of),
     Reader("model", ".safetensors", samples.model_file, TrainedModel.load, (ModelFileError,), bytes_of),
     Reader("model's header", ".json", samples.model_header, read_header, (ModelFileError,), values_of),
     Reader("results.csv", ".csv", samples.results_csv, read_rows, (ResultsError,), bytes_of),

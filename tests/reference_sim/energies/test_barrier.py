@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from reference_sim import Cloth, Material, Obstacle, Potential, TrajectoryError, minimise, simulate
+from reference_sim import Cloth, Material, Obstacle, Potential, minimise, simulate
 from reference_sim.energies import (
     BendHinge,
     ContactBarrier,
@@ -234,19 +234,6 @@ def test_a_timeout_is_not_hidden_by_a_body_that_stopped_and_ends_its_approach(ti
     assert result.status == "timeout" and "pins and obstacle came" in result.reason
     assert Clocked.rough == 1 if timeout < 1 else Clocked.rough >= 3
     assert result.iterations == Clocked.work
-
-
-def test_a_run_cut_off_where_a_body_had_stopped_is_not_gone_on_with(tmp_path):
-    """No file holds how far the body came: begun at its end, it would have passed the cloth."""
-    cloth, press = a_press()
-    path = tmp_path / "run.vtkhdf"
-    for frames in (2, 3):
-        terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
-        done = simulate(cloth, terms, obstacle=press, frames=frames, path=path, resume=True)
-    assert done.frames == 3 and done.status == "stalled"
-    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactBarrier(cloth)]
-    with pytest.raises(TrajectoryError, match=r"frame 2 the obstacle may have stopped .* start again"):
-        simulate(cloth, terms, obstacle=press, frames=5, path=path, resume=True)
 
 
 @pytest.mark.parametrize(

@@ -214,5 +214,3 @@ def test_friction_of_a_step_that_is_frozen_again_is_the_same_and_of_another_past
     potential.prepare(step)
     with pytest.raises(ValueError, match="does not know its normal force"):
         potential.value(x[5])
-    with pytest.raises(ValueError, match="refreeze cannot be resumed"):
-        simulate(scene.cloth, scene.energies, refreeze=1, resume=True, path="no.vtkhdf", **given)

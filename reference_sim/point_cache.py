@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from reference_sim.files.atomic_files import replacing
-from reference_sim.trajectory.trajectory import Trajectory, TrajectoryError
+from reference_sim.trajectory import Trajectory, TrajectoryError
 
 SIGNATURE = b"POINTCACHE2\0"
 HEADER_SIZE = len(SIGNATURE) + 20

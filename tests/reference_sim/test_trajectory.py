@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
-from reference_sim import Trajectory, TrajectoryError, TrajectoryWriter
+from reference_sim import Trajectory, TrajectoryError
 from tests.reference_sim.meshes import grid
 
 REST, FACES = grid(4, 3)
@@ -74,48 +74,17 @@ def test_a_trajectory_of_no_frames_is_saved_too(tmp_path):
 def test_a_save_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
     path = tmp_path / "wave.vtkhdf"
     wave(3).save(path)
-    extend = TrajectoryWriter.extend
 
-    def fail_when_written(self, *args):
-        extend(self, *args)
+    def fail_when_written(self, data):
+        with self.open("wb") as file:
+            file.write(data[:99])
         raise RuntimeError("the disk is full")
 
-    monkeypatch.setattr(TrajectoryWriter, "extend", fail_when_written)
+    monkeypatch.setattr(Path, "write_bytes", fail_when_written)
     with pytest.raises(RuntimeError, match="the disk is full"):
         wave(5).save(path)
     assert_same(Trajectory.load(path), wave(3))
     assert [p.name for p in tmp_path.iterdir()] == ["wave.vtkhdf"]
-
-
-def test_an_unfinished_file_gives_its_whole_frames(tmp_path):
-    """A copy taken between two frames is what a killed run leaves behind."""
-    whole = wave(5)
-    with TrajectoryWriter(tmp_path / "live", FACES, {"seed": 3}, vertex_count=len(REST)) as writer:
-        writer.go_live()
-        for k in range(3):
-            fields = {name: values[k] for name, values in whole.frame_fields.items()}
-            writer.append(whole.positions[k], whole.times[k], whole.frame_seconds[k], fields)
-            shutil.copy(tmp_path / "live", tmp_path / f"copy{k}")
-        writer.finish("converged", "")
-    for k in range(3):
-        loaded = Trajectory.load(tmp_path / f"copy{k}")
-        assert loaded.status == "unfinished" and loaded.reason
-        assert loaded.provenance == {"seed": 3}
-        np.testing.assert_array_equal(loaded.positions, whole.positions[: k + 1])
-        np.testing.assert_array_equal(loaded.times, whole.times[: k + 1])
-        np.testing.assert_array_equal(loaded.frame_seconds, whole.frame_seconds[: k + 1])
-        np.testing.assert_array_equal(loaded.frame_fields["energy/strain"], np.arange(k + 1) / 7)
-    assert Trajectory.load(tmp_path / "live").status == "converged"
-
-
-def test_a_field_that_begins_late_is_nan_before(tmp_path):
-    with TrajectoryWriter(tmp_path / "late", FACES, {}, vertex_count=len(REST)) as writer:
-        writer.append(REST, 0.0)
-        writer.append(REST, 0.1, 0.5, {"energy/strain": 2.0})
-        writer.finish("ok", "")
-    loaded = Trajectory.load(tmp_path / "late")
-    np.testing.assert_array_equal(loaded.frame_fields["energy/strain"], [np.nan, 2.0])
-    np.testing.assert_array_equal(loaded.frame_seconds, [np.nan, 0.5])
 
 
 def test_what_is_no_trajectory_is_named_with_its_path(tmp_path):
@@ -165,18 +134,6 @@ def test_vtk_steps_through_time_with_the_right_points(tmp_path):
         assert points[k].dtype == np.float64
         np.testing.assert_array_equal(points[k], expected.positions[k])
         np.testing.assert_array_equal(faces[k], FACES)
-
-
-def test_vtk_reads_a_file_that_is_still_being_written(tmp_path):
-    whole = wave(4)
-    with TrajectoryWriter(tmp_path / "live.vtkhdf", FACES, {}, vertex_count=len(REST)) as writer:
-        writer.go_live()
-        for k in range(3):
-            writer.append(whole.positions[k], whole.times[k])
-        shutil.copy(tmp_path / "live.vtkhdf", tmp_path / "copy.vtkhdf")
-    _, points, _ = vtk_frames(tmp_path / "copy.vtkhdf")
-    assert len(points) == 3
-    np.testing.assert_array_equal(points[2], whole.positions[2])
 
 
 def test_a_tree_that_comes_back_to_itself_crashes_no_reader(tmp_path):

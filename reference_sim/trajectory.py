@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.array_file import MOST_PACKED
+from reference_sim.files.atomic_files import replacing
 from reference_sim.files.trial import try_out
-from reference_sim.trajectory.writer import TrajectoryWriter
 
 if TYPE_CHECKING:
     import h5py
@@ -84,15 +84,25 @@ class Trajectory:
         return float(self.times[1] - self.times[0]) if self.frames > 1 else float("nan")
 
     def save(self, path: str | Path) -> None:
-        """Write the whole file under a temporary name, then put it in place."""
-        count = self.positions.shape[1]
-        with TrajectoryWriter(path, self.faces, self.provenance, vertex_count=count) as writer:
-            writer.extend(self.positions, self.times, self.frame_seconds, self.frame_fields)
-            writer.finish(self.status, self.reason)
+        """Write the file, whole or not at all; what was there before stays until then.
+
+        Raises:
+            OSError: no room, or no such folder.
+        """
+        import h5py
+
+        # In memory first: HDF5 crashes where it finds no room on the disk.
+        with h5py.File("trajectory", "w", driver="core", backing_store=False) as file:
+            _write_vtk(file, self)
+            _write_benchmark(file, self)
+            file.flush()
+            image = file.id.get_file_image()
+        with replacing(Path(path)) as temporary:
+            temporary.write_bytes(image)
 
     @classmethod
     def load(cls, path: str | Path, *, guarded: bool = False) -> Trajectory:
-        """Read a file of this project; an unfinished one gives its whole frames and status "unfinished".
+        """Read a file of this project.
 
         Args:
             path: the file.
@@ -129,7 +139,7 @@ class Trajectory:
 
 
 def read_file(path: Path) -> Trajectory:
-    """Read all whole frames of a file.
+    """Read a file.
 
     Raises:
         Exception: of any kind, for a file that is no trajectory or is damaged.
@@ -137,31 +147,23 @@ def read_file(path: Path) -> Trajectory:
     import h5py
 
     with h5py.File(path, "r") as file:
-        return read_frames(file)
-
-
-def read_frames(file: h5py.File, *, frames: int | None = None) -> Trajectory:
-    """Read the first `frames` frames of an open file, by default all that are whole.
-
-    Raises:
-        Exception: of any kind, for a file that is no trajectory or is damaged.
-    """
-    benchmark, vtk = file["benchmark"], file["VTKHDF"]
-    provenance = json.loads(benchmark.attrs["provenance"])
-    if not isinstance(provenance, dict):
-        raise ValueError("its provenance is no JSON object")
-    frames = int(benchmark.attrs["frames"]) if frames is None else frames
-    vertex_count = int(_whole(vtk["NumberOfPoints"])[0])
-    return Trajectory(
-        positions=_whole(vtk["Points"], frames * vertex_count).reshape(frames, vertex_count, 3),
-        faces=_whole(vtk["Polygons/Connectivity"]).reshape(-1, 3),
-        times=_whole(vtk["Steps/Values"], frames),
-        frame_seconds=_whole(benchmark["frame_seconds"], frames),
-        status=str(benchmark.attrs["status"]),
-        reason=str(benchmark.attrs["reason"]),
-        provenance=provenance,
-        frame_fields={k.replace(":", "/"): _whole(v, frames) for k, v in benchmark["frame_fields"].items()},
-    )
+        benchmark, vtk = file["benchmark"], file["VTKHDF"]
+        provenance = json.loads(benchmark.attrs["provenance"])
+        if not isinstance(provenance, dict):
+            raise ValueError("its provenance is no JSON object")
+        frames = int(benchmark.attrs["frames"])
+        fields = benchmark["frame_fields"]
+        vertex_count = int(_whole(vtk["NumberOfPoints"])[0])
+        return Trajectory(
+            positions=_whole(vtk["Points"], frames * vertex_count).reshape(frames, vertex_count, 3),
+            faces=_whole(vtk["Polygons/Connectivity"]).reshape(-1, 3),
+            times=_whole(vtk["Steps/Values"], frames),
+            frame_seconds=_whole(benchmark["frame_seconds"], frames),
+            status=str(benchmark.attrs["status"]),
+            reason=str(benchmark.attrs["reason"]),
+            provenance=provenance,
+            frame_fields={name.replace(":", "/"): _whole(fields[name], frames) for name in fields},
+        )
 
 
 def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
@@ -174,7 +176,52 @@ def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
     if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
         raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
     size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
-    # Of the file and not of the dataset, whose index a kill may have left ahead of the whole frames.
     if size > MOST_PACKED * dataset.file.id.get_filesize() + ALWAYS_READ:
         raise ValueError(f"{dataset.name} declares {size} bytes, more than its file can hold")
     return dataset[:rows]
+
+
+def _write_benchmark(file: h5py.File, trajectory: Trajectory) -> None:
+    """Write what VTK has no place for."""
+    benchmark = file.create_group("benchmark")
+    benchmark.attrs.update(
+        {
+            "frames": trajectory.frames,
+            "status": trajectory.status,
+            "reason": trajectory.reason,
+            "provenance": json.dumps(trajectory.provenance),
+        }
+    )
+    benchmark["frame_seconds"] = np.asarray(trajectory.frame_seconds, dtype="f8")
+    fields = benchmark.create_group("frame_fields")
+    for name, values in trajectory.frame_fields.items():
+        # An energy's name has a slash in it; HDF5 would make a group of that.
+        fields[name.replace("/", ":")] = np.asarray(values, dtype="f8")
+
+
+def _write_vtk(file: h5py.File, trajectory: Trajectory) -> None:
+    """Write the groups VTK's reader insists on, for one moving PolyData with fixed faces."""
+    frames, count, _ = trajectory.positions.shape
+    root = file.create_group("VTKHDF")
+    root.attrs["Version"] = np.array([2, 3], dtype="i8")
+    root.attrs.create("Type", b"PolyData", dtype="S8")
+    root["NumberOfPoints"] = np.array([count], dtype="i8")
+    root.create_dataset(
+        "Points", data=np.asarray(trajectory.positions, dtype="f8").reshape(-1, 3), maxshape=(None, 3),
+        chunks=(count, 3), compression=1, shuffle=True,
+    )  # fmt: skip
+    for name in ("Vertices", "Lines", "Polygons", "Strips"):
+        cells = trajectory.faces if name == "Polygons" else np.zeros((0, 3))
+        group = root.create_group(name)
+        group["NumberOfCells"] = np.array([len(cells)], dtype="i8")
+        group["NumberOfConnectivityIds"] = np.array([np.size(cells)], dtype="i8")
+        group["Connectivity"] = np.asarray(cells, dtype="i8").ravel()
+        group["Offsets"] = np.arange(len(cells) + 1, dtype="i8") * 3
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = frames
+    steps["Values"] = np.asarray(trajectory.times, dtype="f8")
+    steps["PointOffsets"] = np.arange(frames, dtype="i8") * count
+    steps["PartOffsets"] = np.zeros(frames, dtype="i8")
+    steps["NumberOfParts"] = np.ones(frames, dtype="i8")
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        steps[name] = np.zeros((frames, 4), dtype="i8")
