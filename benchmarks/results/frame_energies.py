@@ -2,7 +2,8 @@
 
 A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their sum. A
 term that a scene does not have is left empty. It holds what the paper draws over time: the reference,
-baselines and networks. Curves of all else lie beside their trajectories; they are too large to be published.
+baselines, networks and roll-outs of the user. Curves of all else lie beside their trajectories; they are too
+large to be published.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from reference_sim.files.atomic_files import replacing
 if TYPE_CHECKING:
     import numpy as np
 
-ROLES = ("reference", "baseline", "network")
+ROLES = ("reference", "baseline", "network", "external")
 CELL = ("scene", "method", "seed", "seconds")
 SECONDS = "judged/seconds"  # among the curves of a cell: of each frame, nan where it is not judged
 ENERGY = "energy/"

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from reports.figures.figure import Drawing
-from reports.figures.method_styles import leading, style
-from reports.figures.plotting import PAGE_WIDTH, grid, legend_above, log_axis, new_figure
+from reports.figures.method_styles import few, style
+from reports.figures.plotting import fit, log_axis, new_panels
 from reports.run.finished_run import Run
 from reports.statistics.break_even import compared_costs, compared_scenes, crossing, rivals
 
@@ -25,13 +25,12 @@ def break_even(run: Run) -> Iterator[Drawing]:
     frame = run.cells("speed", "garments")
     scenes = next(iter(compared_scenes(run, frame).values()), [])
     trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
-    shown = leading(run, (cost.method for cost in trained))
+    shown = few(run, (cost.method for cost in trained))
     trained = [cost for cost in trained if cost.method in shown]
     if not trained or len(trained) + len(others) < 2:
         return
     costs = [*others, *trained]
-    figure = new_figure(PAGE_WIDTH / 2, 2.7)
-    axes = figure.subplots()
+    figure, (axes,) = new_panels(1)
     frames = np.logspace(0, math.log10(MOST_FRAMES), 200)
     for cost in costs:
         look = style(run, cost.method)
@@ -44,7 +43,6 @@ def break_even(run: Run) -> Iterator[Drawing]:
     axes.set(xlabel="frames", ylabel="data, training and frames [s]")
     log_axis(axes, "x")
     log_axis(axes, "y")
-    grid(axes)
-    legend_above(figure, [style(run, m) for m in run.ordered(cost.method for cost in costs)])
+    fit(figure, [style(run, m) for m in run.ordered(cost.method for cost in costs)])
     caption = f"Total time against the number of frames ({', '.join(scenes)}). "
     yield Drawing(figure, "break_even", caption + "Dots: where a training has paid.")

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.results.protocol import SOFTENING
 from reports.figures.figure import Drawing
 from reports.figures.method_styles import leading, style
-from reports.figures.plotting import PAGE_WIDTH, arcsinh_axis, grid, log_axis, new_figure, wrapped
+from reports.figures.plotting import arcsinh_axis, fit, log_axis, new_panels, wrapped
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import Mean, means
 from reports.statistics.relative_excess import RELATIVE_EXCESS, TOTAL, excess_of, with_relative_excess
@@ -42,8 +42,7 @@ def dots(run: Run) -> Iterator[Drawing]:
     by_method = means(rows, "method", "metric")
     labels = [wrapped(run.label(method), 28) for method in methods]
     lines = max(label.count("\n") + 1 for label in labels)
-    figure = new_figure(PAGE_WIDTH, 0.65 + (0.04 + 0.13 * lines) * len(methods))
-    panels = np.atleast_1d(figure.subplots(1, len(names), sharey=True))
+    figure, panels = new_panels(len(names), 3, sharey=True)
     for axes, name in zip(panels, names):
         of_methods = [by_method.get((method, name)) for method in methods]
         bars = [mean and mean.value for mean in of_methods]
@@ -56,9 +55,10 @@ def dots(run: Run) -> Iterator[Drawing]:
             axes.set_xlim(min(shown) / 1.3, max(shown) * 1.3)
             log_axis(axes, "x")
         axes.set_xlabel((RELATIVE_EXCESS if name == excess else run.metrics[name]).heading)
-        grid(axes, "x")
+        axes.grid(False, axis="y")
     panels[0].set_yticks(range(len(methods)), labels)
     panels[0].set_ylim(len(methods) - 0.4, -0.6)
+    fit(figure, height=(0.04 + 0.13 * lines) * len(methods))
     caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean"
     caption += ", of the relative excess its typical value." if excess else "."
     yield Drawing(figure, "dots", caption)

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
-import numpy as np
 import pandas as pd
 
 from reports.figures.figure import Drawing
 from reports.figures.plane.curves import SOLVERS, families, of_page_one
-from reports.figures.plane.labels import lay_out
 from reports.figures.plane.points import draw_points, write_labels
-from reports.figures.plotting import PAGE_WIDTH, file_name, grid, new_figure, wrapped
+from reports.figures.plotting import LABELLED, file_name, fit, new_panels, wrapped
 from reports.run.finished_run import Metric, Run
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.pareto import (
@@ -67,14 +65,12 @@ def _scenes(run: Run) -> Scenes:
 def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequence[Point]) -> Drawing:
     """Draw one error of a scene in a wide panel, solvers stopped early as one curve."""
     time = run_time(rows)
-    figure = new_figure(PAGE_WIDTH, 2.0)
-    axes = figure.subplots()
+    figure, (axes,) = new_panels(1)
     curves = of_page_one(run, points)
     reference = value_of(rows, run.reference, time)
     drawn = draw_points(axes, run, curves, reference, indistinct(run, rows, metric.name))
     axes.set(xlabel=time_label(time), ylabel=metric.heading)
-    grid(axes)
-    lay_out(figure)
+    fit(figure)
     write_labels(axes, drawn)
     caption = f"{rows['scene'].iloc[0]}: lower left is better. Pale line: the best at each time."
     if any(curve.aside for curve in curves):
@@ -87,19 +83,13 @@ def _draw_scene(run: Run, rows: pd.DataFrame, panels: Sequence[tuple[Metric, lis
     """Draw a panel for each error of one scene, every family a line of its own."""
     scene, time = rows["scene"].iloc[0], run_time(rows)
     reference = value_of(rows, run.reference, time)
-    columns = min(2, len(panels))
-    lines = -(-len(panels) // columns)
-    figure = new_figure(PAGE_WIDTH, 0.2 + 2.4 * lines)
-    every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
-    for axes in every[len(panels) :]:
-        axes.set_axis_off()
+    figure, every = new_panels(len(panels), 2)
     drawn = []
     for axes, (metric, points) in zip(every, panels):
         band = indistinct(run, rows, metric.name)
         drawn.append(draw_points(axes, run, families(run, points), reference, band))
         axes.set(xlabel=time_label(time), title=metric.heading)
-        grid(axes)
-    lay_out(figure)
+    fit(figure, height=LABELLED)
     known: set[str] = set()
     for axes, panel in zip(every, drawn):
         write_labels(axes, panel, size=6.5, known=known)
@@ -116,12 +106,7 @@ def _draw_scene(run: Run, rows: pd.DataFrame, panels: Sequence[tuple[Metric, lis
 
 def _draw_scenes(run: Run, scenes: Sequence[tuple[pd.DataFrame, tuple[Metric, list[Point]]]]) -> Drawing:
     """Draw a small panel for each scene."""
-    columns = min(4, len(scenes))
-    lines = -(-len(scenes) // columns)
-    figure = new_figure(PAGE_WIDTH, 0.35 + 1.55 * lines)
-    every = np.atleast_1d(figure.subplots(lines, columns)).ravel()
-    for axes in every[len(scenes) :]:
-        axes.set_axis_off()
+    figure, every = new_panels(len(scenes), 3)
     titles = list(dict.fromkeys(metric.heading for _, (metric, _) in scenes))
     for axes, (rows, (metric, points)) in zip(every, scenes):
         reference = value_of(rows, run.reference, run_time(rows))
@@ -130,8 +115,8 @@ def _draw_scenes(run: Run, scenes: Sequence[tuple[pd.DataFrame, tuple[Metric, li
         scene = wrapped(str(rows["scene"].iloc[0]), 24)
         axes.set_title("\n".join([scene, *([metric.heading] if len(titles) > 1 else [])]), fontsize=8)
         axes.tick_params(labelsize=7)
-        grid(axes)
     figure.supxlabel("run time [ms per frame]", fontsize=8.5)
+    fit(figure)
     caption = f"The same of other scenes, in the colours above: {' or '.join(titles)} against run time."
     return Drawing(figure, "error_against_time_scenes", caption)
 

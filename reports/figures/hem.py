@@ -9,8 +9,8 @@ import numpy as np
 from reference_sim.trajectory import Trajectory
 from reports.figures.chosen_roll_outs import SceneRollOuts, long_motion
 from reports.figures.figure import Drawing
-from reports.figures.method_styles import leading, style
-from reports.figures.plotting import PAGE_WIDTH, file_name, grid, legend_above, new_figure
+from reports.figures.method_styles import few, style
+from reports.figures.plotting import file_name, fit, new_panels
 from reports.run.finished_run import Run
 from reports.tables.number_texts import number
 
@@ -33,7 +33,7 @@ def _methods_with_hem(run: Run, roll_outs: SceneRollOuts) -> list[str]:
     series = roll_outs.series
     measured = {m for m, cloth in series.items() if {YAW, FROM_END} <= cloth.frame_fields.keys()}
     frames = max((series[m].frames for m in measured), default=0)
-    return leading(run, (m for m in measured if series[m].frames == frames))
+    return few(run, (m for m in measured if series[m].frames == frames))
 
 
 def hem_turns(run: Run, roll_outs: SceneRollOuts) -> bool:
@@ -57,8 +57,8 @@ def draw_hem(run: Run, roll_outs: SceneRollOuts) -> Drawing:
         first = max(stop - BEFORE, 0)
         turned = {m: curve - curve[-1] for m, curve in yaw.items()}
         panels[1:] = [("yaw from its end [degrees]", turned, first), ("from its end [mm]", from_end, first)]
-    figure = new_figure(PAGE_WIDTH, 2.6 if len(methods) <= 4 else 3.0)
-    for axes, (title, curves, first) in zip(figure.subplots(1, len(panels)), panels):
+    figure, every = new_panels(len(panels), 3)
+    for axes, (title, curves, first) in zip(every, panels):
         for method in reversed(methods):  # the reference last, on top
             look, times = style(run, method), series[method].times
             axes.plot(times[first:], curves[method][first:], color=look.colour, linestyle=look.line)
@@ -67,8 +67,7 @@ def draw_hem(run: Run, roll_outs: SceneRollOuts) -> Drawing:
             axes.axvspan(body.times[stop], body.times[-1], color=STOPPED, zorder=0)
             axes.set_xlim(body.times[first], body.times[-1])
         axes.set(title=title, xlabel="time [s]")
-        grid(axes)
-    legend_above(figure, [style(run, method) for method in methods])
+    fit(figure, [style(run, method) for method in methods])
     caption = f"{roll_outs.scene}: the hem in the axes of the root."
     if stop is not None and body is not None:
         caption += f" Grey: the body has stopped, at {number(float(body.times[stop]))} s. "

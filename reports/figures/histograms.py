@@ -9,8 +9,8 @@ import numpy as np
 
 from reports.figures.chosen_roll_outs import long_motion
 from reports.figures.figure import Drawing
-from reports.figures.method_styles import leading, style
-from reports.figures.plotting import PAGE_WIDTH, grid, legend_above, log_axis, new_figure
+from reports.figures.method_styles import few, style
+from reports.figures.plotting import fit, log_axis, new_panels
 from reports.run.finished_run import Run
 from reports.statistics.vertex_values import area_change, mean_curvature
 
@@ -34,14 +34,14 @@ def histograms(run: Run) -> Iterator[Drawing]:
 
 def draw_histograms(run: Run, series: Mapping[str, Trajectory], rest: np.ndarray | None) -> Canvas:
     """Draw a panel of curvature, and one of area where its rest areas (F,) [m^2] are known."""
-    methods = leading(run, series)
+    methods = few(run, series)
     frames = min(series[method].frames for method in methods)
     some = {m: series[m].positions[frames // 5 : frames : EVERY] for m in methods}
     panels = {"mean curvature [1/m]": {m: mean_curvature(x, series[m].faces) for m, x in some.items()}}
     if rest is not None and all(len(series[m].faces) == len(rest) for m in methods):
         panels["change of area [%]"] = {m: area_change(x, series[m].faces, rest) for m, x in some.items()}
-    figure = new_figure(PAGE_WIDTH, 2.2)
-    for axes, (title, values) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels.items()):
+    figure, every = new_panels(len(panels), 2)
+    for axes, (title, values) in zip(every, panels.items()):
         ends = [np.percentile(of_method, (1.0, 98.0)) for of_method in values.values()]
         low, high = min(end[0] for end in ends), max(end[1] for end in ends)
         edges = np.linspace(low, max(high, low + 1e-9), 41)
@@ -51,6 +51,5 @@ def draw_histograms(run: Run, series: Mapping[str, Trajectory], rest: np.ndarray
             axes.plot(middles, np.maximum(share, RARE), color=look.colour, linestyle=look.line)
         axes.set(xlabel=title, ylabel="share of vertices [%]", ylim=(RARE, None))
         log_axis(axes, "y")
-        grid(axes)
-    legend_above(figure, [style(run, method) for method in methods])
+    fit(figure, [style(run, method) for method in methods])
     return figure

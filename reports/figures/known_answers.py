@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from reports.figures.figure import Drawing
-from reports.figures.plotting import PAGE_WIDTH, grid, log_axis, new_figure
+from reports.figures.plotting import fit, log_axis, new_panels
 from reports.run.finished_run import Run
 from reports.statistics.outcomes import checks, tolerances_away
 from reports.tables.number_texts import number
@@ -22,8 +22,7 @@ def known_answers(run: Run) -> Iterator[Drawing]:
     known = sorted(float(x) for x in away if x is not None and math.isfinite(x))
     if len(known) < 2:
         return
-    figure = new_figure(PAGE_WIDTH, 1.75)
-    axes = figure.subplots()
+    figure, (axes,) = new_panels(1)
     heights = np.maximum(known, LOWEST)
     axes.plot(range(1, len(known) + 1), heights, "o", color="#0072B2", markersize=3)
     axes.axhline(1.0, color="#D55E00", linewidth=1.2)
@@ -31,7 +30,7 @@ def known_answers(run: Run) -> Iterator[Drawing]:
     axes.set_ylim(LOWEST / 2.0, max(3.0, 2.0 * heights[-1]))
     axes.set(xlabel="checks, in order", ylabel="tolerances away")
     log_axis(axes, "y")
-    grid(axes)
+    fit(figure)
     caption = f"{len(known)} checks with a known answer: distance from it over the tolerance"
     caption += f"; {number(LOWEST, 1)} stands for all that is less."
     yield Drawing(figure, "known_answers", caption)

@@ -83,6 +83,7 @@ KNOWN = {
 # Roles that a figure shows when it has no room for all; external: roll-outs of the user.
 LEADING = ("reference", "baseline", "network", "external")
 ROOM = 8  # methods that a figure shows whatever they are
+LINES = 5  # methods whose curves a panel holds
 # Members of a family share its colour. Iterations go by doubling: four in a row have four lines.
 _DASHES: tuple[Line, ...] = ((0.0, (8.0, 1.5)), "--", "-.", ":")
 _SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
@@ -130,3 +131,20 @@ def leading(run: Run, methods: Iterable[str]) -> list[str]:
     """
     ordered = run.ordered(set(methods) - set(run.reference_ensemble))
     return ordered if len(ordered) <= ROOM else [m for m in ordered if run.methods[m].role in LEADING]
+
+
+def few(run: Run, methods: Iterable[str]) -> list[str]:
+    """Return at most LINES methods, in order: those that cross in one panel.
+
+    Reference, roll-outs of the user and the first baseline come first, then trained networks.
+    """
+    shown = leading(run, methods)
+    baseline = next((m for m in shown if run.methods[m].role == "baseline"), "")
+
+    def rank(name: str) -> int:
+        method = run.methods[name]
+        if method.role in ("reference", "external") or name == baseline:
+            return 0
+        return 1 if method.role == "network" and not method.base else 2
+
+    return run.ordered(sorted(shown, key=rank)[:LINES])

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import XAxis, YAxis
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
-LINE_LETTERS = 115  # of a legend that fit on one line of a figure as wide as the page
+PANEL = 1.6  # inches (4.06 cm) that panels are high at least, and at least wide
+LABELLED = 2.1  # inches that panels are high in which labels stand beside points
 GRID = "#E3E3E3"
 DOTS = 200  # of a picture in an inch
 _LOOK: dict[Any, Any] = {
@@ -50,12 +52,45 @@ _LOOK: dict[Any, Any] = {
 def new_figure(width: float, height: float) -> Figure:
     """Make an empty figure [inches] in the look of the report, without pyplot and its global state."""
     import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     matplotlib.rcParams.update(_LOOK)
     figure = Figure(figsize=(width, height), layout="constrained")
     figure.get_layout_engine().set(h_pad=0.04, w_pad=0.03)  # type: ignore[union-attr,call-arg]
+    FigureCanvasAgg(figure)
     return figure
+
+
+def new_panels(count: int, columns: int = 1, **more: Any) -> tuple[Figure, list[Axes]]:
+    """Make a figure as wide as the page with `count` panels, so many in a line; `fit` gives it its height."""
+    columns = min(count, columns)
+    lines = -(-count // columns)
+    figure = new_figure(PAGE_WIDTH, 4.0 * PANEL * lines)
+    panels = list(figure.subplots(lines, columns, squeeze=False, **more).flat)
+    for axes in panels[count:]:
+        axes.remove()
+    for axes in panels:
+        grid(axes)
+    return figure, panels[:count]
+
+
+def fit(figure: Figure, entries: Sequence[Style] = (), height: float = PANEL) -> None:
+    """Draw a legend above the panels, and give the figure the height at which each is so high [inches].
+
+    Call it when all that takes room is drawn; panels stay where they are from then on.
+    """
+    if entries:
+        widest = _legend(figure, entries, 1)
+        width = widest.get_window_extent().width
+        widest.remove()
+        _legend(figure, entries, max(1, int(figure.bbox.width / width)))
+    lines = figure.axes[0].get_subplotspec().get_gridspec().nrows  # type: ignore[union-attr]
+    for _ in range(2):  # numbers beside an axis depend on its height
+        figure.draw_without_rendering()
+        lowest = min(axes.get_window_extent().height for axes in figure.axes) / figure.dpi
+        figure.set_figheight(figure.get_figheight() + lines * (max(height, PANEL) - lowest))
+    figure.draw_without_rendering()
 
 
 def log_axis(axes: Axes, which: str) -> None:
@@ -136,33 +171,19 @@ def file_name(text: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
 
 
-def legend_above(figure: Figure, entries: Sequence[Style]) -> None:
-    """Draw one legend of lines for all panels, above them."""
+def _legend(figure: Figure, entries: Sequence[Style], columns: int) -> Legend:
     from matplotlib.lines import Line2D
 
     handles = [
         Line2D([], [], color=look.colour, linestyle=look.line, label=wrapped(look.label, 30))  # type: ignore[arg-type]
         for look in entries
     ]
-    figure.legend(
+    return figure.legend(
         handles=handles,
         loc="outside upper center",
-        ncols=_columns([len(look.label) + 8 for look in entries], figure.get_figwidth() / PAGE_WIDTH),
+        ncols=columns,
         frameon=False,
         handlelength=1.6,
         handletextpad=0.5,
         columnspacing=1.4,
     )
-
-
-def _columns(letters: Sequence[int], width: float = 1.0) -> int:
-    """Return as many columns of a legend as fit into that share of the page's width.
-
-    It is filled column by column, each as wide as its longest entry.
-    """
-    count = len(letters)
-    for columns in range(count, 1, -1):
-        parts = np.array_split(np.array(letters), columns)  # the longer ones first, as matplotlib fills them
-        if sum(int(part.max()) for part in parts) <= LINE_LETTERS * width:
-            return columns
-    return 1

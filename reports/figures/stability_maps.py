@@ -10,7 +10,7 @@ import pandas as pd
 
 from reports.figures.figure import Drawing
 from reports.figures.method_styles import STATUS_COLOURS
-from reports.figures.plotting import PAGE_WIDTH, new_figure, power_text
+from reports.figures.plotting import fit, new_panels, power_text
 from reports.run.finished_run import Run
 from reports.statistics.outcomes import map_points
 
@@ -34,12 +34,13 @@ def stability_maps(run: Run) -> Iterator[Drawing]:
         return
     widths = [of_scene["dt"].nunique() for of_scene in maps.values()]
     height = max(of_scene["factor"].nunique() for of_scene in maps.values())
-    figure = new_figure(PAGE_WIDTH if len(maps) > 1 else 0.55 * PAGE_WIDTH, 1.0 + 0.27 * height)
-    panels = figure.subplots(1, len(maps), squeeze=False, width_ratios=widths)[0]
+    figure, panels = new_panels(len(maps), len(maps), width_ratios=widths)
     for axes, (scene, of_scene) in zip(panels, maps.items()):
         _panel(axes, of_scene)
+        axes.grid(False)
         axes.set_title(scene.replace("_", " "))
     panels[0].set_ylabel("stiffness, as a multiple of cotton's")
+    fit(figure, height=0.27 * height)
     caption = (
         "Stiffness and time step: one step from a noisy start. Blue: converged, with its number of "
         "iterations, deeper for more. Other colours: not converged, by how it ended; "

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from reports.figures.figure import Drawing
 from reports.figures.method_styles import leading, style
-from reports.figures.plotting import PAGE_WIDTH, file_name, grid, legend_above, log_axis, new_figure
+from reports.figures.plotting import file_name, fit, log_axis, new_panels
 from reports.run.finished_run import Run
 from reports.run.training_histories import PANELS, History
 
@@ -25,17 +23,16 @@ def training_curves(run: Run) -> Iterator[Drawing]:
 
 
 def _draw_garment(run: Run, name: str, garment: str, histories: Sequence[History]) -> Drawing:
-    panels = dict.fromkeys((*PANELS.values(), *(h.panel for h in histories)))
-    titles = [title for title in panels if any(h.panel == title for h in histories)]
-    figure = new_figure(PAGE_WIDTH * (1.0 if len(titles) > 1 else 0.6), 2.2)
-    for axes, title in zip(np.atleast_1d(figure.subplots(1, len(titles))), titles):
+    known = dict.fromkeys((*PANELS.values(), *(h.panel for h in histories)))
+    titles = [title for title in known if any(h.panel == title for h in histories)]
+    figure, panels = new_panels(len(titles), 2)
+    for axes, title in zip(panels, titles):
         for history in (h for h in histories if h.panel == title):
             look, seconds = style(run, history.method), history.column("seconds")
             axes.plot(seconds, history.column("loss"), color=look.colour, linestyle=look.line, linewidth=1.1)
         axes.set(xlabel="training time [s]", title=title)
         log_axis(axes, "y")
-        grid(axes)
     shown = leading(run, {history.method for history in histories})
-    legend_above(figure, [style(run, method) for method in shown])
+    fit(figure, [style(run, method) for method in shown])
     caption = f"{garment}: training loss against wall time; one curve per model and seed. "
     return Drawing(figure, name, caption + "Numbers: tables/training_curves.csv.")

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 from reports.figures.figure import Drawing
 from reports.figures.plane.curves import families
-from reports.figures.plane.labels import lay_out
 from reports.figures.plane.points import draw_points, write_labels
-from reports.figures.plotting import PAGE_WIDTH, grid, new_figure
+from reports.figures.plotting import LABELLED, fit, new_panels
 from reports.run.finished_run import Run
 from reports.statistics.fabric.order import ERROR, rows_of_test
 from reports.statistics.means_and_spreads import value_of
@@ -36,16 +35,14 @@ def textile_errors(run: Run) -> Iterator[Drawing]:
     tests = points_of_tests(run)
     if not tests:
         return
-    figure = new_figure(PAGE_WIDTH, 3.1)
-    panels = figure.subplots(1, len(tests), squeeze=False)[0]
+    figure, panels = new_panels(len(tests), 2)
     drawn = []
     for axes, (test, points) in zip(panels, tests.items()):
         rows = rows_of_test(run, test)
         reference, band = value_of(rows, run.reference, TIME), indistinct(run, rows, ERROR)
         drawn.append(draw_points(axes, run, families(run, points), reference, band))
         axes.set(xlabel="run time [ms per frame]", title=PANELS[test])
-        grid(axes)
-    lay_out(figure)
+    fit(figure, height=LABELLED)
     for axes, panel in zip(panels, drawn):
         write_labels(axes, panel)
     caption = (

@@ -39,7 +39,7 @@ def place_labels(
 ) -> None:
     """Write labels beside their spots, the first ones first.
 
-    Call it when limits, scales and all other content of the figure are set and `lay_out` has placed it.
+    Call it when limits, scales and all other content of the figure are set and `fit` has placed it.
 
     Args:
         axes: of the spots.
@@ -147,11 +147,3 @@ def _figure_of(axes: Axes) -> Figure:
     figure = axes.get_figure(root=True)
     assert figure is not None
     return figure
-
-
-def lay_out(figure: Figure) -> None:
-    """Give the axes of a figure the places that they have in its file."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
-    figure.draw_without_rendering()

@@ -48,6 +48,13 @@ def test_a_roll_out_of_the_user_is_shown_where_there_is_no_room_for_all():
     assert method_styles.leading(run, run.methods) == ["simulation", "mine"]
 
 
+def test_a_panel_of_curves_shows_five_methods_the_reference_and_the_users_among_them():
+    names = ("skinning", "untrained", "snug", "supervised", "pbns", "snug+cleanup", "simulation")
+    run = run_of([*(row(method=name) for name in names), row(method="mine", role="external")])
+    five = ["simulation", "skinning", "snug", "pbns", "mine"]
+    assert sorted(method_styles.few(run, run.methods)) == sorted(five)
+
+
 def test_the_hem_is_drawn_where_it_swings():
     turn = {
         "hem/yaw": np.radians(np.linspace(0.0, 40.0, FRAMES)),

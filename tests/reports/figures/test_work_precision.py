@@ -10,7 +10,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from reports.figures.break_even import break_even
 from reports.figures.error_against_time import error_of_page_one, errors_of_scene, errors_of_scenes
 from reports.figures.figure import Drawing, save_drawing
-from reports.figures.plotting import _columns
 from reports.statistics.pareto import (
     indistinct,
     points_of,
@@ -21,15 +20,6 @@ from tests.reports.speed_rows import SCENES, all_rows, row
 
 # method: ms a frame, relative energy gap, curvature error
 FIGURES = (error_of_page_one, errors_of_scene, errors_of_scenes, break_even)
-
-
-def test_a_legend_has_no_more_columns_than_fit():
-    assert _columns([20, 20, 20]) == 3
-    assert _columns([20] * 10) == 5
-    assert _columns([200, 10]) == 1
-    assert _columns([20] * 5, 0.5) == 2
-    longest = [30, 10] * 4  # two lines: each column holds a long one
-    assert _columns(longest) == 3
 
 
 def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_path):

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 
 from reports.figures.plane.curves import families, of_page_one
-from reports.figures.plane.labels import Label, boxes_along, lay_out, place_labels
+from reports.figures.plane.labels import Label, boxes_along, place_labels
 from reports.figures.plane.points import draw_points, write_labels
-from reports.figures.plotting import new_figure
+from reports.figures.plotting import fit, new_figure
 from reports.statistics.pareto import Point
 from tests.reports.report_folder import row, run_of
 
@@ -74,7 +74,7 @@ def test_every_curve_has_its_label_and_no_two_labels_cover_each_other():
     axes = figure.subplots()
     points, run = points_and_run()
     drawn = draw_points(axes, run, families(run, points), 40.0, band=0.0005)
-    lay_out(figure)
+    fit(figure)
     write_labels(axes, drawn)
     boxes = boxes_of_texts(axes)
     assert {"SNUG", "Skinning alone", "Newton, 1", "SNUG + L-BFGS, 1 to 4"} <= set(boxes)
@@ -87,7 +87,7 @@ def test_a_label_avoids_a_line_and_a_known_one_without_room_is_left_out():
     figure = new_figure(3, 2)
     axes = figure.subplots()
     axes.set(xlim=(0, 10), ylim=(0, 10))
-    lay_out(figure)
+    fit(figure)
     beside = boxes_along(axes, np.array([[5.3, 0.0], [5.3, 10.0]]), 3.0)
     place_labels(axes, [Label("here", (5.0, 5.0), "black")], beside, 7.5)
     (box,) = boxes_of_texts(axes).values()
