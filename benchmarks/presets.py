@@ -34,7 +34,7 @@ class Preset:
     again to know the gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell,
     whose short run is done again until then. repeats: times that a cell of suite speed is run, those whose
     first run took at most repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended
-    [s]. smallest: whether of cases, microbenchmarks and hard motions only those run that are marked for it.
+    [s]. smallest: whether of cases and hard motions only those run that are marked for it.
     """
 
     name: str

@@ -7,7 +7,7 @@
 | surface | distance/*, surface/*, penetration/*, drift/hem, body/*, mesh/*, fabric/* |
 | motion | velocity/error, acceleration/error, dynamics/*, conservation/*, exact/distance |
 | motion | time_error/*, motion/*, roll_out/* |
-| cost | cost/*, solver/*, training_distance/*, performance/* |
+| cost | cost/*, solver/*, training_distance/* |
 
 >>> find_metric("curvature/mean").unit
 '1/m'
@@ -22,7 +22,6 @@ from types import ModuleType
 
 from benchmarks.declarations import DeclarationError, by_name, load
 from benchmarks.metric import Metric
-from benchmarks.metrics.cost.microbenchmarks import METRICS as OF_MICROBENCHMARKS
 
 MODULES = {
     "energy": "benchmarks.metrics.energies.energy",
@@ -70,7 +69,7 @@ def modules() -> dict[str, ModuleType]:
 
 @cache
 def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
-    """Return every metric by name: of all modules, of microbenchmarks, and of modules outside.
+    """Return every metric by name: of all modules, and of modules outside.
 
     Raises DeclarationError where a module declares no METRICS, or two declare one name.
     """
@@ -80,7 +79,7 @@ def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
             raise DeclarationError(f"{MODULE_OF[name]} declares no METRICS, a tuple of Metric")
         metrics += module.METRICS
     others = [replace(metric, declared_in=home) for home in outside for metric in load(home).METRICS]
-    return by_name("metric", (*metrics, *OF_MICROBENCHMARKS, *others))
+    return by_name("metric", (*metrics, *others))
 
 
 def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:

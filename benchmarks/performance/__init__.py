@@ -1,1 +1,1 @@
-"""Microbenchmarks: speed of the simulator, trainings and trained networks. registry.py declares them."""
+"""Folder that asv reads (asv.conf.json): microbenchmarks.py."""

@@ -1,4 +1,4 @@
-"""Which scenes meet which methods in a run: its cells; beside them its cases and microbenchmarks."""
+"""Which scenes meet which methods in a run: its cells; beside them its cases."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.metrics import MODULES
-from benchmarks.performance.microbenchmark import SUITE, Microbenchmark
-from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.motion_split import nearest
 from benchmarks.plan.plan import Motions, PlanError
 from benchmarks.plan.roll_out_cells import roll_out_cells
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from benchmarks.external.roll_out_option import RollOutOption
     from benchmarks.validation.case import Case
 
-MEASURED: tuple[Case | Microbenchmark, ...] = (*CASES, *MICROBENCHMARKS)  # what is no cell
 UNTRAINED = "networks are trained for a second garment where its scenes are named"
 
 
@@ -64,7 +61,7 @@ class Selection:
         motions = dict.fromkeys((*of.measured, *of.test, *of.validation))
         dynamic = dict.fromkeys((*of.dynamic_measured, *of.dynamic_test, *of.dynamic_validation))
         declared = all_scenes(motions, dynamic, of.worn)
-        taken = {entry.name for entry in MEASURED}
+        taken = {case.name for case in CASES}
         for scene in self.user_scenes:
             if scene.name in taken:
                 raise DeclarationError(
@@ -85,18 +82,16 @@ class Selection:
         return Extent(self.preset, self.motions, self.full or further, further, self.fabric_scenes)
 
 
-def choose_cells(
-    selection: Selection,
-) -> tuple[tuple[Cell, ...], tuple[Case, ...], tuple[Microbenchmark, ...]]:
-    """Return the cells, cases and microbenchmarks that a selection names.
+def choose_cells(selection: Selection) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
+    """Return the cells and cases that a selection names.
 
     Raises:
         PlanError: a word that names nothing, a selection of nothing, a roll-out that cannot take part.
         DeclarationError: two scenes or methods of one name.
     """
     declared, methods = selection.declared_scenes, selection.declared_methods
-    measured = (*MEASURED, *selection.fabric_cases)
-    _check_words("scene", selection.scenes, [*declared, *(entry.name for entry in measured)])
+    names = [case.name for case in (*CASES, *selection.fabric_cases)]
+    _check_words("scene", selection.scenes, [*declared, *names])
     _check_words("method", selection.methods, list(methods))
     chosen: dict[tuple[str, str, int], Cell] = {}
     for suite, scene, entry in _pairs(selection):
@@ -105,10 +100,8 @@ def choose_cells(
             key = (scene, method, seed)
             before = chosen[key].suites if key in chosen else ()
             chosen[key] = Cell(declared[scene].at(selection.preset), entry, seed, (*before, suite))
-    cases, microbenchmarks = tuple(_cases(selection)), tuple(_microbenchmarks(selection))
-    if selection.one_scene:  # some have the name of a scene
-        cases, microbenchmarks = (), ()
-    if not (chosen or cases or microbenchmarks):
+    cases = () if selection.one_scene else tuple(_cases(selection))  # some have the name of a scene
+    if not (chosen or cases):
         raise PlanError(_nothing_to_run(selection))
     if selection.one_scene and len({scene for scene, _, _ in chosen}) != 1:
         raise PlanError(f"{', '.join(selection.scenes)}: name one scene; see python -m benchmarks.run --list")
@@ -127,7 +120,7 @@ def choose_cells(
     known = {scene.name: scene for scene in settled} | scenes
     for user_scene in (scene for scene in scenes.values() if scene.declared_in):
         _check_user_scene(user_scene, known, selection.motions)
-    return tuple(cells), cases, microbenchmarks
+    return tuple(cells), cases
 
 
 def _timed_once(cells: Sequence[Cell]) -> list[Cell]:
@@ -155,7 +148,7 @@ def _nothing_to_run(selection: Selection) -> str:
     everywhere = replace(selection, suites=SUITE_NAMES, full=True)
     for suite in SUITE_NAMES:
         in_suite = replace(everywhere, suites=(suite,))
-        if any(any(part(in_suite)) for part in (_pairs, _cases, _microbenchmarks)):
+        if any(any(part(in_suite)) for part in (_pairs, _cases)):
             return f"{line}; --suite {suite} has them"
     methods = list(dict.fromkeys(entry.name for *_, entry in _pairs(replace(everywhere, methods=()))))
     if selection.scenes and methods:
@@ -230,17 +223,6 @@ def _cases(selection: Selection) -> Iterator[Case]:
                 yield case
 
 
-def _microbenchmarks(selection: Selection) -> Iterator[Microbenchmark]:
-    """Yield the microbenchmarks named; the smallest preset runs those marked, unless they are named."""
-    for benchmark in MICROBENCHMARKS if SUITE in selection.suites else ():
-        small = benchmark.smoke or selection.scenes or not selection.preset.smallest
-        wanted = (
-            small and named(benchmark.name, selection.scenes) and named(benchmark.method, selection.methods)
-        )
-        if wanted and (not benchmark.long or benchmark.name in selection.scenes):
-            yield benchmark
-
-
 def named(name: str, patterns: Sequence[str]) -> bool:
     """Return whether some pattern means that name; without patterns all are meant.
 
@@ -305,9 +287,9 @@ def choose_suites(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def names_no_motion(scenes: Sequence[str], user_scenes: Sequence[Scene] = ()) -> bool:
-    """Return whether a choice names scenes without a body, cases and microbenchmarks alone."""
+    """Return whether a choice names scenes without a body and cases alone."""
     known = {scene.name for scene in (*all_scenes((), ()).values(), *user_scenes) if not scene.dressed}
-    known |= {entry.name for entry in MEASURED}
+    known |= {case.name for case in CASES}
     return bool(scenes) and known.issuperset(scenes)
 
 

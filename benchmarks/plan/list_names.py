@@ -6,8 +6,6 @@ from collections.abc import Iterable
 
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
-from benchmarks.performance.microbenchmark import SUITE
-from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.choose_cells import Selection, choose_suites, default_suites
 from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.suites import SUITES
@@ -69,7 +67,6 @@ def list_names(preset: Preset, suites: tuple[str, ...] = ()) -> str:
         ("motions without a role", ((name, "") for name in CONTROL)),
         ("presets", ((p.name, p.description) for p in PRESETS)),
         *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
-        (f"microbenchmarks of suite {SUITE}", {b.name: b.description for b in MICROBENCHMARKS}.items()),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets.inputs import LIBRARY, read_inputs
 from benchmarks.method import installed
-from benchmarks.performance.microbenchmark import SUITE
 from benchmarks.plan import user_files
 from benchmarks.plan.choose_cells import Selection, choose_cells, choose_suites, names_no_motion
 from benchmarks.plan.motion_split import split_motions
@@ -69,7 +68,7 @@ def make_plan(request: Request) -> Plan:
         if not installed("ipctk"):
             raise PlanError("--self-contact needs the package ipctk: pip install ipctk")
         motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
-    cells, cases, microbenchmarks = choose_cells(
+    cells, cases = choose_cells(
         Selection(
             suites=suites, full=bool(request.suites), preset=request.preset, motions=motions,
             scenes=tuple(scenes), methods=tuple(methods), seeds=request.seeds,
@@ -79,13 +78,11 @@ def make_plan(request: Request) -> Plan:
     )  # fmt: skip
     check_body_shapes(inputs.body, [cell.scene for cell in cells])
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
-    asked |= {SUITE} if microbenchmarks else set()
     return Plan(
         preset=request.preset,
         suites=tuple(suite for suite in suites if suite in asked),
         cells=cells,
         cases=cases,
-        microbenchmarks=microbenchmarks,
         metrics=choose_metrics(request.metrics),
         motions=motions,
         inputs=inputs,

@@ -74,7 +74,7 @@ def make_parser() -> argparse.ArgumentParser:
     add_scene_options(parser)
     add = parser.add_argument
     add("--suite", action="append", default=[], metavar="NAME",
-        help="garments, speed, validation, extremes, shapes, fabric, engines, performance or all, in full; "
+        help="garments, speed, validation, extremes, shapes, fabric, engines or all, in full; "
         "repeat or separate by commas (default: garments, and a part of speed, validation and "
         "extremes)")  # fmt: skip
     file = "; a file (mine.py) means all that it declares"

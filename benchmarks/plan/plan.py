@@ -18,7 +18,6 @@ from benchmarks.training import Training
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
-    from benchmarks.performance.microbenchmark import Microbenchmark
     from benchmarks.validation.case import Case
 
 
@@ -129,7 +128,6 @@ class Plan:
     suites: tuple[str, ...]
     cells: tuple[Cell, ...]
     cases: tuple[Case, ...]
-    microbenchmarks: tuple[Microbenchmark, ...] = ()
     metrics: tuple[str, ...] = ()
     motions: Motions = Motions()
     inputs: Inputs = field(default_factory=Inputs)

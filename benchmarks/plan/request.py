@@ -22,7 +22,7 @@ class Request:
     command: the command line, for run.json. preset: the sizes of everything.
     suites, scenes, methods, metrics: names, patterns, and paths of files that declare some; empty: all that
     the suites list. further_scenes: scenes that no suite lists and no file declares. one_scene: exactly one
-    scene is asked for, and no case or microbenchmark of its name. roll_outs: stored ones, as methods.
+    scene is asked for, and no case of its name. roll_outs: stored ones, as methods.
     motions: paths, or "library"; motion_options: how to read them; test_motions, validation_motions: names of
     those that have these roles; split: the role that is measured, "test" or "validation".
     fabrics: a user's file of measured fabrics, for suite fabric; gauge: a user's copy of GAUGE, for it too.

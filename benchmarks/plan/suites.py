@@ -228,12 +228,6 @@ SUITES = (
         "where it is named",
         default=False,
     ),
-    Suite(
-        name="performance",
-        description="microbenchmarks: a solver step, a training step, a frame of a network; only where it is "
-        "named",
-        default=False,
-    ),
 )  # fmt: skip
 
 SUITE_NAMES = tuple(suite.name for suite in SUITES)

@@ -8,7 +8,6 @@ from typing import Any
 
 from benchmarks.cell import Cell
 from benchmarks.external.roll_out_option import MODULE as STORED
-from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.plan.plan import Plan, network_of
 from benchmarks.presets import find_preset
 from benchmarks.results.protocol import NUMBER, OWN
@@ -41,8 +40,7 @@ def protocol_of_case(scene: str, metric: str) -> str:
 
 @cache
 def _places() -> frozenset[Any]:
-    names = {benchmark.name for benchmark in MICROBENCHMARKS} | {case.name for case in CASES}
-    return frozenset(names | {(case.scene, case.metric) for case in CASES})
+    return frozenset({case.name for case in CASES} | {(case.scene, case.metric) for case in CASES})
 
 
 @cache

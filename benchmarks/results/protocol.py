@@ -17,7 +17,7 @@ DIGESTS = {
     "scenes": "2949e3d57aec722f",
     "materials": "832890dcb5d69952",
     "motions": "dc71f7b3a0e629a9",
-    "metrics": "3aafcf42de3f3d3f",
+    "metrics": "350e362f70ba6a8b",
     "reference": "7c745c22c1ea3e12",
     "sampling": "c899256a7a704edf",
     "statistics": "bbdacc941ceaa26a",

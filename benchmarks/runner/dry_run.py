@@ -46,9 +46,7 @@ def _head(plan: Plan) -> list[str]:
         how = "simulated for networks that learn from it" if garment in learning else "not simulated"
         how = f"networks of {plan.trained}" if plan.trained else how
         lines.append(f"training motions {', '.join(plan.motions.train)} ({how})")
-    counts = f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"
-    more = f", {len(plan.microbenchmarks)} microbenchmarks" * bool(plan.microbenchmarks)
-    return [*lines, counts + more]
+    return [*lines, f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"]
 
 
 def _size(plan: Plan, garment: str) -> str:

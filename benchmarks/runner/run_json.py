@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.fingerprint.digest import digest, digest_of_file
-from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs
@@ -177,7 +176,6 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     A report needs no other source.
     """
     methods = {cell.method: cell.entry for cell in plan.cells}
-    methods |= {benchmark.method: find_method(benchmark.method) for benchmark in plan.microbenchmarks}
     declarations = {
         name: _metric(name, plan) for name in dict.fromkeys(r.metric for r in rows if r.method in methods)
     }

@@ -15,10 +15,8 @@ from benchmarks.fingerprint.dependencies import find_module
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.metrics import MODULE_OF, names_of
-from benchmarks.performance.microbenchmark import Microbenchmark, Settings
 from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
@@ -28,7 +26,6 @@ from benchmarks.tasks.case import RunCase
 from benchmarks.tasks.cell_task import BatchCell, RepeatCell, RunCell, RunUntimedCell
 from benchmarks.tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
 from benchmarks.tasks.metric_task import MeasureCell
-from benchmarks.tasks.microbenchmark import RunMicrobenchmark
 from benchmarks.tasks.pretrained_network import TakeNetwork, take_network, without_machine
 from benchmarks.tasks.task import Task
 from benchmarks.tasks.training import LONGEST, TrainNetwork
@@ -76,7 +73,6 @@ class Schedule:
         yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
         yield from map(self.case, plan.cases)
-        yield from map(self.microbenchmark, plan.microbenchmarks)
 
     # --- ground truth and training -------------------------------------------------------------------------
 
@@ -285,24 +281,6 @@ class Schedule:
             inputs=self.inputs.machine() | {"declared": declared(case)},
             modules=(case.module, "benchmarks.validation.case", f"{TASKS}.case"),
         )  # fmt: skip
-
-    def microbenchmark(self, benchmark: Microbenchmark) -> RunMicrobenchmark:
-        """Return the task of a microbenchmark."""
-        name, method = flat(benchmark.label.replace(" ", "-")), benchmark.method
-        training = TRAININGS.get(method)
-        inputs: dict[str, Any] = {"declared": declared(benchmark), "training": training}
-        settings = Settings(repeats=benchmark.repeats, training=training)
-        if benchmark.trains:
-            steps = self.preset.steps_of(method, method)
-            settings = dataclasses.replace(settings, device=self.plan.device, steps=steps)
-            inputs["steps"] = steps
-        task = RunMicrobenchmark(
-            name=name, label=benchmark.label, inputs=self.inputs.machine(settings.device) | inputs,
-            modules=(benchmark.module, "benchmarks.performance.microbenchmark", f"{TASKS}.microbenchmark"),
-            benchmark=benchmark, entry=find_method(method), settings=settings, process=name,
-        )  # fmt: skip
-        settings = dataclasses.replace(settings, key=digest(dependencies(task)))
-        return dataclasses.replace(task, settings=settings)
 
     # --- facts of the plan ---------------------------------------------------------------------------------
 

@@ -16,7 +16,6 @@ from benchmarks.scene import Scene
 from snug.recipes.recipe import TERMS
 
 if TYPE_CHECKING:
-    from benchmarks.performance.microbenchmark import Microbenchmark
     from benchmarks.validation.case import Case
 
 ASSETS = "benchmarks.assets.assets"
@@ -80,12 +79,12 @@ class TaskInputs:
         }
 
 
-def declared(entry: MethodEntry | Scene | Case | Microbenchmark) -> dict[str, Any]:
+def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
     """Return what a scene, a method or a case declares, without descriptions; of files their content."""
     fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
     values = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
-    if isinstance(entry, MethodEntry | Scene):  # a microbenchmark's are those that it writes
+    if isinstance(entry, MethodEntry | Scene):
         values["files"] = {path: digest_of_file(Path(path)) for path in values["files"]}
     return values
 

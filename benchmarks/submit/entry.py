@@ -134,7 +134,7 @@ class Entry:
                 )
             declared = metadata.milliseconds if mine else None
             cells.append(replace(cell, entry=replace(cell.entry, timed=False, declared_ms=declared)))
-        return replace(plan, cells=tuple(cells), cases=(), microbenchmarks=())
+        return replace(plan, cells=tuple(cells), cases=())
 
 
 def read_entry(path: Path) -> tuple[Entry | None, list[str]]:

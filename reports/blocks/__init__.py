@@ -26,8 +26,6 @@ from reports.pictures.lead_row import lead_row
 from reports.pictures.side_by_side import side_by_side
 from reports.pictures.strip import strip
 
-PERFORMANCE = ("", "_simulator", "_search", "_scaling", "_training", "_inference", "_convergence")
-
 BLOCKS: tuple[Block, ...] = (
     SentenceBlock(headline),
     Figure("lead", lead_row),
@@ -83,7 +81,6 @@ BLOCKS: tuple[Block, ...] = (
     Heading("Training"),
     TableBlock("trainings"),
     Figure("training", training_curves, ("training.*", "training_*")),
-    *(TableBlock(f"performance{part}_by_scene") for part in PERFORMANCE),
     Heading("How cells, checks and stress tests ended"),
     TableBlock("endings"),
     TableBlock("unfinished", printed=with_labels),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster
-SUITES = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "engines", "performance")
+SUITES = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "engines")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from benchmarks.metric import Metric
 
-MOST_UNITS = 3  # that a row names
 # Pattern of names -> definition. The first pattern that matches a name has it.
 FAMILIES = {
     "energy/collision": "penalty of contact samples within the margin of the body, contact planes searched "
@@ -84,8 +83,6 @@ FAMILIES = {
     "both stretches, and the distance between them about the pelvis",
     "fabric/*": "textile tests: bending length, drape coefficient, and their errors",
     "mesh/*": "vertices, mean length of an edge at rest, time steps of a frame",
-    "performance/*": "suite `performance`: time, memory and iterations of simulator, contact search, "
-    "training and inference; steps and time to convergence of a training",
 }
 
 
@@ -108,8 +105,4 @@ def family_rows(metrics: Iterable[Metric]) -> list[tuple[str, str, str]]:
         units.setdefault(row, [])
         if metric.unit not in units[row]:
             units[row].append(metric.unit)
-    return [(f"`{row}`", _listed(units[row]), definition) for row, definition in definitions.items()]
-
-
-def _listed(units: list[str]) -> str:
-    return ", ".join(units) if len(units) <= MOST_UNITS else "several"
+    return [(f"`{row}`", ", ".join(units[row]), definition) for row, definition in definitions.items()]

@@ -226,7 +226,7 @@ def test_numbers_that_differ_are_refused_by_their_cell():
     with pytest.raises(MergeError, match="status ok in a, failed in b"):
         failed = row("cost/frame", None, "ms", status="failed", reason="died")
         joined_rows({"a": [row("cost/frame", 2.0, "ms", hardware="B")], "b": [failed]}, TIMED)
-    with pytest.raises(MergeError, match="cost/memory"):
+    with pytest.raises(MergeError, match=r"cost/memory: value 2.0 in a, 3.0 in b"):
         joined_rows({"a": [row("cost/memory", 2.0, "MB")], "b": [row("cost/memory", 3.0, "MB")]}, TIMED)
 
 
@@ -253,9 +253,6 @@ def test_times_are_of_the_first_machine_that_measured_them():
     assert joined_rows({"a": [a], "b": [b, trained]}, TIMED) == [a, trained]
     power = [row("mine/power", value, "W", hardware=where) for value, where in ((5.0, "A"), (6.0, "B"))]
     assert joined_rows({"a": power[:1], "b": power[1:]}, TIMED | {"mine/power"}) == power[:1]
-    sizes = [row("performance/parameters", value, "1") for value in (100.0, 999.0)]
-    with pytest.raises(MergeError, match=r"performance/parameters: value 100.0 in a, 999.0 in b"):
-        joined_rows({"a": sizes[:1], "b": sizes[1:]}, TIMED)
     twin = row("cost/frame", 4.0, "ms", method="pbns")  # the same machine again: its times stand beside
     assert joined_rows({"a": [a], "c": [twin]}, TIMED) == [a, twin]
     clip = dataclasses.replace(b, suite="speed")  # a suite that one machine alone has timed

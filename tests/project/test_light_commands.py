@@ -38,7 +38,6 @@ LIGHT = [
         {"numpy", "pandas", "scipy", "matplotlib", "torch", "h5py", "typst", "pyvista", "reference_sim.cloth"}
         | {"reference_sim.trajectory", "snug.body.parametric_body"},
     ),
-    ("benchmarks.performance.registry", [], "", {"numpy", "torch", "reference_sim", "snug"}),
     ("benchmarks.results.run_folder", [], "", {"numpy", "torch", "pandas"}),
 ]
 

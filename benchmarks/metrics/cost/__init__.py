@@ -1,1 +1,1 @@
-"""Metrics of cost and of training data: cost/*, solver/*, training_distance/*, performance/*."""
+"""Metrics of cost and of training data: cost/*, solver/*, training_distance/*."""

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.engines.newton_cloth import NewtonCloth, build_model, spring_stiffness
 from benchmarks.engines.newton_energies import StableNeoHookean, UnequalSprings
 from benchmarks.methods.solvers import newton_physics
-from benchmarks.performance.sheet import DT, regular_sheet
+from benchmarks.performance.microbenchmarks import DT, regular_sheet
 from reference_sim import Potential, simulate
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import Newton

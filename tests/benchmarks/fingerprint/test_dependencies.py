@@ -13,7 +13,6 @@ from benchmarks.fingerprint.dependencies import code_of, data_of, packages_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.metrics import MODULE_OF
-from benchmarks.performance.registry import MICROBENCHMARKS
 from benchmarks.scenes import FURTHER_SCENES, SCENES
 
 FILES = {
@@ -203,16 +202,12 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
         "training",
         "metric_task",
         "case",
-        "microbenchmark",
     )
     modules = [f"benchmarks.tasks.{name}" for name in names]
     modules += [entry.module for entry in (*SCENES, *FURTHER_SCENES, *METHODS)]
     modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets.assets"]
     modules += list(MODULE_OF.values())
     assert {name: files for name in modules if (files := lists & set(code_of(name)))} == {}
-    # A shirt of preset quick is measured.
-    lists -= {"benchmarks/presets.py", "benchmarks/scenes/__init__.py"}
-    assert not any(lists & set(code_of(benchmark.module)) for benchmark in MICROBENCHMARKS)
 
 
 def test_the_packages_that_move_a_number_are_known():

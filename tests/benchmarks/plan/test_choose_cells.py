@@ -19,7 +19,7 @@ SMOKE = find_preset("smoke")
 
 
 def chosen(suites, *, full=False, scenes=(), methods=(), seeds=(0,), test=("kick", "punch")):
-    cells, cases, _ = choose_cells(
+    cells, cases = choose_cells(
         Selection(
             suites=tuple(suites), full=full, preset=find_preset("quick"), scenes=tuple(scenes),
             motions=Motions(("walk",), test, {}), methods=tuple(methods), seeds=seeds,

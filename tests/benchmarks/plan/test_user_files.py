@@ -205,8 +205,8 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, message, tmp_path
     (tmp_path / "worn.py").write_text(worn)
     (tmp_path / "random.py").write_text("METHODS = ()\n")
     with monkeypatch.context() as patch:
-        case = dataclasses.replace(choosing.MEASURED[0], name="membrane/uniaxial")
-        patch.setattr("benchmarks.plan.choose_cells.MEASURED", (case,))
+        case = dataclasses.replace(choosing.CASES[0], name="membrane/uniaxial")
+        patch.setattr("benchmarks.plan.choose_cells.CASES", (case,))
         refused(message, run.main, ["--scenes", "free_fall", option, word, "-o", "out"])
 
 

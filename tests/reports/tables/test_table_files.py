@@ -9,10 +9,8 @@ import re
 import pytest
 from matplotlib.mathtext import MathTextParser
 
-from benchmarks.metrics.cost import microbenchmarks
 from benchmarks.results import run_folder as results
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks import PERFORMANCE
 from reports.run.finished_run import make_run
 from reports.run.reading import read_run, read_run_with_trainings
 from reports.tables import latex, make_tables, write_tables
@@ -141,8 +139,3 @@ def test_a_table_that_the_run_has_not_is_not_written(tmp_path):
     latex.write_latex(run, make_tables(run), folder.tables)
     assert [path.name for path in folder.tables.iterdir()] == ["energies.tex"]
     assert len(dictionary(run).rows) == len(results.COLUMNS) + 1
-
-
-def test_every_table_of_the_microbenchmarks_has_its_block():
-    declared = {metric.table for metric in microbenchmarks.METRICS}
-    assert declared == {f"performance{part}" for part in PERFORMANCE}

@@ -1,0 +1,156 @@
+"""Microbenchmarks: a solver step, a search of contact, a training step, a frame of a network.
+
+Each class is one of asv: `setup` makes what its function `time_...` then does again and again. Times belong
+to the machine that they were taken on: compare ratios. Without asv, a plain call prints median times:
+
+    python -c "from benchmarks.performance.microbenchmarks import print_times; print_times()"
+"""
+
+from __future__ import annotations
+
+import itertools
+import timeit
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.assets.assets import embedded_motions
+from benchmarks.methods.catalogue.trainings import TRAININGS
+from reference_sim.cloth import Cloth
+from reference_sim.contact.closest_point import FaceSearch
+from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.material import Material
+from reference_sim.obstacle import DEFAULT_REGION
+from reference_sim.time_step import State, TimeStepper
+from snug.body.parametric_body import Body
+from snug.garments.templates import TSHIRT, find_template
+from snug.motion.library import TRAIN
+from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import prepare_frames
+from snug.training.optimisation_step import Trainer
+from snug.training.train_network import untrained_model
+
+DT = 1 / 30  # [s]
+NOISE = 1e-4  # [m] of the flat start, which would otherwise be a saddle
+VERTICES = (1000, 4400)  # of the T-shirt, about
+MOTIONS = TRAIN[:3]
+
+
+def regular_sheet(n: int) -> Cloth:
+    """Return a 1 m square of n x n vertices, pinned at two corners."""
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    h = 1.0 / (n - 1)
+    positions = np.stack([h * i.ravel(), np.zeros(n * n), h * j.ravel()], axis=1)
+    a = (i[:-1, :-1] * n + j[:-1, :-1]).ravel()
+    faces = np.concatenate([np.stack([a, a + 1, a + n], 1), np.stack([a + 1, a + n + 1, a + n], 1)])
+    return Cloth(positions, faces, Material(), pins=[0, n - 1])
+
+
+def dressed_body(vertices: int) -> DressedBody:
+    """Return the body in a T-shirt of about so many vertices."""
+    body = Body.load()
+    return DressedBody(body, find_template(TSHIRT).tailor(body, vertices=vertices))
+
+
+class SolverStep:
+    """The first time step of a sheet, side x side vertices, that falls from two pinned corners."""
+
+    params = ((32, 64, 128), ("newton", "lbfgs"))
+
+    def setup(self, side: int, method: str) -> None:
+        """Make the sheet, flat but for noise."""
+        cloth = regular_sheet(side)
+        terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+        self.stepper = TimeStepper(cloth, terms, dt=DT, method=method)
+        x = cloth.rest_positions + np.random.default_rng(0).normal(0, NOISE, cloth.rest_positions.shape)
+        x[cloth.pins] = cloth.rest_positions[cloth.pins]
+        self.start = State(x, np.zeros_like(x))
+
+    def time_step(self, side: int, method: str) -> None:
+        """Minimise to the default tolerance."""
+        self.stepper.advance(1, self.start, None)
+
+
+class ContactSearch:
+    """Closest faces of the walking body to all contact samples of a T-shirt."""
+
+    params = (VERTICES,)
+
+    def setup(self, vertices: int) -> None:
+        """Skin the T-shirt to two frames of the walk, and search the first."""
+        dressed, (walk,) = dressed_body(vertices), embedded_motions(["walk"])
+        body, contact = dressed.body, ContactPenalty(dressed.garment.cloth())
+        before, self.samples = (contact.sample_matrix @ x for x in dressed.skinned(walk)[:2])
+        start, self.positions = body.vertices(walk.poses[:2], walk.translations[:2])
+        self.search = FaceSearch(body.faces, body.shaped()[body.faces].mean(axis=1))
+        self.listed = self.search.listed(contact.rest_samples, DEFAULT_REGION)
+        self.search.refit(start)
+        self.hints = self.search.nearest(before, hints=None, samples=self.listed).faces
+
+    def time_search(self, vertices: int) -> None:
+        """Search from the answers of the frame before, the body's new pose included."""
+        self.search.refit(self.positions)
+        self.search.nearest(self.samples, hints=self.hints, samples=self.listed)
+
+
+class TrainingStep:
+    """A step of a training on a CPU; the supervised network learns from skinned vertices here."""
+
+    params = (("snug", "supervised", "pbns"), VERTICES)
+    timeout = 600.0
+
+    def setup(self, network: str, vertices: int) -> None:
+        """Do what a training does before its first step."""
+        training, dressed, motions = TRAININGS[network], dressed_body(vertices), embedded_motions(MOTIONS)
+        targets = {motion.name: dressed.skinned(motion) for motion in motions} if training.simulated else None
+        self.trainer = Trainer(
+            training.kind,
+            dressed,
+            motions,
+            steps=10_000,
+            seed=0,
+            recipe=training.recipe,
+            trajectories=targets,
+        )
+        self.numbers = itertools.count()
+
+    def time_step(self, network: str, vertices: int) -> None:
+        """Do the next step."""
+        self.trainer.step(next(self.numbers))
+
+
+class NetworkFrame:
+    """A frame of a network and its skinning on one core. Weights are random: no time depends on them."""
+
+    params = (("snug", "pbns", "tailornet", "santesteban2019"), VERTICES)
+
+    def setup(self, network: str, vertices: int) -> None:
+        """Make the inputs of all frames of a motion, which then comes again and again."""
+        training, dressed, motions = TRAININGS[network], dressed_body(vertices), embedded_motions(MOTIONS)
+        model = untrained_model(training.kind, dressed, motions, seed=0, recipe=training.recipe)
+        start = prepare_frames(model, dressed, motions[0])
+        self.frames = (frame for _ in itertools.count() for frame in start())
+
+    def time_frame(self, network: str, vertices: int) -> None:
+        """Compute the next frame."""
+        next(self.frames)
+
+
+CLASSES = (SolverStep, ContactSearch, TrainingStep, NetworkFrame)
+
+
+def print_times(classes: Sequence[Any] = CLASSES, repeats: int = 20) -> None:
+    """Print the median time [ms] of each class at each of its parameters."""
+    for kind in classes:
+        for values in itertools.product(*kind.params):
+            benchmark = kind()
+            benchmark.setup(*values)
+            (name,) = (name for name in vars(kind) if name.startswith("time_"))
+            once = getattr(benchmark, name)
+            once(*values)  # compiles
+            seconds = timeit.repeat(lambda: once(*values), number=1, repeat=repeats)  # noqa: B023
+            print(f"{kind.__name__}.{name}{values}: {1e3 * float(np.median(seconds)):.3f} ms", flush=True)
