@@ -185,12 +185,9 @@ def _npz(path: str) -> dict[str, Any]:
 
 
 def _pickle(path: str) -> dict[str, Any]:
-    from snug.body.plain_pickle import read_plain_pickle
+    from reference_sim.files.pickle_file import read_pickled_arrays
 
-    held = read_plain_pickle(path)
-    if not isinstance(held, dict):
-        raise ValueError(f"holds a {type(held).__name__}: a dict with 'pred' (T,V,3) is due")
-    return {KEYS[name]: value for name, value in held.items() if name in KEYS}
+    return {KEYS[name]: array for name, array in read_pickled_arrays(path, KEYS).items()}
 
 
 def _point_cache(path: str) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def read_array(path: str | Path) -> np.ndarray:
         with path.open("rb") as stream:
             return _array(stream)
     except Exception as error:
-        raise _refusal(path, "", error) from None
+        raise refusal(path, "", error) from None
 
 
 def read_arrays(
@@ -85,7 +85,7 @@ def read_arrays(
                     arrays[name] = _array(array)
         return arrays
     except Exception as error:
-        raise _refusal(path, name, error) from None
+        raise refusal(path, name, error) from None
 
 
 def write_array(path: str | Path, array: np.ndarray) -> None:
@@ -115,7 +115,7 @@ def array_names(path: str | Path) -> list[str]:
         with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
             return [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
     except Exception as error:
-        raise _refusal(path, "", error) from None
+        raise refusal(path, "", error) from None
 
 
 def _array(stream: IO[bytes]) -> np.ndarray:
@@ -133,7 +133,8 @@ def _array(stream: IO[bytes]) -> np.ndarray:
     return array
 
 
-def _refusal(path: Path, name: str, error: Exception) -> ArrayFileError:
+def refusal(path: Path, name: str, error: Exception) -> ArrayFileError:
+    """Return the one line that says why a file, or its array `name`, cannot be read."""
     if isinstance(error, FileNotFoundError):
         return ArrayFileError(f"{path}: no such file")
     reason = " ".join(str(error).split())[:200] or type(error).__name__

@@ -7,7 +7,6 @@
 | skinning | linear blend skinning in torch, and its inverse |
 | smpl_files | `read_body`: a user's SMPL, SMPL-H, SMPL-X or plain arrays, checked |
 | t_pose | a body in A pose, brought to the T pose |
-| plain_pickle | a reader of pickles that runs nothing |
 
 >>> from snug.body import Body, JOINT_NAMES
 >>> body = Body.load()

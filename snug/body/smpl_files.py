@@ -6,7 +6,7 @@
 | faces, closed and wound outwards | `f`, `faces` | (F, 3), (F, 4) |
 | weights, rows sum to one | `weights`, `blend_weights`, `lbs_weights`, `skinning_weights` | (B, J) |
 | SMPL's tree | `kintree_table`; or `parents` | (2, J); (J,) |
-| joints from vertices, dense or sparse | `J_regressor` | (J, B) |
+| joints from vertices, dense or `csc_matrix` | `J_regressor` | (J, B) |
 | or joints | `J_template`, `joints`, `joint_template`, `J` | (J, 3) [m] |
 | shapes, optional, the first ten | `shapedirs`, `shape_directions` | (B, 3, S) |
 | how shape moves joints without regressor | `J_shapedirs`, `joint_directions` | (J, 3, S) |
@@ -20,15 +20,15 @@ brought to the T pose, since that is what motions are relative to.
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import scipy.sparse
 
+from reference_sim.cloth import MeshError
 from reference_sim.files.array_file import ArrayFileError, read_arrays
-from reference_sim.geometry.topology import boundary_loops, half_edges
+from reference_sim.files.pickle_file import read_pickled_arrays
+from reference_sim.geometry.closed_mesh import check_closed
+from reference_sim.geometry.topology import boundary_loops
 from snug.body.parametric_body import SHAPES, Body
-from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, PARENTS, BodyError
 from snug.body.t_pose import arm_angles, arm_rotations, turn_rest_pose
 
@@ -61,21 +61,14 @@ class _File:
         names = [name for synonyms in SYNONYMS.values() for name in synonyms]
         try:
             pickled = path.suffix.lower() in (".pkl", ".pickle")
-            content = read_plain_pickle(path) if pickled else read_arrays(path, names)
-        except PlainPickleError as error:
-            raise BodyError(str(error)) from error
+            content = read_pickled_arrays(path, names) if pickled else read_arrays(path, names)
         except ArrayFileError as error:
             remedy = "expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
             raise BodyError(f"{error}; {remedy}") from error
-        if not isinstance(content, dict):
-            raise self.error(f"holds a {type(content).__name__}; expected a dict of arrays")
-        self.arrays: dict[str, Any] = {}  # of numpy; J_regressor may be a sparse matrix
+        self.arrays: dict[str, np.ndarray] = {}
         for key, synonyms in SYNONYMS.items():
             if present := [content[name] for name in synonyms if name in content]:
-                sparse = scipy.sparse.issparse(present[0])
-                if sparse and key != "J_regressor":
-                    raise self.error(f"{key} is a sparse matrix; give a plain array, as toarray() makes")
-                self.arrays[key] = present[0] if sparse else np.asarray(present[0])
+                self.arrays[key] = present[0]
 
     def error(self, problem: str) -> BodyError:
         """Return the error that names the file."""
@@ -88,13 +81,11 @@ class _File:
         if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
             wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
             raise self.error(f"{key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
-        dense = array.toarray() if scipy.sparse.issparse(array) else array
-        with np.errstate(over="ignore"):
-            dense = dense.astype(np.float64)
-        if len(bad := np.argwhere(~np.isfinite(dense))):
-            first, place = dense[tuple(bad[0])], ", ".join(map(str, bad[0]))
+        array = array.astype(np.float64)
+        if len(bad := np.argwhere(~np.isfinite(array))):
+            first, place = array[tuple(bad[0])], ", ".join(map(str, bad[0]))
             raise self.error(f"{key}[{place}] is {first}: not finite, as are {len(bad)} of its values")
-        return dense
+        return array
 
 
 def read_body(path: str | Path | None) -> Body:
@@ -158,8 +149,13 @@ def _skeleton(file: _File, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
     sums = weights.sum(axis=1, keepdims=True)
     if weights.min() < -1e-6 or np.abs(sums - 1.0).max() > 1e-3:
         raise file.error("weights must be non-negative with rows that sum to one")
-    if "rest_pose" in file.arrays and not _is_identity(file.arrays["rest_pose"]):
-        raise file.error("rest_pose gives bones axes of their own; give a body without, and its motion too")
+    if "rest_pose" in file.arrays:  # axis-angles, or quaternions with w first or last
+        turns = np.abs(file.numbers("rest_pose", (joints, None)))
+        still = ([0, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1])
+        if not any(len(one) == turns.shape[1] and np.allclose(turns, one, atol=1e-4) for one in still):
+            raise file.error(
+                "rest_pose gives bones axes of their own; give a body without, and its motion too"
+            )
     kept = JOINTS if joints == JOINTS else BODY_JOINTS
     wrong = [j for j in range(1, kept) if parents[j] != PARENTS[j]]
     if wrong:
@@ -182,14 +178,6 @@ def _skeleton(file: _File, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
     if knuckles.min() == 0:
         raise file.error("kintree_table: a wrist without a finger")
     return weights / sums, places / knuckles, folded
-
-
-def _is_identity(turns: np.ndarray) -> bool:
-    """Return whether axis-angles (J, 3), or quaternions (J, 4) with w first or last, turn nothing."""
-    if turns.ndim != 2 or turns.shape[1] not in (3, 4) or turns.dtype.kind not in "fiu":
-        return False
-    identities = [np.zeros(3)] if turns.shape[1] == 3 else [np.eye(4)[0], np.eye(4)[3]]
-    return any(np.allclose(np.abs(turns), one, atol=1e-4) for one in identities)
 
 
 def _joints(
@@ -268,7 +256,10 @@ def _in_t_pose(file: _File, body: Body) -> Body:
 
 
 def _faces(file: _File, template: np.ndarray) -> np.ndarray:
-    """Return the triangles (F, 3) of a closed surface, wound outward. Raises BodyError."""
+    """Return the triangles (F, 3) of a closed surface, wound outward.
+
+    Small holes, as the eyes of SMPL-X, are closed by fans of triangles. Raises BodyError.
+    """
     faces = file.arrays["f"]
     if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu" or faces.size == 0:
         raise file.error(f"f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)")
@@ -277,28 +268,14 @@ def _faces(file: _File, template: np.ndarray) -> np.ndarray:
         raise file.error(f"f names vertex {faces.max()}; the body has {len(template)}")
     if faces.shape[1] == 4:
         faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
-    edges = half_edges(faces)
-    if len(np.unique(edges, axis=0)) != len(edges) or (edges[:, 0] == edges[:, 1]).any():
-        raise file.error("f is not a closed surface with one winding; inside and outside need one")
-    faces = _fill_holes(file, faces, template)
-    a, b, c = (template[faces[:, k]] for k in range(3))
-    if np.einsum("ij,ij->", a, np.cross(b, c)) < 0:
-        raise file.error("f winds inwards; reverse the order of each triangle's vertices")
-    return faces
-
-
-def _fill_holes(file: _File, faces: np.ndarray, template: np.ndarray) -> np.ndarray:
-    """Return the faces with small holes, as the eyes of SMPL-X, closed by fans of triangles."""
     try:
-        loops = boundary_loops(faces)
+        for loop in boundary_loops(faces):
+            around = np.linalg.norm(template[loop] - template[np.roll(loop, 1)], axis=1).sum()
+            if around > MAX_HOLE:
+                raise MeshError(f"a hole at vertex {loop[0]} is {around:.2g} m around")
+            fan = np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1)
+            faces = np.concatenate([faces, fan])
+        check_closed(template[None], faces)
     except ValueError as error:
-        raise file.error(f"f is not a closed surface: {error}") from error
-    for loop in loops:
-        around = np.linalg.norm(template[loop] - template[np.roll(loop, 1)], axis=1).sum()
-        if around > MAX_HOLE:
-            raise file.error(
-                f"f is not a closed surface: a hole at vertex {loop[0]} is {around:.2g} m around"
-            )
-        fan = np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1)
-        faces = np.concatenate([faces, fan])
+        raise file.error(f"f is no closed surface: {str(error).removeprefix('obstacle ')}") from error
     return faces

@@ -6,9 +6,10 @@
 | library | the motions of the package by name and role; `make_motion` |
 | clips | tables of angles that the motions made by code consist of |
 | recorded | recorded clips of the library, under their own notice |
-| files | `load_motions`: a user's files, checked and ready to use |
+| files | `load_motions`: a user's files, checked and ready to use; the table of readers |
+| acclaim, bvh, smpl_arrays | readers, one per format |
+| joint_names, retarget | a foreign skeleton: its joints matched with ours, its motion put on ours |
 | options | facts that a file does not state, such as its vertical axis |
-| formats | the table of readers: acclaim, bvh, smpl_arrays; joint_names matches foreign skeletons |
 | raw_motion | a motion as its file has it |
 | vertical_axis, recording_errors | which axis is up; jumps and numbers that are not finite |
 

@@ -9,18 +9,29 @@ G_bone = G_parent C M C^-1 is its rotation in the world. Its far end lies at G_b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from snug.body.skeleton import LEG_LENGTH
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import Line, check_frame_count, read_lines
+from snug.motion.options import MotionFileOptions
+from snug.motion.raw_motion import Line, RawMotion, check_frame_count, frame_rate, read_lines
+from snug.motion.retarget import FEET, HINGES, LIMBS, retarget
 
+CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
 INCH = 0.0254  # [m]
-_ROTATIONS = ("rx", "ry", "rz")
-_TRANSLATIONS = ("tx", "ty", "tz")
+ROTATIONS, TRANSLATIONS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
+# Our joint: the CMU bone whose turn it takes. Thumbs and the half bones inside hips and neck are not needed.
+JOINT_BONES = {
+    "pelvis": "root", "spine1": "lowerback", "spine2": "upperback", "spine3": "thorax",
+    "neck": "upperneck", "head": "head",
+    **{f"{side}_{joint}": side[0] + bone for side in ("left", "right") for joint, bone in (
+        ("hip", "femur"), ("knee", "tibia"), ("ankle", "foot"), ("foot", "toes"), ("collar", "clavicle"),
+        ("shoulder", "humerus"), ("elbow", "radius"), ("wrist", "hand"), ("hand", "fingers"))},
+}  # fmt: skip
 
 
 @dataclass
@@ -35,11 +46,10 @@ class Bone:
         parent: name of the bone that it hangs on.
     """
 
-    name: str
-    direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    length: float = 0.0
-    axes: np.ndarray = field(default_factory=lambda: np.eye(3))
-    channels: tuple[str, ...] = ()
+    direction: np.ndarray
+    length: float
+    axes: np.ndarray
+    channels: tuple[str, ...]
     parent: str = ""
 
 
@@ -57,35 +67,159 @@ class Skeleton:
     bones: dict[str, Bone]
     metres: float
     position: np.ndarray
-    degrees: bool = True
+    degrees: bool
+
+
+def read_asf_amc(path: Path, options: MotionFileOptions) -> RawMotion:
+    """Read an .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf).
+
+    The path is scaled by the ratio of leg lengths, so that steps and legs agree.
+
+    Raises:
+        MotionError: no skeleton, a damaged file, or a skeleton without the bones of CMU's.
+    """
+    names = (path.stem, path.stem.split("_")[0])
+    candidates = [path.with_name(name + end) for name in names for end in (".asf", ".ASF")]
+    file = next((file for file in candidates if file.is_file()), None)
+    if file is None:
+        raise MotionError(f"{path}: its skeleton {names[1]}.asf is missing; put it beside the clip")
+    skeleton = read_asf(file)
+    bones = skeleton.bones
+    if missing := [bone for bone in JOINT_BONES.values() if bone not in bones]:
+        raise MotionError(f"{file}: no bone '{missing[0]}'; only skeletons with CMU's bone names are read")
+    leg = bones["lfemur"].length + bones["ltibia"].length
+    if leg <= 0.0:
+        raise MotionError(f"{file}: the left leg has no length; fetch the skeleton again")
+    channels = read_amc(path, skeleton)
+    turned = world_turns(skeleton, channels)
+    poses = retarget(
+        file,
+        {joint: turned[bone] for joint, bone in JOINT_BONES.items()},
+        {joint: bones[JOINT_BONES[joint]].direction for joint in LIMBS | FEET},
+        {joint: bones[JOINT_BONES[joint]].axes[:, 0] for joint in HINGES},
+    )
+    order = bones["root"].channels
+    root = skeleton.position + np.stack(
+        [channels["root"][:, order.index(axis)] if axis in order else np.zeros(len(poses))
+         for axis in TRANSLATIONS], axis=1,
+    )  # fmt: skip
+    return RawMotion(
+        path=path, poses=poses, translations=LEG_LENGTH / leg * root,
+        fps=frame_rate(path, None, options, CMU_RATE), source=f"{path.name} with {file.name}",
+    )  # fmt: skip
+
+
+def world_turns(skeleton: Skeleton, channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return G (T, 3, 3) of every bone: its rotation in the world, from the zero pose."""
+    turned: dict[str, np.ndarray] = {}
+    for name, bone in skeleton.bones.items():
+        local = np.eye(3)
+        if bone.channels:
+            local = bone.axes @ product(bone.channels, channels[name]) @ bone.axes.T
+        turned[name] = turned[bone.parent] @ local if bone.parent else local
+    return turned
+
+
+def product(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
+    """Return M (T, 3, 3) of a bone: the product of its rotations (T, channels), the first applied first."""
+    rotation = Rotation.identity(len(values))
+    for channel, angles in zip(channels, values.T):
+        if channel in ROTATIONS:
+            rotation = Rotation.from_euler(channel[1], angles[:, None]) * rotation
+    return rotation.as_matrix()
 
 
 def read_asf(path: Path) -> Skeleton:
     """Parse a skeleton. Raises MotionError with file and line."""
-    sections: dict[str, list[Line]] = {}
-    for line in _lines(path):
+    sections: dict[str, list[Line]] = {"": []}
+    current = sections[""]
+    for line in read_lines(path, comment="#"):
         if line.tokens[0].startswith(":"):
             current = sections.setdefault(line.tokens[0][1:].lower(), [])
             line.tokens = line.tokens[1:]
-            if not line.tokens:
-                continue
-        elif not sections:
+        elif current is sections[""]:
             raise line.error("no section such as :root before this; is it an .asf file?")
-        current.append(line)
+        if line.tokens:
+            current.append(line)
     for name in ("root", "bonedata", "hierarchy"):
         if not sections.get(name):
             raise MotionError(f"{path}: section :{name} is missing or empty; fetch the skeleton again")
     units = {line.tokens[0]: line for line in sections.get("units", [])}
-    unit = units["length"].numbers(1, 2)[0] if "length" in units else 1.0
+    unit = units["length"].numbers(1, 1)[0] if "length" in units else 1.0
     if unit <= 0:
         raise units["length"].error("the unit of length must be positive")
+    metres = INCH / unit  # CMU's lengths times 1 / unit are inches
     degrees = "angle" not in units or units["angle"].tokens[1:] != ["rad"]
-    # CMU's lengths times 1 / unit are inches.
-    skeleton = Skeleton({}, INCH / unit, np.zeros(3), degrees)
-    skeleton.bones["root"] = _root(sections["root"], skeleton)
-    bones = _bones(sections["bonedata"], skeleton)
-    _attach(sections["hierarchy"], bones, skeleton)
-    return skeleton
+    root = {line.tokens[0].lower(): line for line in sections["root"]}
+    if "order" not in root or len(root["order"].tokens) == 1:
+        raise sections["root"][0].error("the root has no 'order' of its channels")
+    position = root["position"].numbers(1, 3) if "position" in root else [0.0, 0.0, 0.0]
+    bones = {"root": _bone(root, metres, degrees)}
+    listed = {name: _bone(block, metres, degrees) for name, block in _blocks(sections["bonedata"]).items()}
+    _attach(sections["hierarchy"], listed, bones)
+    return Skeleton(bones, metres, np.array(position) * metres, degrees)
+
+
+def _blocks(lines: list[Line]) -> dict[str, dict[str, Line]]:
+    """Return the lines of each bone, which follow a 'begin', by their first words."""
+    blocks: dict[str, dict[str, Line]] = {}
+    block: dict[str, Line] = {}
+    for line in lines:
+        word = line.tokens[0].lower()
+        if word == "begin":
+            block = {}
+        elif word == "name" and len(line.tokens) > 1:
+            if word in block or line.tokens[1] in blocks:
+                raise line.error(f"second name, or bone: '{line.tokens[1]}'; is a 'begin' missing?")
+            blocks[line.tokens[1]] = block
+        block[word] = line
+    return blocks
+
+
+def _bone(block: dict[str, Line], metres: float, degrees: bool) -> Bone:
+    """Return a bone, or the root, whose channels are 'order' and whose axes 'orientation'."""
+    root = "order" in block
+    direction, length, axes = np.zeros(3), 0.0, np.eye(3)
+    if "direction" in block:
+        direction = np.array(block["direction"].numbers(1, 3))
+        norm = float(np.linalg.norm(direction))
+        if not 1e-6 < norm < 1e6:
+            raise block["direction"].error("a bone's direction cannot be zero, nor so long")
+        direction /= norm
+    if "length" in block:
+        length = block["length"].numbers(1, 1)[0] * metres
+    if line := block.get("orientation" if root else "axis"):
+        order = (block["axis"].tokens[1:2] if root and "axis" in block else line.tokens[4:5]) or ["XYZ"]
+        letters = order[0].lower()
+        if sorted(letters) != ["x", "y", "z"]:
+            raise line.error(f"axis order '{order[0]}' is not a permutation of XYZ")
+        angles = np.array([line.numbers(1, 3)])
+        axes = product(tuple(f"r{letter}" for letter in letters), np.radians(angles) if degrees else angles)[
+            0
+        ]
+    line = block.get("order" if root else "dof")
+    channels = tuple(word.lower() for word in line.tokens[1:]) if line else ()
+    allowed = TRANSLATIONS + ROTATIONS if root else ROTATIONS
+    if line and (unknown := [channel for channel in channels if channel not in allowed]):
+        raise line.error(f"channel '{unknown[0]}' is not supported here; known are {' '.join(allowed)}")
+    return Bone(direction, length, axes, channels)
+
+
+def _attach(lines: list[Line], listed: dict[str, Bone], bones: dict[str, Bone]) -> None:
+    """Hang the bones of a skeleton on each other, below the root, as its hierarchy says."""
+    for line in lines:
+        parent, *children = line.tokens
+        if parent in ("begin", "end"):
+            continue
+        if parent not in bones:
+            raise line.error(f"'{parent}' is not joined to the root yet; list parents before children")
+        for child in children:
+            if child not in listed:
+                raise line.error(f"bone '{child}' has no entry in :bonedata")
+            if child in bones:
+                raise line.error(f"bone '{child}' has two parents")
+            listed[child].parent = parent
+            bones[child] = listed[child]
 
 
 def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
@@ -93,13 +227,11 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
     moving = {name: len(bone.channels) for name, bone in skeleton.bones.items() if bone.channels}
     frames: list[dict[str, list[float]]] = []
     degrees = skeleton.degrees
-    lines = _lines(path)
-    for line in lines:
+    for line in read_lines(path, comment="#"):
         word = line.tokens[0]
         if word.startswith(":"):
             degrees = {":degrees": True, ":radians": False}.get(word.lower(), degrees)
         elif len(line.tokens) == 1 and word.isdigit():
-            _check_whole(line, frames, moving)
             frames.append({})
         elif not frames:
             raise line.error(f"'{word}' comes before the first frame number; is it an .amc file?")
@@ -108,118 +240,18 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
                 f"unknown bone '{word[:40]}'; the skeleton does not have it, give the right .asf"
             )
         else:
-            values = line.numbers(1)
-            if len(values) != moving[word]:
-                raise line.error(
-                    f"bone '{word}' has {len(values)} numbers, its skeleton {moving[word]}; fetch again"
-                )
-            frames[-1][word] = values
-    if not frames:
-        raise MotionError(f"{path}: holds no frame; give a whole .amc file")
+            frames[-1][word] = line.numbers(1, moving[word], last=True)
     check_frame_count(path, len(frames))
-    _check_whole(lines[-1], frames, moving)
+    for number, frame in enumerate(frames, 1):
+        if missing := [name for name in moving if name not in frame]:
+            raise MotionError(
+                f"{path}: frame {number} ends without bone '{missing[0]}'; it is cut off, fetch it again"
+            )
     channels = {}
     for name in moving:
         scale = [
-            (math.pi / 180 if degrees else 1.0) if channel in _ROTATIONS else skeleton.metres
+            (math.pi / 180 if degrees else 1.0) if channel in ROTATIONS else skeleton.metres
             for channel in skeleton.bones[name].channels
         ]
         channels[name] = np.array([frame[name] for frame in frames]) * scale
     return channels
-
-
-def turns(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
-    """Return M (T, 3, 3) of a bone: the product of its rotations (T, channels), the first applied first."""
-    rotation = Rotation.identity(len(values))
-    for channel, angles in zip(channels, values.T):
-        if channel in _ROTATIONS:
-            rotation = Rotation.from_euler(channel[1], angles[:, None]) * rotation
-    return rotation.as_matrix()
-
-
-def _lines(path: Path) -> list[Line]:
-    lines = list(read_lines(path, comment="#"))
-    if not lines:
-        raise MotionError(f"{path}: the file is empty; fetch it again")
-    return lines
-
-
-def _check_whole(line: Line, frames: list[dict[str, list[float]]], moving: dict[str, int]) -> None:
-    if frames and len(frames[-1]) < len(moving):
-        missing = next(name for name in moving if name not in frames[-1])
-        raise line.error(
-            f"frame {len(frames)} ends without bone '{missing}'; the file is cut off, fetch it again"
-        )
-
-
-def _axes(line: Line, angles: list[float], order: str, degrees: bool) -> np.ndarray:
-    if sorted(order.lower()) != ["x", "y", "z"]:
-        raise line.error(f"axis order '{order}' is not a permutation of XYZ")
-    values = np.radians([angles]) if degrees else np.array([angles])
-    return turns(tuple(f"r{letter}" for letter in order.lower()), values)[0]
-
-
-def _root(lines: list[Line], skeleton: Skeleton) -> Bone:
-    entries = {line.tokens[0].lower(): line for line in lines}
-    if "order" not in entries:
-        raise lines[0].error("the root has no 'order' of its channels")
-    bone = Bone("root", channels=_channels(entries["order"], _TRANSLATIONS + _ROTATIONS))
-    if "position" in entries:
-        skeleton.position = np.array(entries["position"].numbers(1, 4)) * skeleton.metres
-    if "orientation" in entries:
-        order = entries["axis"].tokens[1] if "axis" in entries and len(entries["axis"].tokens) > 1 else "XYZ"
-        line = entries["orientation"]
-        bone.axes = _axes(line, line.numbers(1, 4), order, skeleton.degrees)
-    return bone
-
-
-def _channels(line: Line, allowed: tuple[str, ...]) -> tuple[str, ...]:
-    channels = tuple(word.lower() for word in line.tokens[1:])
-    for channel in channels:
-        if channel not in allowed:
-            raise line.error(f"channel '{channel}' is not supported here; known are {' '.join(allowed)}")
-    return channels
-
-
-def _bones(lines: list[Line], skeleton: Skeleton) -> dict[str, Bone]:
-    bones: dict[str, Bone] = {}
-    bone = Bone("")
-    for line in lines:
-        word = line.tokens[0].lower()
-        if word == "begin":
-            bone = Bone("")
-        elif word == "name" and len(line.tokens) > 1:
-            if bone.name or line.tokens[1] in bones:
-                raise line.error(f"second name, or bone: '{line.tokens[1]}'; is a 'begin' missing?")
-            bone.name = line.tokens[1]
-            bones[bone.name] = bone
-        elif word == "direction":
-            bone.direction = np.array(line.numbers(1, 4))
-            norm = float(np.linalg.norm(bone.direction))
-            if not 1e-6 < norm < 1e6:
-                raise line.error("a bone's direction cannot be zero, nor so long")
-            bone.direction /= norm
-        elif word == "length":
-            bone.length = line.numbers(1, 2)[0] * skeleton.metres
-        elif word == "axis":
-            order = line.tokens[4] if len(line.tokens) > 4 else "XYZ"
-            bone.axes = _axes(line, line.numbers(1, 4), order, skeleton.degrees)
-        elif word == "dof":
-            bone.channels = _channels(line, _ROTATIONS)
-    return bones
-
-
-def _attach(lines: list[Line], bones: dict[str, Bone], skeleton: Skeleton) -> None:
-    for line in lines:
-        parent, *children = line.tokens
-        if parent in ("begin", "end"):
-            continue
-        if parent not in skeleton.bones:
-            raise line.error(f"'{parent}' is not joined to the root yet; list parents before children")
-        for child in children:
-            if child not in bones:
-                raise line.error(f"bone '{child}' has no entry in :bonedata")
-            if child in skeleton.bones:
-                raise line.error(f"bone '{child}' has two parents")
-            bones[child].parent = parent
-            skeleton.bones[child] = bones[child]

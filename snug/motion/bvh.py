@@ -7,19 +7,22 @@ joints stand at the sums of their offsets: the zero pose.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from snug.body.skeleton import LEG_LENGTH
+from snug.motion.joint_names import match_joints, way_up
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import Line, check_frame_count, read_lines
+from snug.motion.options import MotionFileOptions
+from snug.motion.raw_motion import Line, RawMotion, check_frame_count, frame_rate, read_lines
+from snug.motion.retarget import FEET, LIMBS, retarget
 
-MAX_JOINTS = 1000
 MAX_ROTATIONS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second
-CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
+CHANNELS = {f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}
 
 
 @dataclass
@@ -27,9 +30,11 @@ class Joint:
     """A joint of the hierarchy. An end site is a joint without channels and without a name.
 
     Attributes:
+        name: in the file.
         parent: index, -1 for the root.
         offset: (3,) in the file's unit.
         channels: "Xposition" and so on, from column `first` of the frames on.
+        first: column.
     """
 
     name: str
@@ -71,23 +76,82 @@ class BvhClip:
         return shift
 
 
+def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
+    """Read a .bvh of one body, whatever its unit of length: the path is scaled by the length of the legs.
+
+    Raises MotionError.
+    """
+    clip = read_clip(path)
+    parents = [joint.parent for joint in clip.joints]
+    matches = match_joints(path, [joint.name for joint in clip.joints], parents, options.joint_map)
+    places = np.zeros((len(parents), 3))
+    for index, joint in enumerate(clip.joints):
+        places[index] = joint.offset + (places[joint.parent] if joint.parent >= 0 else 0.0)
+    axes, leg = _standing(path, {name: places[index] for name, index in matches.items()})
+    places = places @ axes
+    directions = {
+        near: places[matches[far]] - places[matches[near]]
+        for near, far in (LIMBS | FEET).items()
+        if far in matches
+    }
+    for ankle in FEET:
+        if ankle in directions and directions[ankle][2] < -0.02 * leg:
+            raise MotionError(f"{path}: {FEET[ankle]} points backwards; are left and right exchanged?")
+    turned: dict[int, np.ndarray] = {}
+    for index in sorted({above for joint in matches.values() for above in way_up(parents, joint)}):
+        local = clip.turns(clip.joints[index])
+        turned[index] = turned[parents[index]] @ local if parents[index] >= 0 else local
+    root, *chain = reversed(way_up(parents, matches["pelvis"]))
+    pelvis = clip.shift(clip.joints[root])
+    for index in chain:
+        pelvis = pelvis + np.einsum("tij,tj->ti", turned[parents[index]], clip.shift(clip.joints[index]))
+    return RawMotion(
+        path=path,
+        poses=retarget(path, {name: turned[k] @ axes for name, k in matches.items()}, directions, {}),
+        translations=LEG_LENGTH / leg * pelvis,
+        fps=frame_rate(path, clip.fps, options),
+        source=f"{path.name} ({len(matches)} of 24 joints)",
+    )
+
+
+def _standing(path: Path, at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
+    """Return our axes as columns (3, 3) in the zero pose with joints `at` (3,), and the length of its leg.
+
+    Up is the axis nearest to the direction from ankles to head; left leads from hip to hip. Raises
+    MotionError.
+    """
+    leg = sum(
+        float(np.linalg.norm(at[near] - at[far]))
+        for near, far in (("left_hip", "left_knee"), ("left_knee", "left_ankle"))
+    )
+    way = at["head"] - 0.5 * (at["left_ankle"] + at["right_ankle"])
+    up = np.zeros(3)
+    up[np.abs(way).argmax()] = np.sign(way[np.abs(way).argmax()])
+    left = at["left_hip"] - at["right_hip"]
+    left -= up * (up @ left)
+    across = float(np.linalg.norm(left))
+    if not (1e-6 < leg < 1e6 and across > 1e-3 * leg and up.any()):
+        raise MotionError(f"{path}: legs or hips of its zero pose have no length; export it with offsets")
+    left /= across
+    return np.stack((left, up, np.cross(left, up)), axis=1), leg
+
+
 def read_clip(path: Path) -> BvhClip:
     """Parse a file. Raises MotionError, naming the file, and the line of what is damaged or too large."""
     lines = read_lines(path)
     _next_line(lines, path, "HIERARCHY")
     joints = _hierarchy(lines, path)
     columns = joints[-1].first + len(joints[-1].channels)
-    frames, frame_time = _header(lines, path, len(joints))
-    rows: list[np.ndarray] = []
-    for line in lines:
-        if len(rows) == frames:
-            raise line.error(f"more than the {frames} frames that 'Frames:' declares; export it again")
-        rows.append(np.array(_numbers(line, 0, columns)))
-    if len(rows) < frames:
-        raise MotionError(
-            f"{path}: declares {frames} frames and holds {len(rows)}; it is cut off, export it again"
-        )
-    return BvhClip(joints, np.stack(rows), 1.0 / frame_time if frame_time else None)
+    _next_line(lines, path, "MOTION")
+    [declared] = _next_line(lines, path, "Frames:").numbers(1, 1, last=True)
+    [seconds] = _next_line(lines, path, "Frame", "Time:").numbers(2, 1, last=True)
+    rows = [np.array(line.numbers(0, columns, last=True)) for line in lines]
+    if len(rows) != declared:
+        raise MotionError(f"{path}: declares {declared:g} frames and holds {len(rows)}; export it again")
+    check_frame_count(path, len(rows))
+    if len(rows) * len(joints) > MAX_ROTATIONS:
+        raise MotionError(f"{path}: {len(rows)} frames of {len(joints)} joints are too many; cut the clip")
+    return BvhClip(joints, np.stack(rows), 1.0 / seconds if seconds else None)
 
 
 def _next_line(lines: Iterator[Line], path: Path, *tokens: str) -> Line:
@@ -102,70 +166,36 @@ def _next_line(lines: Iterator[Line], path: Path, *tokens: str) -> Line:
     return line
 
 
-def _numbers(line: Line, first: int, count: int) -> list[float]:
-    """Return the tokens from `first` on as numbers. Raises MotionError unless they are `count`."""
-    values = line.numbers(first)
-    if len(values) != count:
-        raise line.error(f"{count} numbers should be here, not {len(values)}; export it again")
-    return values
-
-
 def _hierarchy(lines: Iterator[Line], path: Path) -> list[Joint]:
+    """Return the joints of the lines up to the brace that closes the root. Raises MotionError."""
     joints: list[Joint] = []
     open_joints: list[int] = []
+    names = {""}
     columns = 0
-    while True:
+    while not joints or open_joints:
         line = _next_line(lines, path)
-        tokens = line.tokens
-        word = tokens[0].lower()
-        if word in ("root", "joint", "end"):
-            if (word == "root") != (not joints):
-                raise line.error("there is one ROOT, and JOINTs and End Sites below it")
-            name = "" if word == "end" else " ".join(tokens[1:])
-            if word != "end" and (not name or any(joint.name == name for joint in joints)):
+        word, *rest = line.tokens
+        word = word.lower()
+        if word == ("joint" if joints else "root") or (word == "end" and joints):
+            name = "" if word == "end" else " ".join(rest)
+            if word != "end" and name in names:
                 raise line.error(f"joint '{name[:40]}' has no name or one that is taken")
-            if len(joints) == MAX_JOINTS:
-                raise line.error(f"more than {MAX_JOINTS} joints; is it the skeleton of one body?")
+            names.add(name)
             joints.append(Joint(name, open_joints[-1] if open_joints else -1, first=columns))
             open_joints.append(len(joints) - 1)
             _next_line(lines, path, "{")
-        elif not open_joints:
-            raise line.error(f"'{tokens[0][:40]}' where ROOT should be; is it a .bvh file?")
-        elif word == "offset":
-            joints[open_joints[-1]].offset = np.array(_numbers(line, 1, 3))
-        elif word == "channels" and open_joints[-1] == len(joints) - 1 and columns == joints[-1].first:
-            joints[-1].channels = _channels(line)
+        elif word == "offset" and open_joints:
+            joints[open_joints[-1]].offset = np.array(line.numbers(1, 3, last=True))
+        elif word == "channels" and open_joints[-1:] == [len(joints) - 1] and not joints[-1].channels:
+            joints[-1].channels = tuple(CHANNELS.get(word.lower(), "") for word in rest[1:])
             columns += len(joints[-1].channels)
-        elif word == "}":
+            known = set(joints[-1].channels) - {""}
+            if not rest[:1] == [str(len(rest) - 1)] == [str(len(known))]:
+                raise line.error(
+                    f"'{' '.join(line.tokens)[:60]}' declares other channels than it names, or unknown ones"
+                )
+        elif word == "}" and open_joints:
             open_joints.pop()
-            if not open_joints:
-                return joints
         else:
-            raise line.error(f"'{' '.join(tokens)[:40]}' is not known in a hierarchy, or out of place")
-
-
-def _channels(line: Line) -> tuple[str, ...]:
-    tokens = line.tokens
-    known = {channel.lower(): channel for channel in CHANNELS}
-    channels = tuple(known.get(word.lower(), "") for word in tokens[2:])
-    if tokens[1:2] != [str(len(channels))] or len(set(channels)) != len(channels) or "" in channels:
-        raise line.error(f"'{' '.join(tokens)[:60]}' declares other channels than it names, or unknown ones")
-    return channels
-
-
-def _header(lines: Iterator[Line], path: Path, joints: int) -> tuple[int, float | None]:
-    """Return the number of frames, and seconds a frame where it is stated."""
-    _next_line(lines, path, "MOTION")
-    line = _next_line(lines, path, "Frames:")
-    tokens = line.tokens[1:]
-    if len(tokens) != 1 or not (tokens[0].isascii() and tokens[0].isdigit() and len(tokens[0]) < 10):
-        raise line.error(f"'{' '.join(tokens)[:40]}' is no number of frames")
-    frames = int(tokens[0])
-    check_frame_count(path, frames)
-    if frames * joints > MAX_ROTATIONS:
-        raise line.error(f"{frames} frames of {joints} joints are too many; cut the clip")
-    line = _next_line(lines, path, "Frame", "Time:")
-    seconds = _numbers(line, 2, 1)[0]
-    if seconds < 0:
-        raise line.error("the frame time is negative")
-    return frames, seconds or None
+            raise line.error(f"'{' '.join(line.tokens)[:40]}' is not known in a hierarchy, or out of place")
+    return joints

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -10,13 +11,23 @@ import numpy as np
 
 from reference_sim.files.array_file import ArrayFileError, array_names
 from snug.body.skeleton import JOINT
-from snug.motion.formats import READERS
+from snug.motion.acclaim import read_asf_amc
+from snug.motion.bvh import read_bvh
 from snug.motion.motion import Motion, MotionError, clear_arms, place, resample
 from snug.motion.options import MotionFileOptions
+from snug.motion.raw_motion import RawMotion
 from snug.motion.recording_errors import remove_recording_errors
-from snug.motion.smpl_arrays import ARRAY_NAMES
+from snug.motion.smpl_arrays import ARRAY_NAMES, read_smpl_arrays
 from snug.motion.vertical_axis import turn_y_up
 
+# Extension of a motion file: its reader. Each gives the clip as recorded, in the axes of the file.
+READERS: dict[str, Callable[[Path, MotionFileOptions], RawMotion]] = {
+    ".amc": read_asf_amc,
+    ".bvh": read_bvh,
+    ".npz": read_smpl_arrays,
+    ".npy": read_smpl_arrays,
+    ".pkl": read_smpl_arrays,
+}
 # As the authors of SNUG did: recorded hands are noisy and drive nothing.
 HAND_DAMPING = 0.1
 HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand")]
@@ -35,7 +46,7 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
     no motion.
 
     Args:
-        path: a file of a kind in `snug.motion.formats.READERS`, or a folder of them.
+        path: a file of a kind in `READERS`, or a folder of them.
         options: facts that the files do not state.
 
     Raises:
@@ -64,10 +75,10 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
 
 def read_motion(file: Path, options: MotionFileOptions) -> Motion:
     """Read one clip as recorded, at its rate, y up and without recording errors. Raises MotionError."""
-    printable = file.stem.isprintable() and not file.stem.startswith(FORMULA)
-    # Options list names with commas between, and rows write spaces side by side as one.
-    listed = "," not in file.stem and file.stem == " ".join(file.stem.split())
-    if not (printable and listed) or len(file.stem.encode(errors="replace")) > MAX_NAME_BYTES:
+    name = file.stem
+    # Rows of CSV files and lists in options hold names: no commas, no formulas, no spaces side by side.
+    plain = name.isprintable() and "," not in name and name == " ".join(name.split())
+    if not plain or name.startswith(FORMULA) or len(name.encode(errors="replace")) > MAX_NAME_BYTES:
         raise MotionError(
             f"{str(file)[:200]!a}: files are named after a motion; give this one a name of at most "
             f"{MAX_NAME_BYTES} printable bytes without a comma, without spaces side by side or at the ends, "
@@ -75,10 +86,8 @@ def read_motion(file: Path, options: MotionFileOptions) -> Motion:
         )
     reader = READERS.get(file.suffix.lower())
     if reader is None:
-        remedy = " Give the .amc clips that belong to it." if file.suffix.lower() == ".asf" else ""
-        raise MotionError(
-            f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}.{remedy}"
-        )
+        clips = "; give the .amc clips that belong to it" * (file.suffix.lower() == ".asf")
+        raise MotionError(f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}{clips}")
     # Absurd numbers overflow here, and are refused by name where recording errors are looked for.
     with np.errstate(all="ignore"):
         raw = reader(file, options)
@@ -86,7 +95,7 @@ def read_motion(file: Path, options: MotionFileOptions) -> Motion:
         damped[:, HANDS] *= HAND_DAMPING
         raw = remove_recording_errors(replace(raw, poses=damped), repair=options.repair)
     raw = turn_y_up(raw, options.up)
-    return Motion(file.stem, raw.poses, raw.translations, raw.fps, "recorded", raw.source)
+    return Motion(name, raw.poses, raw.translations, raw.fps, "recorded", raw.source)
 
 
 def holds_shape_alone(file: Path) -> bool:

@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 from snug.body.skeleton import JOINT_NAMES
@@ -31,6 +31,7 @@ STYLES: tuple[dict[str, tuple[str, ...]], ...] = (
         "elbow": ("forearm", "lowarm", "lowerarm"), "wrist": ("hand",), "hand": (),
     },
 )  # fmt: skip
+SIDES = ("left", "right")
 SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -49,10 +50,8 @@ def match_joints(
     Raises:
         MotionError: a needed joint is missing or hangs elsewhere; names the joint.
     """
-    matches = {ours: names.index(theirs) for ours, theirs in _given(given, path, names).items()}
-    matches = _limbs(names) | matches
-    needed = [f"{side}_{joint}" for side in ("left", "right") for joint in NEEDED]
-    for ours in needed:
+    matches = _limbs(names) | _given(given, path, names)
+    for ours in (f"{side}_{joint}" for side in SIDES for joint in NEEDED):
         if ours not in matches:
             known = ", ".join(filter(None, names))
             raise MotionError(
@@ -61,13 +60,13 @@ def match_joints(
     matches = _trunk(path, names, parents, matches) | matches
     above = {
         f"{side}_{joint}": f"{side}_{before}"
-        for side in ("left", "right")
+        for side in SIDES
         for limb in LIMB_CHAINS
         for before, joint in pairwise(limb)
     }
     for ours, theirs in matches.items():
         upper = above.get(ours, "pelvis")
-        if upper in matches and ours != "pelvis" and matches[upper] not in _way(parents, theirs)[1:]:
+        if upper in matches and ours != "pelvis" and matches[upper] not in way_up(parents, theirs)[1:]:
             raise MotionError(
                 f"{path}: '{names[theirs]}' taken for {ours} does not hang below '{names[matches[upper]]}' "
                 f"taken for {upper}; name them by --joint-map"
@@ -75,58 +74,44 @@ def match_joints(
     return matches
 
 
-def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, str]:
+def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, int]:
+    """Return the joints that a file names, by ours."""
     if file is None:
         return {}
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as problem:
-        raise MotionError(f"{file}: cannot be read ({problem.strerror}); check --joint-map") from None
-    except (ValueError, RecursionError) as problem:
+    except (OSError, ValueError, RecursionError) as problem:
         reason = " ".join(str(problem).split())[:200]
         raise MotionError(f'{file}: not a TOML file ({reason}); write lines as left_hip = "LHip"') from None
     for ours, theirs in table.items():
         if ours not in JOINT_NAMES:
             known = ", ".join(JOINT_NAMES)
             raise MotionError(f"{file}: '{ours[:40]}' is none of our joints; they are {known}")
-        if not isinstance(theirs, str) or not theirs or theirs not in names:
-            near = get_close_matches(str(theirs), [name for name in names if name], n=3)
+        if not theirs or theirs not in names:
+            near = get_close_matches(str(theirs), filter(None, names), n=3)
             hint = f"did you mean {' or '.join(near)}?" if near else "look into its hierarchy"
             raise MotionError(f"{file}: {path.name} has no joint '{str(theirs)[:40]}' for {ours}; {hint}")
-    return table
+    return {ours: names.index(theirs) for ours, theirs in table.items()}
 
 
 def _limbs(names: Sequence[str]) -> dict[str, int]:
     """Return the joints of legs and arms, each in the style that names most of those needed."""
     sided: dict[tuple[str, str], int] = {}
     for index, name in enumerate(names):
-        side, base = _side(name)
-        if side:
-            sided.setdefault((side, base), index)
+        sided.setdefault(_side(name), index)
     matches: dict[str, int] = {}
     for limb in LIMB_CHAINS:
-        guesses = [_limb(limb, style, sided) for style in STYLES]
-        best = max(guesses, key=_needed)
+        guesses: list[dict[str, int]] = []
+        for style in STYLES:
+            guess: dict[str, int] = {}
+            for side, joint in product(SIDES, limb):
+                places = [sided[side, base] for base in style[joint] if (side, base) in sided]
+                if places and places[0] not in guess.values():  # none stands for two of ours
+                    guess[f"{side}_{joint}"] = places[0]
+            guesses.append(guess)
+        best = max(guesses, key=lambda guess: sum(ours.partition("_")[2] in NEEDED for ours in guess))
         matches.update(best)
     return matches
-
-
-def _needed(guess: Mapping[str, int]) -> int:
-    """Count the joints that a skeleton must have."""
-    return sum(ours.partition("_")[2] in NEEDED for ours in guess)
-
-
-def _limb(
-    limb: Sequence[str], style: Mapping[str, Sequence[str]], sided: Mapping[tuple[str, str], int]
-) -> dict[str, int]:
-    """Return the joints of both limbs of a kind, named in one style; none stands for two of ours."""
-    guess: dict[str, int] = {}
-    for side in ("left", "right"):
-        for joint in limb:
-            places = [sided[side, base] for base in style[joint] if (side, base) in sided]
-            if places and places[0] not in guess.values():
-                guess[f"{side}_{joint}"] = places[0]
-    return guess
 
 
 def _side(name: str) -> tuple[str, str]:
@@ -152,18 +137,18 @@ def _trunk(
     if head is None:
         raise MotionError(f"{path}: no joint is known as 'head'; name it by --joint-map")
     trunk = {"pelvis": pelvis, "head": head}
-    spine = [joint for joint in reversed(_way(parents, chest)) if pelvis in _way(parents, joint)[1:]]
+    spine = [joint for joint in reversed(way_up(parents, chest)) if pelvis in way_up(parents, joint)[1:]]
     if spine:
         trunk["spine1"] = spine[0]
     if len(spine) > 1:
         trunk["spine3"] = spine[-1]
     if len(spine) > 2:
         trunk["spine2"] = spine[len(spine) // 2]
-    neck = [joint for joint in _way(parents, head)[1:] if chest in _way(parents, joint)[1:]]
+    neck = [joint for joint in way_up(parents, head)[1:] if chest in way_up(parents, joint)[1:]]
     return trunk | ({"neck": neck[0]} if neck else {})
 
 
-def _way(parents: Sequence[int], joint: int) -> list[int]:
+def way_up(parents: Sequence[int], joint: int) -> list[int]:
     """Return the joint and all above it, upwards."""
     way = [joint]
     while parents[way[-1]] >= 0:
@@ -173,5 +158,5 @@ def _way(parents: Sequence[int], joint: int) -> list[int]:
 
 def _meet(parents: Sequence[int], one: int, other: int) -> int:
     """Return the lowest joint above both."""
-    above = set(_way(parents, other))
-    return next(joint for joint in _way(parents, one) if joint in above)
+    above = set(way_up(parents, other))
+    return next(joint for joint in way_up(parents, one) if joint in above)

@@ -58,17 +58,19 @@ class Line:
         """Return the error that names file and line."""
         return MotionError(f"{self.path}, line {self.number}: {problem}")
 
-    def numbers(self, first: int, last: int | None = None) -> list[float]:
-        """Return tokens first to last - 1 as numbers. Raises MotionError unless they are there and finite."""
+    def numbers(self, first: int, count: int, *, last: bool = False) -> list[float]:
+        """Return `count` tokens from `first` on as numbers; last: the line ends with them.
+
+        Raises MotionError unless they are there and finite.
+        """
         try:
-            values = [float(word) for word in self.tokens[first:last]]
+            values = [float(word) for word in self.tokens[first : None if last else first + count]]
         except ValueError:
-            values = [math.nan]
-        if not all(map(math.isfinite, values)) or (last is not None and len(values) != last - first):
-            count = "" if last is None else f"{last - first} "
+            values = []
+        if len(values) != count or not all(map(math.isfinite, values)):
             text = " ".join(self.tokens)[:60]
             raise self.error(
-                f"{count}finite numbers should be in '{text}'; repair the file or fetch it again"
+                f"{count} finite numbers should be in '{text}'; repair the file or fetch it again"
             )
         return values
 
@@ -93,7 +95,7 @@ def read_lines(path: Path, comment: str | None = None) -> Iterator[Line]:
 def check_frame_count(path: Path, frames: int) -> None:
     """Raise MotionError unless a clip has between 1 and MAX_FRAMES frames."""
     if not 0 < frames <= MAX_FRAMES:
-        remedy = "cut the clip" if frames > 0 else "give a clip with frames"
+        remedy = "cut the clip" if frames else "give a clip with frames"
         raise MotionError(f"{path}: {frames} frames; between 1 and {MAX_FRAMES} are read: {remedy}")
 
 
@@ -114,8 +116,5 @@ def frame_rate(
     if fps is None:
         raise MotionError(f"{path}: states no frame rate; give --motion-fps N")
     if not LOWEST_RATE <= fps <= HIGHEST_RATE:
-        raise MotionError(
-            f"{path}: {fps:g} frames per second; a rate between {LOWEST_RATE:g} and "
-            f"{HIGHEST_RATE:g} is needed"
-        )
+        raise MotionError(f"{path}: {fps:g} frames per second; rates are {LOWEST_RATE:g} to {HIGHEST_RATE:g}")
     return fps

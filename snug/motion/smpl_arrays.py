@@ -19,13 +19,14 @@ caller's choice.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from reference_sim.files.array_file import ArrayFileError, array_names, read_array, read_arrays
-from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
+from reference_sim.files.pickle_file import read_pickled_arrays
 from snug.body.skeleton import BODY_JOINTS, JOINT_NAMES, axis_angles
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions
@@ -42,61 +43,46 @@ ROOT_ROTATIONS = ("root_orient", "global_orient")
 PATHS = ("trans", "transl", "translations")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
 ARRAY_NAMES = (*ROTATIONS, *BODY_ROTATIONS, *ROOT_ROTATIONS, *PATHS, *RATES)
-PLAIN = (np.ndarray, int, float, list, tuple)
 UNIT = 0.02  # a quaternion's length, and a matrix's entries, may be off by as much
 
 
-def read_npz(path: Path, options: MotionFileOptions) -> RawMotion:
-    """Read an .npz with rotations, a path of the root [m] and a frame rate [1/s]. Raises MotionError."""
+def read_smpl_arrays(path: Path, options: MotionFileOptions) -> RawMotion:
+    """Read an .npz or a pickled dict with arrays of the table, or an .npy with rotations alone.
+
+    The root of the latter stays in place. Nothing in a pickle is executed. Raises MotionError.
+    """
+    note, suffix = "", path.suffix.lower()
     try:
-        arrays = read_arrays(path, ARRAY_NAMES)
-        if not arrays:
-            names = ", ".join(array_names(path)[:12]) or "nothing"
-            raise MotionError(f"{path}: no array of a motion (found {names}); give 'poses', 'trans', 'fps'")
+        if suffix == ".npy":
+            poses = read_array(path)
+            arrays = {"poses": poses, "trans": np.zeros((len(np.atleast_1d(poses)), 3))}
+            note = "; no path: the root stays"
+        elif suffix == ".pkl":
+            arrays = read_pickled_arrays(path, ARRAY_NAMES)
+        else:
+            arrays = read_arrays(path, ARRAY_NAMES)
+            if not arrays:
+                raise ArrayFileError(
+                    f"{path}: no array of a motion among {', '.join(array_names(path)[:12])}"
+                )
     except ArrayFileError as error:
-        raise MotionError(f"{error}; give an .npz motion file, export or download it again") from None
-    return make_raw_motion(path, arrays, options)
-
-
-def read_npy(path: Path, options: MotionFileOptions) -> RawMotion:
-    """Read an .npy with rotations alone; the root stays in place. Raises MotionError."""
-    try:
-        poses = read_array(path)
-    except ArrayFileError as error:
-        raise MotionError(f"{error}; give an .npy of plain numbers, or an .npz motion file") from None
-    in_place = np.zeros((len(np.atleast_1d(poses)), 3))
-    return make_raw_motion(path, {"poses": poses, "trans": in_place}, options, "; no path: the root stays")
-
-
-def read_pkl(path: Path, options: MotionFileOptions) -> RawMotion:
-    """Read a pickled dict with the arrays of an .npz. Nothing in it is executed. Raises MotionError."""
-    try:
-        content = read_plain_pickle(path)
-    except PlainPickleError as error:
-        raise MotionError(str(error)) from None
-    if not isinstance(content, dict):
-        raise MotionError(f"{path}: holds no dict of arrays; write an .npz motion file")
-    given = {name: content[name] for name in ARRAY_NAMES if isinstance(content.get(name), PLAIN)}
-    try:
-        arrays = {name: np.asarray(values) for name, values in given.items()}
-    except ValueError:
-        raise MotionError(f"{path}: a list of rows of several lengths; give arrays, a row a frame") from None
-    if not arrays:
-        names = ", ".join(map(str, list(content)[:12]))[:200] or "nothing"
-        raise MotionError(f"{path}: no array of a motion (found {names}); give 'poses', 'trans', 'fps'")
-    return make_raw_motion(path, arrays, options)
+        raise MotionError(f"{error}; give an .npz with 'poses', 'trans' and 'fps'") from None
+    return make_raw_motion(path, arrays, options, note)
 
 
 def make_raw_motion(
-    path: Path, arrays: dict[str, np.ndarray], options: MotionFileOptions, note: str = ""
+    path: Path, arrays: Mapping[str, np.ndarray], options: MotionFileOptions, note: str = ""
 ) -> RawMotion:
-    """Make a motion of arrays by the names that docs/bring-your-own.md lists. Raises MotionError."""
-    arrays = {name: _numbers(path, name, array) for name, array in arrays.items()}
+    """Make a motion of arrays by the names of the table. Raises MotionError."""
+    for name, array in arrays.items():
+        if array.dtype.kind not in "iuf" or array.size == 0:
+            raise MotionError(
+                f"{path}: array '{name}' is empty or holds no numbers; give floating-point values"
+            )
+    arrays = {name: array.astype(np.float64) for name, array in arrays.items()}
     turns, what = _rotations(path, arrays)
     check_frame_count(path, len(turns))
-    name = _first(arrays, PATHS)
-    if name is None:
-        raise MotionError(f"{path}: no array 'trans', the root's path (frames, 3) [m]; zeros where it stays")
+    name = _first(path, arrays, PATHS, "the root's path (frames, 3) [m]; zeros where it stays")
     translations = arrays[name]
     if translations.shape not in ((len(turns), 3), (len(turns), 1, 3)):
         raise MotionError(
@@ -105,45 +91,33 @@ def make_raw_motion(
     poses = np.zeros((len(turns), len(JOINT_NAMES), 3))
     kept = poses.shape[1] if turns.shape[1] == poses.shape[1] else BODY_JOINTS
     poses[:, :kept] = turns[:, :kept]
-    fps = frame_rate(path, _stated_rate(path, arrays), options)
+    rates = [name for name in RATES if name in arrays]
+    if rates and arrays[rates[0]].size != 1:
+        raise MotionError(f"{path}: '{rates[0]}' is not one number; give the frames per second")
+    fps = frame_rate(path, arrays[rates[0]].item() if rates else None, options)
     source = f"{path.name} ({what}, {LAYOUTS[turns.shape[1]]} layout{note})"
     return RawMotion(path=path, poses=poses, translations=translations.reshape(-1, 3), fps=fps, source=source)
 
 
-def _numbers(path: Path, name: str, array: np.ndarray) -> np.ndarray:
-    if array.dtype.kind not in "iuf":
-        raise MotionError(f"{path}: array '{name}' does not hold numbers; give floating-point values")
-    return array.astype(np.float64)
+def _first(path: Path, arrays: Mapping[str, np.ndarray], names: Iterable[str], meaning: str) -> str:
+    """Return the first of `names` that the arrays have. Raises MotionError."""
+    names = tuple(names)
+    if found := [name for name in names if name in arrays]:
+        return found[0]
+    given = ", ".join(sorted(arrays))
+    raise MotionError(f"{path}: no array '{names[0]}' (found {given}); give {meaning}")
 
 
-def _first(arrays: dict[str, np.ndarray], names: tuple[str, ...]) -> str | None:
-    return next((name for name in names if name in arrays), None)
-
-
-def _stated_rate(path: Path, arrays: dict[str, np.ndarray]) -> float | None:
-    name = _first(arrays, RATES)
-    if name is None:
-        return None
-    fps = arrays[name]
-    if fps.size != 1 or not 0 < fps.item() < np.inf:
-        raise MotionError(f"{path}: '{name}' is no positive number; give one number of frames per second")
-    return float(fps.item())
-
-
-def _rotations(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, str]:
+def _rotations(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarray, str]:
     """Return rotations (T, J, 3) [rad] of the root and the others, J one of LAYOUTS, and their array's name.
 
     Raises MotionError.
     """
-    name = _first(arrays, (*ROTATIONS, *BODY_ROTATIONS))
-    if name is None:
-        names = ", ".join(sorted(arrays))
-        raise MotionError(f"{path}: no array of rotations (found {names}); give 'poses' (frames, 72)")
+    name = _first(path, arrays, (*ROTATIONS, *BODY_ROTATIONS), "rotations (frames, 72) [rad]")
     turns = _axis_angles(path, name, arrays[name])
+    known = ", ".join(f"{3 * joints} ({layout})" for joints, layout in LAYOUTS.items())
     if turns.shape[1] + 1 in LAYOUTS:
-        root = _first(arrays, ROOT_ROTATIONS)
-        if root is None:
-            raise MotionError(f"{path}: no array '{ROOT_ROTATIONS[0]}', the root's rotation, beside '{name}'")
+        root = _first(path, arrays, ROOT_ROTATIONS, f"the root's rotation beside '{name}'")
         matrices = arrays[root].shape[1:] == (3, 3)
         first = _axis_angles(path, root, arrays[root][:, None] if matrices else arrays[root])
         if first.shape != (len(turns), 1, 3):
@@ -153,7 +127,6 @@ def _rotations(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, s
             )
         turns, name = np.concatenate([first, turns], axis=1), f"{root} and {name}"
     if turns.shape[1] not in LAYOUTS:
-        known = ", ".join(f"{3 * joints} ({layout})" for joints, layout in LAYOUTS.items())
         raise MotionError(
             f"{path}: '{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {known}"
         )
@@ -163,27 +136,23 @@ def _rotations(path: Path, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, s
 def _axis_angles(path: Path, name: str, array: np.ndarray) -> np.ndarray:
     """Return (T, J, 3) [rad] of axis-angles (T, 3 J) or (T, J, 3), matrices, or quaternions (T, J, 4)."""
     shape = array.shape
-    if array.size == 0:
-        raise MotionError(f"{path}: '{name}' has shape {shape} and no frame; give a clip with frames")
-    if name in QUATERNIONS:
-        if array.ndim == 3 and shape[2] == 4:
-            return _from_quaternions(path, name, array)
-        raise MotionError(f"{path}: '{name}' has shape {shape}; give (frames, joints, 4)")
-    if array.ndim == 4 and shape[2:] == (3, 3):
+    if name in QUATERNIONS and shape[2:] == (4,):
+        return _from_quaternions(path, name, array)
+    if name not in QUATERNIONS and shape[2:] == (3, 3):
         return _from_matrices(path, name, array)
-    if (array.ndim == 3 and shape[2] == 3) or (array.ndim == 2 and shape[1] % 3 == 0):
+    if name not in QUATERNIONS and (shape[2:] == (3,) or (len(shape) == 2 and shape[1] % 3 == 0)):
         return array.reshape(len(array), -1, 3)
-    raise MotionError(
-        f"{path}: '{name}' has shape {shape}; give (frames, 3 joints), (frames, joints, 3) [rad] or rotation "
-        "matrices (frames, joints, 3, 3)"
-    )
+    wanted = "(frames, joints, 4)" if name in QUATERNIONS else (
+        "(frames, 3 joints), (frames, joints, 3) [rad] or rotation matrices (frames, joints, 3, 3)"
+    )  # fmt: skip
+    raise MotionError(f"{path}: '{name}' has shape {shape}; give {wanted}")
 
 
 def _from_matrices(path: Path, name: str, matrices: np.ndarray) -> np.ndarray:
     whole = np.isfinite(matrices).all(axis=(2, 3))
     matrices = np.where(whole[..., None, None], matrices, np.eye(3))
     off = np.abs(np.swapaxes(matrices, -1, -2) @ matrices - np.eye(3)).max(axis=(2, 3))
-    _check_entries(path, name, (off > UNIT) | (np.linalg.det(matrices) <= 0), "is no rotation matrix")
+    _check_entries(path, name, (off > UNIT) | (np.linalg.det(matrices) <= 0), "rotation matrix")
     return np.where(whole[..., None], axis_angles(matrices), np.nan)
 
 
@@ -191,9 +160,8 @@ def _from_quaternions(path: Path, name: str, quaternions: np.ndarray) -> np.ndar
     w = QUATERNIONS[name]
     whole = np.isfinite(quaternions).all(axis=2)
     quaternions = np.where(whole[..., None], quaternions, np.eye(4)[w])
-    _check_entries(
-        path, name, np.abs(np.linalg.norm(quaternions, axis=2) - 1.0) > UNIT, "is no unit quaternion"
-    )
+    off = np.abs(np.linalg.norm(quaternions, axis=2) - 1.0)
+    _check_entries(path, name, off > UNIT, "unit quaternion")
     # Most joints turn by less than 90 degrees most of the time: w is then the largest of the four.
     if (np.abs(quaternions).argmax(axis=2) == 3 - w).mean() > 0.5:
         order = "quaternions_xyzw" if w == 0 else "quaternions_wxyz"
@@ -203,9 +171,9 @@ def _from_quaternions(path: Path, name: str, quaternions: np.ndarray) -> np.ndar
     return np.where(whole[..., None], turns, np.nan)
 
 
-def _check_entries(path: Path, name: str, wrong: np.ndarray, problem: str) -> None:
+def _check_entries(path: Path, name: str, wrong: np.ndarray, kind: str) -> None:
     for frame, joint in np.argwhere(wrong)[:1]:
         raise MotionError(
-            f"{path}: '{name}' of frame {frame}, joint {joint} {problem}; give rotations relative to "
+            f"{path}: '{name}' of frame {frame}, joint {joint} is no {kind}; give rotations relative to "
             "the parent"
         )

@@ -31,9 +31,9 @@ from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.files.mesh_files import read_mesh
+from reference_sim.files.pickle_file import read_pickled_arrays
 from reference_sim.point_cache import read_point_cache
 from snug.body.parametric_body import Body
-from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
 from snug.body.skeleton import BodyError
 from snug.body.smpl_files import read_body
 from snug.garments.garment import GarmentError
@@ -67,6 +67,10 @@ def read_cloth(path: Path) -> None:
 
 def read_clip(path: Path) -> None:
     load_motions(path)
+
+
+def read_pickled(path: Path) -> None:
+    read_pickled_arrays(path, ("J", *samples.roll_out()))
 
 
 def read_worn(path: Path) -> None:
@@ -137,7 +141,7 @@ READERS: tuple[Reader, ...] = (
     Reader("motion pickle", ".pkl", samples.pickled(samples.amass_arrays),
            read_clip, (MotionError,), bytes_of),
     Reader("plain pickle", ".pkl", samples.pickled(samples.anything),
-           read_plain_pickle, (PlainPickleError,), bytes_of),
+           read_pickled, (ArrayFileError,), bytes_of),
     Reader("garment", ".obj", samples.shirt, read_worn, (GarmentError,), bytes_of),
     Reader("material", ".toml", lambda: samples.MATERIAL, read_material, (GarmentError,), bytes_of),
     Reader("joints", ".toml", lambda: samples.JOINTS, read_joints, (MotionError,), bytes_of),

@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from scipy.sparse import coo_matrix, csc_matrix
+from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT_NAMES, BodyError
@@ -134,7 +134,7 @@ def test_the_eyes_of_a_head_are_closed(small, layouts, tmp_path):
 
 def test_quadrilaterals_become_triangles(small, layouts, tmp_path):
     doubled = small.faces[:, [0, 1, 2, 2]]  # each falls into the triangle and one without area
-    with pytest.raises(BodyError, match="closed surface"):
+    with pytest.raises(BodyError, match="no closed surface"):
         read_body(saved(tmp_path / "a.npz", layouts["SMPL"] | {"f": doubled}))
 
 
@@ -170,7 +170,7 @@ def moved_joint(regressor):
         (changed("kintree_table", lambda t: np.full((2, 24), 30)), "hangs on 30"),
         (changed("kintree_table", lambda t: t[:, :23]), "(2, 23)"),
         (lambda a: a | {"f": a["f"][a["v_template"][a["f"], 1].min(axis=1) > 0.12]}, "a hole at vertex"),
-        (changed("f", lambda f: f[:, ::-1]), "inwards"),
+        (changed("f", lambda f: f[:, ::-1]), "inside out"),
         (changed("f", lambda f: f + 1), "vertex 1000"),
         (lambda a: a | {"rest_pose": np.full((24, 3), 0.2)}, "rest_pose"),
         (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
@@ -183,15 +183,6 @@ def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
         read_body(path)
     message = str(caught.value)
     assert says in message and str(path) in message and "\n" not in message
-
-
-@pytest.mark.parametrize("name", ["kintree_table", "f", "weights", "v_template"])
-def test_what_need_not_be_sparse_is_refused_in_one_line(name, layouts, tmp_path):
-    arrays = layouts["SMPL"]
-    path = tmp_path / "sparse.pkl"
-    path.write_bytes(pickle.dumps(arrays | {name: coo_matrix(arrays[name])}))
-    with pytest.raises(BodyError, match=f"{name} is a sparse matrix; give a plain array"):
-        read_body(path)
 
 
 @pytest.mark.parametrize(

@@ -164,7 +164,7 @@ def test_a_map_names_joints_that_no_guess_finds(tmp_path):
         table.write_text(text)
         with pytest.raises(MotionError, match=message):
             read_motion(path, MotionFileOptions(joint_map=table))
-    with pytest.raises(MotionError, match=r"none\.toml: cannot be read"):
+    with pytest.raises(MotionError, match=r"none\.toml: not a TOML file .*No such file"):
         read_motion(path, MotionFileOptions(joint_map=tmp_path / "none.toml"))
 
 
@@ -208,10 +208,10 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
         (lambda text: "solid\n" + text, "line 1: 'solid' where 'HIERARCHY' should be"),
         (lambda text: text.replace("MOTION", "MOVE"), "where 'MOTION' should be"),
         (lambda text: text.replace("Frames: 20", "Frames: 21"), "declares 21 frames and holds 20"),
-        (lambda text: text.replace("Frames: 20", "Frames: 19"), "more than the 19 frames"),
-        (lambda text: text.replace("Frames: 20", "Frames: -1"), "no number of frames"),
-        (lambda text: text.replace("Frames: 20", "Frames: 99999"), "holds 20|cut the clip"),
-        (lambda text: text.replace("Frames: 20", "Frames: 0"), "0 frames"),
+        (lambda text: text.replace("Frames: 20", "Frames: 19"), "declares 19 frames and holds 20"),
+        (lambda text: text.replace("Frames: 20", "Frames: -1"), "declares -1 frames"),
+        (lambda text: text.replace("Frames: 20", "Frames: 99999"), "declares 99999 frames"),
+        (lambda text: text.replace("Frames: 20", "Frames: 0"), "declares 0 frames"),
         (lambda text: text.replace("Frame Time: 0.0333333", "Frame Time: 0"), "no frame rate"),
         (lambda text: text.replace("CHANNELS 3", "CHANNELS 4", 1), "declares other channels"),
         (lambda text: text.replace("Zrotation", "Wrotation", 1), "unknown ones"),
@@ -219,8 +219,8 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
         (lambda text: text.replace("left_knee", "left_thing"), "no joint is known as 'left_knee'"),
         (lambda text: text.replace("head", "hat"), "no joint is known as 'head'"),
         (lambda text: text.replace("OFFSET", "OFFSETS", 1), "not known in a hierarchy"),
-        (lambda text: text.rsplit(" ", 1)[0], "75 numbers should be here, not 74"),
-        (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "finite numbers should be in"),
+        (lambda text: text.rsplit(" ", 1)[0], "75 finite numbers"),
+        (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "75 finite numbers"),
         (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
     ],
 )

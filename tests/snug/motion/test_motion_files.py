@@ -83,16 +83,16 @@ class TestForms:
             ({"poses": KICK.poses[:, :23, None]}, r"'poses' has shape \(40, 23, 1, 3\)"),
             ({"poses": KICK.poses[:, :21]}, "no array 'root_orient'"),
             ({"poses": KICK.poses[:, :20]}, "72 .SMPL."),
-            ({"poses": np.zeros((0, 72)), "trans": np.zeros((0, 3))}, "no frame"),
+            ({"poses": np.zeros((0, 72)), "trans": np.zeros((0, 3))}, "empty"),
             ({"poses": np.zeros((200_000, 66)), "trans": np.zeros((200_000, 3))}, "200000 frames"),
             ({"poses": np.zeros((20_000, 66)), "trans": np.zeros((20_000, 3)), "fps": 10}, "lasts 2000 s"),
             ({"poses": np.degrees(KICK.poses)}, "radians, not degrees"),
             ({"poses": np.zeros((40, 70))}, r"'poses' has shape \(40, 70\)"),
             ({"trans": KICK.translations + 1e5}, "metres"),
-            ({"trans": KICK.translations.astype(complex)}, "does not hold numbers"),
+            ({"trans": KICK.translations.astype(complex)}, "holds no numbers"),
             ({"trans": KICK.translations[1:]}, r"'trans' has shape \(39, 3\); give \(40, 3\)"),
-            ({"fps": 0}, "positive"),
-            ({"fps": 1 / 120}, "rate between 5 and 1000"),
+            ({"fps": 0}, "rates are 5 to 1000"),
+            ({"fps": 1 / 120}, "rates are 5 to 1000"),
             ({"fps": np.array([30.0, 30.0])}, "one number"),
         ],
     )
@@ -102,7 +102,7 @@ class TestForms:
     def test_rotations_that_are_none_are_refused(self, tmp_path):
         path, rest = tmp_path / "clip.npz", {"trans": KICK.translations, "fps": 30.0}
         np.savez(path, **rest)
-        assert refused(path, "no array of rotations .found fps, trans.")
+        assert refused(path, "no array .poses. .found fps, trans.")
         matrices = Rotation.from_rotvec(KICK.poses.reshape(-1, 3)).as_matrix().reshape(-1, 24, 3, 3)
         quaternions = Rotation.from_rotvec(KICK.poses.reshape(-1, 3)).as_quat().reshape(-1, 24, 4)
         matrices[7, 5] *= 1.1

@@ -1,4 +1,4 @@
-"""The restricted pickle reader: plain values come back as they are, and nothing in a file is ever run."""
+"""Arrays of pickles: plain ones come back as they are, and nothing in a file is ever run."""
 
 import pickle
 import struct
@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from snug.body.plain_pickle import PlainPickleError, read_plain_pickle
+from reference_sim.files.array_file import ArrayFileError
+from reference_sim.files.pickle_file import ALLOWED, read_pickled_arrays
 
 ROLL_OUT = {
     "pred": np.arange(24, dtype=np.float32).reshape(2, 4, 3),
@@ -21,6 +22,9 @@ ROLL_OUT = {
     "turned": np.arange(24).reshape(2, 3, 4).transpose(1, 0, 2),
     "names": np.array(["neck", "hem"]),
     "empty": np.empty((0, 3)),
+    "columns": scipy.sparse.csc_matrix(np.diag([1.0, 2.0, 3.0])[:2]),
+    "rows": scipy.sparse.csr_array(np.eye(2)),
+    "fps": 30.0,
 }
 
 
@@ -30,25 +34,14 @@ def written(path: Path, content: bytes) -> Path:
 
 
 @pytest.mark.parametrize("protocol", range(6))
-def test_plain_values_come_back(tmp_path, protocol):
-    read = read_plain_pickle(written(tmp_path / "a.pkl", pickle.dumps(ROLL_OUT, protocol)))
-    assert list(read) == list(ROLL_OUT)
-    for key, value in ROLL_OUT.items():
-        if isinstance(value, np.ndarray):
-            assert type(read[key]) is np.ndarray and read[key].dtype.kind == value.dtype.kind
-            np.testing.assert_array_equal(read[key], value)
-        else:
-            assert read[key] == value
-
-
-@pytest.mark.parametrize("protocol", [0, 2, 5])
-@pytest.mark.parametrize("kind", ["csc_matrix", "csr_matrix", "coo_matrix", "csc_array"])
-def test_sparse_matrices_come_back(tmp_path, kind, protocol):
-    dense = np.diag([1.0, 2.0, 3.0])[:2]
-    content = pickle.dumps({"J": getattr(scipy.sparse, kind)(dense)}, protocol)
-    read = read_plain_pickle(written(tmp_path / "a.pkl", content))["J"]
-    assert scipy.sparse.issparse(read)
-    np.testing.assert_array_equal(read.toarray(), dense)
+def test_arrays_come_back_by_name(tmp_path, protocol):
+    read = read_pickled_arrays(written(tmp_path / "a.pkl", pickle.dumps(ROLL_OUT, protocol)), ROLL_OUT)
+    assert set(read) == set(ROLL_OUT) - {"metrics", "config", "rows"}
+    for key, array in read.items():
+        value = ROLL_OUT[key].toarray() if key == "columns" else np.asarray(ROLL_OUT[key])
+        assert type(array) is np.ndarray and array.dtype.kind == value.dtype.kind
+        assert array.flags.fnc == np.asarray(value, order="K").flags.fnc or key in ("turned", "columns")
+        np.testing.assert_array_equal(array, value)
 
 
 def python2(numbers: np.ndarray) -> bytes:
@@ -76,9 +69,9 @@ def test_an_official_body_of_python_2_is_read(tmp_path):
     sparse += b"".join(b"U" + bytes([len(key)]) + key + python2(value) for key, value in parts)
     sparse += b"U\x06_shapeK\x03K\x02\x86ub"
     content = b"\x80\x02}(U\tshapedirs" + chumpy + b"U\x0bJ_regressor" + sparse + b"u."
-    read = read_plain_pickle(written(tmp_path / "smpl.pkl", content))
+    read = read_pickled_arrays(written(tmp_path / "smpl.pkl", content), ("shapedirs", "J_regressor"))
     np.testing.assert_array_equal(read["shapedirs"], shapes)
-    np.testing.assert_array_equal(read["J_regressor"].toarray(), [[0, 1], [1, 0], [0, 0]])
+    np.testing.assert_array_equal(read["J_regressor"], [[0, 1], [1, 0], [0, 0]])
 
 
 class Calls:
@@ -132,47 +125,50 @@ def evil(marker: Path) -> dict[str, bytes]:
     }
 
 
-@pytest.mark.parametrize("trick", sorted(evil(Path("x"))))
-def test_nothing_in_a_pickle_is_run(tmp_path, trick):
-    marker = tmp_path / "ran"
-    path = written(tmp_path / "evil.pkl", evil(marker)[trick])
-    with pytest.raises(PlainPickleError) as caught:
-        read_plain_pickle(path)
-    assert not marker.exists()
-    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
-    assert "numpy.savez" in str(caught.value)
-
-
 ARRAY = pickle.dumps(np.arange(6.0).reshape(2, 3), 4)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        raw(b"\x8e" + struct.pack("<Q", 2**40)),  # BINBYTES8
-        raw(b"\x96" + struct.pack("<Q", 2**40)),  # BYTEARRAY8
-        raw(b"\x8d" + struct.pack("<Q", 2**40)),  # BINUNICODE8
-        raw(b"\x95" + struct.pack("<Q", 2**62), b"N"),  # FRAME
-        raw(b"Nr" + struct.pack("<I", 2**32 - 1)),  # LONG_BINPUT: a memo of 64 GiB
-        raw(b"Np4000000000\n"),
-        raw(b"\x8b" + struct.pack("<i", 2**31 - 1)),  # LONG4
-        b"L" + b"9" * 100_000 + b"L\n.",
-        b"\x80\x02)" + b"\x85" * 500_000 + b"}\x94(h\x00Nu.",
-        raw(b"]" * 900_000 + b"a" * 899_999),  # a nest of lists
-        raw(b"]q\x00h\x00a"),  # a list that holds itself
-        ARRAY[:-40],
-        ARRAY.replace(b"K\x02K\x03", b"K\x02K\x04"),
-        ARRAY.replace(b"K\x02K\x03", b"K\x02K\x02"),
-        ARRAY.replace(b"K\x02K\x03", b"K\xffK\xff"),
-        pickle.dumps(np.array([{}], dtype=object)),
-        pickle.dumps(np.zeros(2, dtype=[("a", "f4")])),
-        b"", b"\x80", b"PK\x03\x04", b"\x93NUMPY\x01\x00",
-    ],
-    ids=range(21),
-)  # fmt: skip
-def test_sizes_and_broken_files_are_refused(tmp_path, content):
-    path = written(tmp_path / "a.pkl", content)
-    with pytest.raises(PlainPickleError) as caught:
-        read_plain_pickle(path)
-    assert str(path) in str(caught.value) and "\n" not in str(caught.value) and len(str(caught.value)) < 500
-    assert "MemoryError" not in str(caught.value)  # refused before anything of that size is asked for
+BROKEN = {
+    "bytes without end": raw(b"\x8e" + struct.pack("<Q", 2**40)),
+    "bytearray without end": raw(b"\x96" + struct.pack("<Q", 2**40)),
+    "text without end": raw(b"\x8d" + struct.pack("<Q", 2**40)),
+    "frame without end": raw(b"\x95" + struct.pack("<Q", 2**62), b"N"),
+    "memo of 64 GiB": raw(b"Nr" + struct.pack("<I", 2**32 - 1)),
+    "memo in text": raw(b"Np4000000000\n"),
+    "integer without end": raw(b"\x8b" + struct.pack("<i", 2**31 - 1)),
+    "integer of 100,000 digits": b"L" + b"9" * 100_000 + b"L\n.",
+    "nest of tuples": b"\x80\x02)" + b"\x85" * 500_000 + b"}\x94(h\x00Nu.",
+    "nest of lists": raw(b"]" * 900_000 + b"a" * 899_999),
+    "list that holds itself": raw(b"}", name("a"), b"]q\x00h\x00as"),
+    "cut off": ARRAY[:-40],
+    "shape too large": ARRAY.replace(b"K\x02K\x03", b"K\x02K\x04"),
+    "shape too small": ARRAY.replace(b"K\x02K\x03", b"K\x02K\x02"),
+    "another shape": ARRAY.replace(b"K\x02K\x03", b"K\xffK\xff"),
+    "objects": pickle.dumps({"a": np.array([{}], dtype=object)}),
+    "fields": pickle.dumps({"a": np.zeros(2, dtype=[("a", "f4")])}),
+    "sparse matrix of 80 GB": pickle.dumps({"a": scipy.sparse.csc_matrix((100_000, 100_000))}),
+    "rows of several lengths": pickle.dumps({"a": [[1, 2], [3]]}),
+    "no dict": ARRAY,
+    "no array": pickle.dumps({"b": 1, "a": None}),
+    "empty": b"", "byte": b"\x80", "zip": b"PK\x03\x04", "npy": b"\x93NUMPY\x01\x00",
+}  # fmt: skip
+HOSTILE = {name: lambda marker, name=name: evil(marker)[name] for name in evil(Path("x"))}
+HOSTILE |= {name: lambda marker, content=content: content for name, content in BROKEN.items()}
+HOSTILE |= {
+    f"slots of {module}.{title}": lambda marker, names=(module, title): raw(
+        b"c%b\n%b\nN}(" % tuple(map(str.encode, names)), name("made"), name("x"), b"u\x86b"
+    )
+    for module, title in ALLOWED
+}
+
+
+@pytest.mark.parametrize("trick", HOSTILE)
+def test_a_hostile_or_broken_pickle_is_refused_in_one_line_and_nothing_is_run(tmp_path, trick):
+    marker, before = tmp_path / "ran", [dict(vars(kind)) for kind in ALLOWED.values()]
+    path = written(tmp_path / "a.pkl", HOSTILE[trick](marker))
+    with pytest.raises(ArrayFileError) as caught:
+        read_pickled_arrays(path, ("a", "x"))
+    message = str(caught.value)
+    assert not marker.exists() and before == [dict(vars(kind)) for kind in ALLOWED.values()]
+    assert str(path) in message and "\n" not in message and len(message) < 500
+    assert "MemoryError" not in message  # refused before anything of that size is asked for
