@@ -21,7 +21,7 @@ EXAMPLES = """examples:
   python -m benchmarks.export hanging_sheet --preset smoke -o sheet --reference
   python -m benchmarks.export tshirt/01_01 --motions clips/ --test-motions 01_01 --body mine.npz -o out
   python -m benchmarks.score mine.npz --scene tshirt/kick        what came of it, judged
-  python -m reports.export RUN --scene tshirt/kick --method snug -o kick.usdc    another command: a roll-out
+  python -m reports.film RUN --scene tshirt/kick --methods snug -o kick.pc2    another command: a roll-out
 
 The folder's README.txt says what each file holds: units, axes, order of vertices.
 exit status: 0 written; 2 the scene is not known or cannot be made, or the folder is not empty: one line says

@@ -1,4 +1,4 @@
-"""Reports of finished runs: tables, figures, PDF and page; commands that compare, check, film and export.
+"""Reports of finished runs: tables, figures, PDF and page; commands that compare, check and film.
 
 Rooms, each importing only those before it: run (reading), statistics, tables, figures, pictures, blocks (the
 one list of what a report shows), document (PDF) and page (HTML). A new figure is a function in a file of its

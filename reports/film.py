@@ -26,6 +26,10 @@ EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.mp4
   python -m reports.film reports/runs/NAME --scene flag --methods simulation,newton-1,xpbd-40 -o flag.gif
   python -m reports.film reports/runs/NAME --scene tshirt/punch --methods snug,pbns --speed 0.25 -o punch.mp4
+  python -m reports.film reports/runs/NAME --scene tshirt/kick --methods snug -o kick.pc2
+
+A .pc2 is no film: it gives kick_snug.pc2 and kick_body.pc2, the vertices of each method and of the body, with an
+.obj each, in metres, y up, for Blender's Mesh Cache modifier.
 
 An .mp4 needs pip install 'neural-garment-benchmark[film]'; a .gif does not. No screen is needed.
 The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.
@@ -207,6 +211,14 @@ def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
 
 
+def write_point_caches(path: Path, selected: SelectedRollOuts) -> None:
+    """Write the vertices of each method, and of the body, as NAME_METHOD.pc2 with an .obj beside it."""
+    from reference_sim.point_cache import write_point_cache
+
+    for name, mesh in (selected.cloths | ({"body": selected.body} if selected.body else {})).items():
+        write_point_cache(path.with_stem(f"{path.stem}_{name.replace('/', '-')}"), mesh)
+
+
 WRITERS = {".mp4": write_mp4, ".gif": write_gif}
 
 
@@ -214,8 +226,10 @@ def demand_possible(path: Path) -> None:
     """Raise ValueError where no such film can be made here."""
     from importlib.util import find_spec
 
+    if path.suffix == ".pc2":
+        return
     if path.suffix not in WRITERS:
-        raise ValueError(f"{path}: a film ends in .mp4 or .gif")
+        raise ValueError(f"{path}: a film ends in .mp4 or .gif, point caches in .pc2")
     if path.suffix == ".mp4" and find_spec("av") is None:
         raise ValueError(f"{path}: needs pip install 'neural-garment-benchmark[film]'; a .gif does not")
     # In a process of its own: where there is no OpenGL, it is killed.
@@ -241,7 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--width", type=int, default=480, help="of a view [pixels] (default 480)")
     parser.add_argument("--azimuth", type=float, default=25.0, metavar="DEGREES",
         help="of the camera, from the front to the body's left (default 25; 180: from behind)")  # fmt: skip
-    parser.add_argument("-o", "--out", required=True, metavar="FILE", help="x.mp4 or x.gif")
+    parser.add_argument("-o", "--out", required=True, metavar="FILE", help="x.mp4, x.gif or x.pc2")
     options = parser.parse_args(arguments)
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
@@ -251,10 +265,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from reports.run.selected_roll_outs import select_roll_outs
 
     selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
-    dt = selected.longest.dt
-    rate = options.speed / dt if dt > 0.0 else 1.0
-    with replacing(path) as temporary:
-        WRITERS[path.suffix](temporary, draw_frames(selected, options.width, options.azimuth), rate)
+    if path.suffix == ".pc2":
+        write_point_caches(path, selected)
+    else:
+        dt = selected.longest.dt
+        rate = options.speed / dt if dt > 0.0 else 1.0
+        with replacing(path) as temporary:
+            WRITERS[path.suffix](temporary, draw_frames(selected, options.width, options.azimuth), rate)
     print(path)
     return 0
 

@@ -11,6 +11,8 @@ from PIL import Image
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
+from reference_sim.files.mesh_files import read_mesh
+from reference_sim.point_cache import read_point_cache
 from reports import film
 from reports.pictures.render import camera_axes
 from reports.run.selected_roll_outs import SelectedRollOuts
@@ -100,6 +102,20 @@ def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monke
     assert len(frames) == 5 and labels == names + names + 3 * [*names, "ended at 0.03 s: ok"]
 
 
+def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(film, "SWATCH", "import os; os.kill(os.getpid(), 11)")  # no OpenGL is needed
+    assert filmed(run, tmp_path / "x.pc2", "--methods", "snug") == 0
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"x_{name}.{ending}" for name in ("snug", "body") for ending in ("pc2", "obj")
+    }
+    for name in ("snug", "body"):
+        mesh = Trajectory.load(run.trajectory_path(SCENE, name))
+        assert read_point_cache(tmp_path / f"x_{name}.pc2") == pytest.approx(mesh.positions, abs=1e-7)
+        first = read_mesh(tmp_path / f"x_{name}.obj")
+        assert first.positions == pytest.approx(mesh.positions[0], abs=1e-7)
+        assert np.array_equal(first.faces, mesh.faces)
+
+
 def kept_of(*positions: np.ndarray) -> SelectedRollOuts:
     faces = np.array([[0, 1, 2]])
     cloths = {str(k): Trajectory(x, faces, np.arange(len(x)) / 30.0) for k, x in enumerate(positions)}
@@ -138,7 +154,7 @@ def test_the_normals_of_a_ball_that_moves_point_outwards():
     ("change", "hint"),
     [
         (["--methods", "snug,simulatoin"], "no method in tshirt/walk is called 'simulatoin'"),
-        (["-o", "x.avi"], "x.avi: a film ends in .mp4 or .gif"),
+        (["-o", "x.avi"], "x.avi: a film ends in .mp4 or .gif, point caches in .pc2"),
         (["--speed", "0"], "--speed is 0.01 to 10"),
         (["--speed", "nan"], "--speed is 0.01 to 10"),
         (["--width", "7"], "--width 64 to 2000"),

@@ -12,7 +12,6 @@ from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES, joint
 from snug.networks.ncs.network import LEAD
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.onnx_file import write_onnx
 from snug.recipes.named import NCS
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network
@@ -115,11 +114,3 @@ def test_poses_held_have_the_static_answer(trained):
     one = roll_out(trained, tube_dress(), held(motion, 5, 20)).positions
     assert np.abs(one - one[0]).max() < 1e-6 and np.abs(one[0] - still[5]).max() < 2e-6
     assert np.abs(roll_out(trained, tube_dress(), motion).positions - still).max() > 1e-6
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")  # of the exporter, about its own parts
-def test_an_onnx_file_gives_the_same(trained, tmp_path):
-    pytest.importorskip("onnxruntime")
-    pytest.importorskip("onnxscript")
-    assert write_onnx(trained, tube_dress(), swaying(6), tmp_path / "ncs.onnx") < 1e-5
