@@ -2,13 +2,204 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
-from reference_sim.assembly.hessian_pattern import HessianPattern
+from reference_sim.cholesky import nested_dissection
 from reference_sim.energies.energy import Energy, Step
+from reference_sim.kernels.float64_lanes import BlockPlaces
+from reference_sim.kernels.kernel_cache import njit
+
+# A wider pattern keeps up to this many times the blocks that dynamic terms need at the moment.
+SPARE_BLOCKS = 3
+
+
+class HessianPattern:
+    """Pattern of the sum of `energies` over the free vertices, built once per scene.
+
+    Dynamic terms have no blocks in it at first: `covering` gives a wider pattern when they couple vertices
+    that no other term couples.
+
+    The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order, as a
+    Cholesky factorisation reads it. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that the
+    coordinates share.
+
+    Args:
+        energies: the terms.
+        vertex_count: V.
+        free: (V,) True for vertices that take part.
+        block: 3 or 1.
+
+    Attributes:
+        free: (n,) indices of the free vertices, in the order of the matrix.
+        block: 3 or 1.
+        indptr, indices: CSC structure of the (block n, block n) lower matrix.
+        order: fill-reducing order of its rows and columns.
+        diagonal: places of the diagonal entries in the values.
+    """
+
+    def __init__(
+        self, energies: Sequence[Energy], vertex_count: int, free: np.ndarray, *, block: int = 3
+    ) -> None:
+        self.block = block
+        self.energies = tuple(energies)
+        self.free = np.flatnonzero(free)
+        number = np.full(vertex_count, -1, dtype=np.int64)
+        number[self.free] = np.arange(len(self.free))
+        n = len(self.free)
+        of_terms = [_block_keys(number[energy.stencils], n) for energy in energies]
+        key = np.unique(np.concatenate([np.arange(n) * (n + 1), *map(np.unique, of_terms)]))
+        key = key[key >= 0]  # -1 stands for a pinned vertex or the upper triangle
+        self._number = number
+        self._slots = [np.where(keys < 0, -1, np.searchsorted(key, keys)) for keys in of_terms]
+        self._fixed = self
+        self._lay_out(key)
+
+    def _lay_out(self, key: np.ndarray) -> None:
+        """Place the blocks of the sorted keys column * n + row one after the other."""
+        self._key, block, n = key, self.block, len(self.free)
+        column, row = np.divmod(key, n)
+        start = np.searchsorted(column, np.arange(n + 1))
+        height = np.diff(start)
+        within = np.arange(len(key)) - start[column]
+        self._base = block**2 * start[column] + block * within
+        self._stride = block * height[column]
+        self.indptr = np.concatenate([[0], np.cumsum(np.repeat(block * height, block))])
+        self.indices = np.empty(block**2 * len(row), dtype=np.int64)
+        _fill_rows(start, row, block, self.indices)
+        off = row != column
+        ones = np.ones(off.sum())
+        lower = sp.csr_matrix((ones, (row[off], column[off])), shape=(n, n))
+        self._adjacency = (lower + lower.T).tocsr()
+        first = start[:-1]  # a diagonal block is the first of its column
+        step = self._stride[first][:, None] + 1
+        self.diagonal = (self._base[first][:, None] + np.arange(block) * step).ravel()
+
+    def changing(self, x: np.ndarray, convexity: float = 0.0) -> list[sp.csc_matrix]:
+        """Return the Hessians (3V, 3V) of the dynamic terms at x (V, 3)."""
+        return [energy.sparse_hessian(x, convexity) for energy in self.energies if energy.dynamic]
+
+    def covering(self, changing: Sequence[sp.csc_matrix]) -> HessianPattern:
+        """Return this pattern, or a wider one if the matrices couple vertices that have no block here.
+
+        A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis each
+        time, until more than SPARE_BLOCKS times the needed ones are kept.
+        """
+        if not changing:
+            return self
+        needed = np.unique(np.concatenate([self._keys_of(matrix)[0] for matrix in changing]))
+        needed = np.setdiff1d(needed, self._fixed._key, assume_unique=True)
+        if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
+            return self
+        kept = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
+        return self._fixed._widened(
+            np.union1d(kept, needed) if len(kept) < SPARE_BLOCKS * len(needed) else needed
+        )
+
+    def _widened(self, extra: np.ndarray) -> HessianPattern:
+        wider = copy.copy(self)
+        for cached in ("order", "_constant"):
+            wider.__dict__.pop(cached, None)
+        key = np.union1d(self._key, extra)
+        moved = np.append(np.searchsorted(key, self._key), -1)  # slot -1, not stored, stays -1
+        wider._slots = [moved[slots] for slots in self._slots]
+        wider._lay_out(key)
+        return wider
+
+    def _keys_of(self, hessian: sp.csc_matrix) -> tuple[np.ndarray, np.ndarray]:
+        """Return keys (m,) of the stored blocks of a (3V, 3V) matrix, sorted, and their values (m, 3, 3)."""
+        blocks = hessian.tobsr(blocksize=(3, 3))
+        row = self._number[np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))]
+        column = self._number[blocks.indices]
+        stored = np.flatnonzero((row >= column) & (column >= 0))
+        key = (column * len(self.free) + row)[stored]
+        order = np.argsort(key)
+        return key[order], blocks.data[stored[order]]
+
+    @property
+    def size(self) -> int:
+        """Number of rows, block n."""
+        return self.block * len(self.free)
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """(block n,) fill-reducing order of rows and columns."""
+        vertices = nested_dissection(self._adjacency)
+        return (self.block * vertices[:, None] + np.arange(self.block)).ravel()
+
+    def assemble(
+        self, x: np.ndarray, changing: Sequence[sp.csc_matrix] = (), *, convexity: float = 0.0
+    ) -> np.ndarray:
+        """Return the values (nnz,) [N/m] of the lower matrix: Hessian, or scalar stiffness for block 1.
+
+        Args:
+            x: (V, 3) [m].
+            changing: Hessians of the dynamic terms at x, which this pattern must cover.
+            convexity: see Energy.active_hessian_blocks.
+        """
+        values = self._constant.copy()
+        for energy, slots in zip(self.energies, self._slots):
+            if not (energy.dynamic or self.block in energy.constant):
+                self._add_term(energy, slots, x, convexity, values)
+        for matrix in changing:
+            self._add(matrix, values)
+        return values
+
+    @cached_property
+    def _constant(self) -> np.ndarray:
+        """(nnz,) values of the terms that give the same everywhere."""
+        values, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
+        for energy, slots in zip(self.energies, self._slots):
+            if self.block in energy.constant:
+                self._add_term(energy, slots, anywhere, 0.0, values)
+        return values
+
+    def _add_term(
+        self, energy: Energy, slots: np.ndarray, x: np.ndarray, convexity: float, values: np.ndarray
+    ) -> None:
+        places = BlockPlaces(slots, self._base, self._stride, self.block)
+        if self.block == 3:
+            energy.add_hessian(x, convexity, places, values)
+        else:
+            places.add(*energy.scalar_stiffness(x), values)
+
+    def _add(self, hessian: sp.csc_matrix, values: np.ndarray) -> None:
+        key, blocks = self._keys_of(hessian)
+        slot = np.searchsorted(self._key, key)
+        i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
+        values[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += blocks
+
+    def lower(self, values: np.ndarray) -> sp.csc_matrix:
+        """Return the values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
+        return sp.csc_matrix((values, self.indices, self.indptr), shape=(self.size, self.size))
+
+    def symmetric(self, values: np.ndarray) -> sp.csc_matrix:
+        """Return the whole symmetric (3n, 3n) matrix."""
+        lower = sp.tril(self.lower(values), format="csc")
+        return sp.csc_matrix(lower + sp.tril(lower, -1).T)
+
+
+def _block_keys(stencils: np.ndarray, n: int) -> np.ndarray:
+    """Return (N, k * k) keys column * n + row of each block of each element, -1 where it is not stored."""
+    row, column = stencils[:, :, None], stencils[:, None, :]
+    key = column * n + row
+    key = np.where((row < 0) | (column < 0) | (row < column), -1, key)
+    return key.reshape(len(stencils), stencils.shape[1] ** 2)
+
+
+@njit(cache=True)
+def _fill_rows(start, row, block, indices):
+    at = 0
+    for column in range(start.shape[0] - 1):
+        for _ in range(block):
+            for p in range(start[column], start[column + 1]):
+                for r in range(block):
+                    indices[at] = block * row[p] + r
+                    at += 1
 
 
 class Potential:

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.cloth import Cloth
+from reference_sim.cloth import Cloth, fingerprint
 from reference_sim.energies.energy import Energy
-from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise.result import Result, severity
 from reference_sim.progress import progress_bar
 from reference_sim.time_step import FirstGuess, State, TimeStepper

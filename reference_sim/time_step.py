@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.cloth import Cloth
+from reference_sim.cloth import Cloth, fingerprint
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.inertia import Inertia
-from reference_sim.fingerprint import fingerprint
 from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 from reference_sim.step_minimiser import StepMinimiser

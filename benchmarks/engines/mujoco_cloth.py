@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.engines.engine import EngineCloth
 from benchmarks.engines.specimens import Specimen
 from reference_sim.cloth import Cloth
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY
 
 

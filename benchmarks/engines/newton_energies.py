@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.engines.newton_cloth import spring_stiffness
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 
 if TYPE_CHECKING:

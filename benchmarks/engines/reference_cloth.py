@@ -6,9 +6,9 @@ import numpy as np
 
 from benchmarks.engines.engine import EngineCloth
 from benchmarks.engines.specimens import Specimen
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.time_step import State, TimeStepper
 
 

@@ -20,7 +20,7 @@ from benchmarks.fabrics.elastica import bending_length
 from benchmarks.fabrics.fabric import SNUG, Fabric
 from benchmarks.meshes import ROW, lying, rectangle
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.material import GRAVITY, Material
 from reference_sim.potential import Potential
 

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
@@ -98,6 +99,6 @@ def modules_of(terms: Iterable[str]) -> tuple[str, ...]:
     """Modules of energies that a recipe names beside the usual ones: they are found by name, not imported."""
     if set(terms) <= set(TERMS):
         return ()
-    from reference_sim.energies import MODULE_OF
+    from reference_sim import energies
 
-    return tuple(f"reference_sim.energies.{module}" for module in sorted(set(MODULE_OF.values())))
+    return tuple(f"{energies.__name__}.{module.name}" for module in iter_modules(energies.__path__))

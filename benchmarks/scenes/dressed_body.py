@@ -15,11 +15,11 @@ import numpy as np
 from benchmarks.assets.assets import Assets
 from benchmarks.scene import BuiltScene, Dressed, Scene
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.obstacle import Obstacle
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory import Trajectory

@@ -15,11 +15,11 @@ from benchmarks.external.scene_fit import LONGEST_STRETCH, mean_stretch
 from benchmarks.fingerprint.digest import digest
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth, MeshError
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle

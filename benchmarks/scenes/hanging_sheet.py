@@ -5,9 +5,9 @@ from __future__ import annotations
 from benchmarks.meshes import square_sheet
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 
 SIZE = 0.4  # [m]

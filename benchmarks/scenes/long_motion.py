@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.scene import BuiltScene, Dressed, Scene
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, transition
 

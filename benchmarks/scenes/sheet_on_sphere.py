@@ -7,10 +7,10 @@ import numpy as np
 from benchmarks.meshes import in_space, rectangle, sphere, square_sheet
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 

@@ -42,9 +42,9 @@ def build(
     """Build the scene; no assets are needed."""
     from benchmarks.fabrics.disc import Disc, disc
     from benchmarks.fabrics.strip import Strip, cantilever
-    from reference_sim.energies.bend_hinge.definition import BendHinge
+    from reference_sim.energies.bend_hinge import BendHinge
     from reference_sim.energies.gravity import Gravity
-    from reference_sim.energies.stretch_stvk.definition import StretchStVK
+    from reference_sim.energies.stretch_stvk import StretchStVK
 
     specimen: Strip | Disc
     if test == "cantilever":

@@ -19,35 +19,6 @@ from reference_sim.kernels.float32_layout import (
 from reference_sim.kernels.kernel_cache import njit
 
 
-class HenckySpring(Energy):
-    """Springs along the edges of the mesh; `stiffness` k in N."""
-
-    name = "hencky"
-    kernels: ClassVar[dict[str, str]] = {"float32_lanes": "lanes"}  # or "module:function" of another file
-
-    def __init__(self, cloth: Cloth, *, stiffness: float = 10.0) -> None:
-        self.cloth, self.stencils, self.lengths = cloth, cloth.edges, cloth.edge_lengths
-        self.stiffness = stiffness * self.lengths
-
-    def element_energy(self, u: torch.Tensor) -> torch.Tensor:
-        """Return the energy (N,) [J] of edges from their ends u (N, 2, 3) [m]."""
-        length = torch.linalg.vector_norm(u[..., 1, :] - u[..., 0, :], dim=-1)
-        strain = torch.log(length / torch.as_tensor(self.lengths).to(u))
-        return 0.5 * torch.as_tensor(self.stiffness).to(u) * strain**2
-
-
-def lanes(term: HenckySpring) -> Float32Lanes:
-    """Return the gradient in float32, which takes several edges at once."""
-    vertices, constants = lay_out(term.stencils, term.stiffness, term.lengths)
-    edges = empty_state(vertices, 3)
-
-    def freeze(x0: np.ndarray) -> tuple:
-        set_edges(x0, vertices, 1, edges)
-        return vertices, constants, edges
-
-    return Float32Lanes(spring_gradient, freeze)
-
-
 @njit(cache=True, fastmath=FAST, error_model="numpy")
 def spring_gradient(data, u, gradient, scratch):
     """Add the gradient at displacements u to `gradient`; return the energy."""
@@ -71,3 +42,32 @@ def spring_gradient(data, u, gradient, scratch):
                 gradient[j + axis] += scratch[axis * L + g]
                 gradient[i + axis] -= scratch[axis * L + g]
     return total
+
+
+def lanes(term: "HenckySpring") -> Float32Lanes:
+    """Return the gradient in float32, which takes several edges at once."""
+    vertices, constants = lay_out(term.stencils, term.stiffness, term.lengths)
+    edges = empty_state(vertices, 3)
+
+    def freeze(x0: np.ndarray) -> tuple:
+        set_edges(x0, vertices, 1, edges)
+        return vertices, constants, edges
+
+    return Float32Lanes(spring_gradient, freeze)
+
+
+class HenckySpring(Energy):
+    """Springs along the edges of the mesh; `stiffness` k in N."""
+
+    name = "hencky"
+    kernels: ClassVar = {"float32_lanes": lanes}
+
+    def __init__(self, cloth: Cloth, *, stiffness: float = 10.0) -> None:
+        self.cloth, self.stencils, self.lengths = cloth, cloth.edges, cloth.edge_lengths
+        self.stiffness = stiffness * self.lengths
+
+    def element_energy(self, u: torch.Tensor) -> torch.Tensor:
+        """Return the energy (N,) [J] of edges from their ends u (N, 2, 3) [m]."""
+        length = torch.linalg.vector_norm(u[..., 1, :] - u[..., 0, :], dim=-1)
+        strain = torch.log(length / torch.as_tensor(self.lengths).to(u))
+        return 0.5 * torch.as_tensor(self.stiffness).to(u) * strain**2

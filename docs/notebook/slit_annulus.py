@@ -16,9 +16,9 @@ from benchmarks.validation.bending.gaussian_curvature import GaussianCurvature
 from benchmarks.validation.bending.plates import plate_stiffness
 from benchmarks.validation.bending.slit_annulus import MATERIAL, D, annulus, lift
 from benchmarks.validation.case import slow_paths_allowed
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 
 EXACT = np.array([lift for _, lift in SZE])
 

@@ -1,8 +1,8 @@
-"""Physical terms, a file or a folder each: formula with its source, definition in torch, kernels.
+"""Physical terms: formula with its source, definition in torch, kernels in float64, in one file each.
 
-In a folder, `definition.py` has the formula and the kernels in float64, and every other file the kernels of
-one use (kernels.fast_kernels). A new term is one file, its line in MODULE_OF and its import for type
-checkers. The file is imported when the term's name is first used: a scene without contact loads none.
+Beside it lies, where a term has them, a file of the kernels for solvers and training. A new term is one file
+and its line in `__init__.pyi`. A file is imported when the term's name is first used: a scene without contact
+loads none.
 
 >>> from reference_sim import Cloth
 >>> from reference_sim.energies import StretchStVK
@@ -12,42 +12,6 @@ checkers. The file is imported when the term's name is first used: a scene witho
 (0.0035, (3, 3))
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING
+import lazy_loader
 
-if TYPE_CHECKING:
-    from reference_sim.energies.area_barrier import AreaBarrier as AreaBarrier
-    from reference_sim.energies.bend_hinge.definition import BendHinge as BendHinge
-    from reference_sim.energies.contact_barrier import ContactBarrier as ContactBarrier
-    from reference_sim.energies.contact_friction import ContactFriction as ContactFriction
-    from reference_sim.energies.contact_penalty.definition import ContactPenalty as ContactPenalty
-    from reference_sim.energies.energy import Energy as Energy
-    from reference_sim.energies.energy import Step as Step
-    from reference_sim.energies.gravity import Gravity as Gravity
-    from reference_sim.energies.inertia import Inertia as Inertia
-    from reference_sim.energies.stretch_spring import StretchSpring as StretchSpring
-    from reference_sim.energies.stretch_stvk.definition import StretchStVK as StretchStVK
-
-MODULE_OF = {
-    "StretchStVK": "stretch_stvk.definition",
-    "StretchSpring": "stretch_spring",
-    "BendHinge": "bend_hinge.definition",
-    "Gravity": "gravity",
-    "Inertia": "inertia",
-    "ContactPenalty": "contact_penalty.definition",
-    "ContactFriction": "contact_friction",
-    "ContactBarrier": "contact_barrier",
-    "AreaBarrier": "area_barrier",
-    "Energy": "energy",
-    "Step": "energy",
-}
-
-__all__ = list(MODULE_OF)
-
-
-def __getattr__(name: str) -> type:
-    if name not in MODULE_OF:
-        raise AttributeError(
-            f"reference_sim.energies has no term {name!r}: choose one of {', '.join(MODULE_OF)}"
-        )
-    return getattr(import_module(f".{MODULE_OF[name]}", __name__), name)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy, Step, demand_not_negative, demand_positive
 from reference_sim.kernels.kernel_cache import njit
 

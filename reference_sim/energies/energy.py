@@ -9,7 +9,7 @@ where the definition is evaluated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from reference_sim.cloth import Cloth
-    from reference_sim.kernels.block_indices import BlockPlaces
+    from reference_sim.kernels.float64_lanes import BlockPlaces
     from reference_sim.obstacle import Obstacle
 
 
@@ -44,6 +44,11 @@ class Step:
 DERIVATIVES = (
     "value_and_gradient", "hessian_blocks", "active_hessian_blocks", "add_hessian", "scalar_stiffness",
 )  # fmt: skip
+
+
+def _inherits(cls: type[Energy], name: str) -> bool:
+    """Return whether a class has a closed form from a parent."""
+    return getattr(cls, name) is not getattr(Energy, name)
 
 
 def demand_not_negative(what: str, **numbers: float) -> None:
@@ -76,8 +81,8 @@ class Energy:
         impassable: whether an obstacle may have to stop on its way to the end of a step.
         joins_late: whether a step is minimised without the term first. It is zero wherever nothing is near,
             so most steps end there.
-        kernels: fast kernels by use, "module:function" each, or the name of a function of the term's own
-            file; the uses are listed in kernels.fast_kernels. A subclass does not inherit them.
+        kernels: functions for fast kernels by use; the uses are listed in kernels.fast_kernels. A subclass
+            does not inherit them.
     """
 
     name: str
@@ -88,19 +93,22 @@ class Energy:
     remembers: bool = False
     impassable: bool = False
     joins_late: bool = False
-    kernels: ClassVar[Mapping[str, str]] = {}
+    kernels: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Take the derivatives of a class with a definition of its own from it, unless it has them too.
+        """Refuse a class with a definition of its own that would inherit the closed forms of another.
 
-        Those that it would inherit are the closed forms of another energy.
+        Raises:
+            TypeError: names the derivatives, and what to write where the definition is to give them.
         """
         super().__init_subclass__(**options)
         own = vars(cls)
-        if not {"element_energy", "power"}.isdisjoint(own):
-            for name in DERIVATIVES:
-                if name not in own:
-                    setattr(cls, name, vars(Energy)[name])
+        if {"element_energy", "power"}.isdisjoint(own):
+            return
+        foreign = [name for name in DERIVATIVES if name not in own and _inherits(cls, name)]
+        if foreign:
+            lines = "; ".join(f"{name} = Energy.{name}" for name in foreign)
+            raise TypeError(f"{cls.__name__} would inherit closed forms of another energy: write {lines}")
 
     def energy(self, x: Tensor) -> Tensor:
         """Return the energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""

@@ -13,7 +13,24 @@ from reference_sim.material import GRAVITY
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from reference_sim.kernels.training_lanes import BatchKernel
+    from reference_sim.kernels.fast_kernels import BatchKernel
+
+
+def vertex_weights(term: Gravity) -> np.ndarray:
+    """Return the weight (V,) [N] of each vertex, along -y."""
+    return term.weights
+
+
+def batch(term: Gravity) -> BatchKernel:
+    """Return the kernel of training on a CPU."""
+    weights = term.weights.astype(np.float32)
+    zero = np.float32(term.weights.sum() * term.origin_height)
+
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        gradients[:, :, 1] += weights[:, None]
+        return weights @ x[:, :, 1] - zero
+
+    return run
 
 
 class Gravity(Energy):
@@ -26,7 +43,7 @@ class Gravity(Energy):
 
     name = "gravity"
     constant = (3,)
-    kernels: ClassVar = {"vertex_weights": "vertex_weights", "training_batch": "batch"}
+    kernels: ClassVar = {"vertex_weights": vertex_weights, "training_batch": batch}
 
     def __init__(self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY) -> None:
         self.cloth = cloth
@@ -57,20 +74,3 @@ class Gravity(Energy):
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices (n,) with second derivatives, and these (n, 3, 3) [N/m]; see Energy."""
         return np.arange(0), np.zeros((0, 3, 3))
-
-
-def vertex_weights(term: Gravity) -> np.ndarray:
-    """Return the weight (V,) [N] of each vertex, along -y."""
-    return term.weights
-
-
-def batch(term: Gravity) -> BatchKernel:
-    """Return the kernel of training on a CPU (kernels.training_lanes)."""
-    weights = term.weights.astype(np.float32)
-    zero = np.float32(term.weights.sum() * term.origin_height)
-
-    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-        gradients[:, :, 1] += weights[:, None]
-        return weights @ x[:, :, 1] - zero
-
-    return run

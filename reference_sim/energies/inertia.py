@@ -11,10 +11,15 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
-from reference_sim.kernels.training_lanes import TRAINING_LANES, BatchKernel
+from reference_sim.kernels.fast_kernels import TRAINING_LANES, BatchKernel
 
 if TYPE_CHECKING:
     from torch import Tensor
+
+
+def vertex_inertia(term: Inertia) -> np.ndarray:
+    """Return the stiffness (V,) [N/m] by which each vertex is pulled towards x_hat."""
+    return term.masses / term.dt**2
 
 
 class Inertia(Energy):
@@ -22,7 +27,7 @@ class Inertia(Energy):
 
     name = "inertia"
     constant = (1, 3)
-    kernels: ClassVar = {"vertex_inertia": "vertex_inertia"}
+    kernels: ClassVar = {"vertex_inertia": vertex_inertia}
 
     def __init__(self, cloth: Cloth, dt: float) -> None:
         if not (np.isfinite(dt) and dt > 0):
@@ -71,13 +76,8 @@ class Inertia(Energy):
         return np.arange(len(self.masses)), (self.masses / self.dt**2)[:, None, None]
 
 
-def vertex_inertia(term: Inertia) -> np.ndarray:
-    """Return the stiffness (V,) [N/m] by which each vertex is pulled towards x_hat."""
-    return term.masses / term.dt**2
-
-
 def batch_of_windows(term: Inertia, ahead: np.ndarray, windows: int, weight: float = 1.0) -> BatchKernel:
-    """Return the kernel of training on a CPU (kernels.training_lanes), of windows that fill whole blocks.
+    """Return the kernel of training on a CPU, of windows that fill whole blocks.
 
     E = weight m / (2 dt^2) |a|^2 with a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t, zero for the first two frames.
     ahead (C, 3, TRAINING_LANES) [m]: where the frame before would be if nothing pulled, seen from where it

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_sim.cloth import MeshError
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
@@ -77,3 +79,69 @@ def corner_angles(points: Array, faces: Index) -> Array:
     """
     after, before = (points[np.roll(faces, -k, axis=1)] - points[faces] for k in (1, 2))
     return np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), np.sum(after * before, axis=2))
+
+
+LEAST_AREA_RATIO = 1e-12  # area of a face relative to the mean, below which it has no normal
+
+
+def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
+    """Refuse a mesh that is no moving closed surface.
+
+    Args:
+        positions: (T, B, 3) [m].
+        faces: (F, 3).
+
+    Raises:
+        MeshError: wrong shapes, no frame, NaN, a face without area, an open, non-manifold, inconsistently
+            wound or inside-out mesh; the message names vertex, face or edge, and the remedy.
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> check_closed(corners[None], np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    """
+    if positions.ndim != 3 or positions.shape[2] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise MeshError(f"obstacle {positions.shape} and faces {faces.shape}: expected (T, B, 3) and (F, 3)")
+    if not positions.size or not faces.size:
+        raise MeshError(f"obstacle with {len(positions)} frames and {len(faces)} faces: nothing to touch")
+    if faces.min() < 0 or faces.max() >= positions.shape[1]:
+        raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
+    if not np.isfinite(positions).all():
+        frame, vertex, _ = np.argwhere(~np.isfinite(positions))[0]
+        raise MeshError(f"obstacle vertex {vertex} of frame {frame} is not finite")
+    _check_edges(faces, positions.shape[1])
+    for frame, x in enumerate(positions):
+        _check_shape(x[faces], frame)
+
+
+def _check_edges(faces: np.ndarray, size: int) -> None:
+    """Refuse an edge that is not between exactly two faces that walk it in opposite directions."""
+    half = half_edges(faces)
+    undirected = np.sort(half, axis=1) @ np.array([size, 1])
+    _, inverse, count = np.unique(undirected, return_inverse=True, return_counts=True)
+    count = count[inverse]
+    for wrong, message in (
+        (count == 1, "is not closed: edge ({a}, {b}) of face {face} has one face only: fill the hole"),
+        (count > 2, "has {count} faces at edge ({a}, {b}), {face} one of them: separate what meets there"),
+    ):
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            text = message.format(a=half[k, 0], b=half[k, 1], face=k // 3, count=count[k])
+            raise MeshError(f"obstacle {text}")
+    directed, first, times = np.unique(half @ np.array([size, 1]), return_index=True, return_counts=True)
+    if len(directed) < len(half):
+        k = int(first[np.argmax(times > 1)])
+        raise MeshError(
+            f"obstacle faces disagree: edge ({half[k, 0]}, {half[k, 1]}) of face {k // 3} is walked the same "
+            "way by the face beside it: wind all faces outwards"
+        )
+
+
+def _check_shape(corner: np.ndarray, frame: int) -> None:
+    """Refuse faces (F, 3, 3) of one frame without an area, or with no positive volume inside."""
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.sqrt(np.einsum("fi,fi->f", normal, normal))
+    if not area.min() > LEAST_AREA_RATIO * area.mean():
+        raise MeshError(f"obstacle face {int(area.argmin())} has no area in frame {frame}: remove it")
+    if frame == 0:
+        volume = np.einsum("fi,fi->", corner[:, 0], normal) / 6
+        if not volume > 0:
+            raise MeshError(f"obstacle is inside out (volume {volume:.3g} m^3): reverse its faces")

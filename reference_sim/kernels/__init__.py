@@ -1,1 +1,1 @@
-"""Foundations of all compiled kernels: their cache on disk, lanes of elements, indices of blocks."""
+"""Foundations of all compiled kernels: their cache on disk, lanes of elements, kernels as arguments."""

@@ -1,8 +1,18 @@
-"""Declaration of a term's fast kernels, and how a solver or a training finds them.
+"""Declaration of a term's fast kernels, their forms, and how a solver or a training finds them.
 
-An `Energy` names in its class attribute `kernels` what it has, by use (USES): "module:function", or the name
-of a function of its own file. The module is imported when a solver asks. Nobody keeps a list of terms. Where
-a kernel is missing, a solver with a slower way says so once (`warn_slow_path`); the others refuse the term.
+The class attribute `kernels` of an `Energy` has a function for each use (USES) that it serves. Where one is
+missing, a solver with a slower way says so once (`warn_slow_path`); the others refuse the term.
+
+Gauss-Seidel sweeps (vertex block descent, XPBD) move vertices between one element and the next, so their
+kernels work on one element at a time, in float64; tests/benchmarks/methods/test_minimisers.py holds them to
+the energies' gradients and Hessians.
+
+Training on a CPU evaluates one mesh in some fifty configurations, so each element is worked out for
+TRAINING_LANES of them at once, in float32: the innermost loop has a fixed length and no branch, and the
+compiler turns it into vector instructions. Vertices (N, T, V, 3) of N windows of T frames lie in memory as C
+blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows, then the second
+ones, and so on (snug.kernels.lanes). tests/snug/training/test_device.py holds these kernels to the
+definitions.
 """
 
 from __future__ import annotations
@@ -11,7 +21,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,14 +30,15 @@ if TYPE_CHECKING:
     from reference_sim.energies.inertia import Inertia
     from reference_sim.potential import Potential
 
-# Use -> what the named function (term) -> ... gives, and who asks for it.
+
+# Use -> what the function (term) -> ... gives, and who asks for it.
 USES = {
     "vertex_inertia": "(V,) [N/m] of a pull towards term.x_hat: early-stopped L-BFGS, block descent, XPBD",
     "vertex_weights": "(V,) [N] of a constant pull along -y: early-stopped L-BFGS, block descent, XPBD",
     "float32_lanes": "kernels.float32_layout.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS",
-    "vertex_block": "kernels.element_sweeps.VertexBlocks: vertex block descent",
-    "constraint": "kernels.element_sweeps.Constraints: XPBD",
-    "training_batch": "kernels.training_lanes.BatchKernel: the loss of trainings on a CPU",
+    "vertex_block": "VertexBlocks: vertex block descent",
+    "constraint": "Constraints: XPBD",
+    "training_batch": "BatchKernel: the loss of trainings on a CPU",
 }
 OF_VERTICES = ("vertex_inertia", "vertex_weights")
 
@@ -43,26 +53,21 @@ def has_kernel(term: Energy, use: str) -> bool:
     A subclass may compute something else: one that does not says `kernels = Parent.kernels`.
 
     Raises:
-        ValueError: the class declares a use that does not exist.
+        ValueError: the class declares a use that does not exist, or no function for one.
     """
     declared = vars(type(term)).get("kernels", {})
-    if unknown := sorted(set(declared) - set(USES)):
-        raise ValueError(
-            f"{type(term).__name__}.kernels: unknown use {unknown[0]!r}, choose of {', '.join(USES)}"
-        )
+    for name, function in declared.items():
+        if name not in USES:
+            known = ", ".join(USES)
+            raise ValueError(f"{type(term).__name__}.kernels: unknown use {name!r}, choose of {known}")
+        if not callable(function):
+            raise ValueError(f"{type(term).__name__}.kernels: {name!r} is {function!r}: give the function")
     return use in declared
 
 
 def fast_kernel(term: Energy, use: str) -> Any:
     """Return what the term's function for this use gives, or None if it declares none."""
-    kind: Any = type(term)  # hashable, which mypy does not see
-    return _function(kind, use)(term) if has_kernel(term, use) else None
-
-
-@cache
-def _function(kind: type[Energy], use: str) -> Callable[[Energy], Any]:
-    module, colon, name = kind.kernels[use].rpartition(":")
-    return getattr(import_module(module if colon else kind.__module__), name)
+    return type(term).kernels[use](term) if has_kernel(term, use) else None
 
 
 @dataclass(frozen=True)
@@ -121,3 +126,62 @@ def warn_slow_path(asker: str, kernel: str, terms: Sequence[Energy], instead: st
 @cache
 def _warn_once(message: str) -> None:
     warnings.warn(message, SlowPathWarning, stacklevel=4)
+
+
+SCRATCH_SHAPE = (4, 3)  # numbers that the kernel of a vertex block may use for its own
+
+
+@dataclass(frozen=True)
+class VertexBlocks:
+    """A term as vertex block descent takes it: what the function for "vertex_block" returns.
+
+    Attributes:
+        kernel: compiled function (data, x, v, g, H, scratch) -> 0.0, which adds the gradient (3,) [N] and a
+            convex Hessian block (3, 3) [N/m] of vertex v at x (V, 3) [m] to g and H. data is (first, corners,
+            *arrays): corner c of element e is e k + c, and those of vertex v are
+            corners[first[v] : first[v + 1]].
+        stencils: (N, k) vertices of the elements.
+        used: (N, k) corners that the element depends on.
+        freeze: function that gives `arrays`, as the step has them.
+    """
+
+    kernel: Any
+    stencils: np.ndarray
+    used: np.ndarray
+    freeze: Callable[[], tuple[Any, ...]]
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """A term as XPBD takes it: what the function for "constraint" returns.
+
+    Attributes:
+        kernel: compiled function (data, x, w) -> 0.0, which solves one constraint after the other and moves
+            x (V, 3) [m] in place; w (V,) [m/N] is dt^2 over the mass. A multiplier is a force: the paper's
+            lambda / dt^2.
+        freeze: function that gives `data` as the step has it, with multipliers of zero.
+    """
+
+    kernel: Any
+    freeze: Callable[[], tuple[Any, ...]]
+
+
+TRAINING_LANES = 16
+# No assumption on NaN or infinity: the guard of training must see them.
+GUARDED = {"reassoc", "contract", "arcp", "nsz"}
+
+# x (C, V, 3, TRAINING_LANES) float32 [m] -> values (C, TRAINING_LANES) [J]; the second argument is like x,
+# and the gradients [N] are added to it. The function for "training_batch" returns one.
+BatchKernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def batch_kernel(kernel: Any, stencils: np.ndarray, *constants: Any) -> BatchKernel:
+    """Bind a compiled function (x, stencils, *constants, values, gradients) of flat arrays to an energy."""
+    stencils = stencils.astype(np.uint32)  # for a signed index is first asked whether it counts from the end
+
+    def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        values = np.empty((len(x), TRAINING_LANES), np.float32)
+        kernel(x.ravel(), stencils, *constants, values, gradients.ravel())
+        return values
+
+    return run

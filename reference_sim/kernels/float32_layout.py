@@ -6,7 +6,7 @@ millimetres and not of a body metres away.
 
 Elements come in blocks of LANES_FLOAT32; the last one is filled up with elements of no stiffness. Arrays of a
 block lie one quantity after the other, each LANES_FLOAT32 wide, so that the loops over lanes become vector
-instructions. The kernels lie beside the definitions of their terms (`float32_lanes.py`);
+instructions. The kernels lie beside the definitions of their terms;
 tests/reference_sim/minimise/test_compiled.py holds values and gradients to the definitions.
 """
 
@@ -30,7 +30,7 @@ HALF, ONE, TWO, THREE = np.float32(0.5), np.float32(1.0), np.float32(2.0), np.fl
 
 @dataclass(frozen=True)
 class Float32Lanes:
-    """A term as `CompiledLBFGS` takes it: what a function returns that a term names as "float32_lanes".
+    """A term as `CompiledLBFGS` takes it: what the function for "float32_lanes" returns.
 
     Attributes:
         gradient: compiled function (data, u, gradient, scratch) -> energy [J] at u (3V,) [m], which adds to

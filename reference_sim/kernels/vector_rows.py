@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from reference_sim.kernels.training_lanes import TRAINING_LANES as L
+from reference_sim.kernels.fast_kernels import TRAINING_LANES as L
 
 WIDE = ir.IntType(64)
 WIDTH = 16  # numbers of a row that `bits_at_most` compares

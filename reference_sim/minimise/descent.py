@@ -1,10 +1,10 @@
-"""State of a minimisation: the point reached, counts, clock, line search and report."""
+"""State of a minimisation: the point reached, counts, clock, line search and report; and the shared loop."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -179,3 +179,53 @@ def approximate_wolfe(before: float, after: float, slope: float, end_slope: floa
     noise = 1e-13 * abs(before)
     flat = after <= before + noise and -slope < 100 * noise
     return flat and float(end_slope) <= (2 * SUFFICIENT_DECREASE - 1) * slope
+
+
+RunState = TypeVar("RunState", bound=Descent, contravariant=True)
+
+
+NOT_FINITE = Stop("diverged", "energy or gradient is not finite at the starting point")
+
+
+class Solver(Protocol[RunState]):
+    """One way to minimise a potential; what a minimisation changes is in its `run`.
+
+    Attributes:
+        max_iterations: iterations before the loop gives up.
+        timeout: seconds before it does, counted from the start of `run`.
+    """
+
+    max_iterations: int
+    timeout: float
+
+    def init(self, run: RunState) -> Stop | None:
+        """Prepare the first step; return a Stop if there cannot be one."""
+        ...
+
+    def terminate(self, run: RunState) -> Stop | None:
+        """Return a Stop if the point reached is an answer, or no step can lead on from it."""
+        ...
+
+    def step(self, run: RunState) -> Stop | None:
+        """Take one step; return a Stop if there is none."""
+        ...
+
+
+def iterate(solver: Solver[RunState], run: RunState) -> Stop:  # type: ignore[misc]
+    """Minimise from where `run` is; return why that ended. Limits give "max_iterations" and "timeout"."""
+    if stop := solver.init(run):
+        return stop
+    run.show()
+    while True:
+        # Asked first: on a saddle, terminate takes an iteration and wants the step after it.
+        last = run.iterations >= solver.max_iterations
+        if stop := solver.terminate(run):
+            return stop
+        if last:
+            return Stop("max_iterations", f"gave up after {run.iterations} iterations")
+        if run.late(solver.timeout):
+            return Stop("timeout", f"gave up after {solver.timeout:g} s")
+        if stop := solver.step(run):
+            return stop
+        run.iterations += 1
+        run.show()

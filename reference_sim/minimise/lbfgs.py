@@ -19,17 +19,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reference_sim.cholesky import analyse
 from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
-from reference_sim.minimise.descent import Descent, Observer
+from reference_sim.minimise.descent import NOT_FINITE, Descent, Observer, iterate
 from reference_sim.minimise.lbfgs_history import LBFGSHistory
-from reference_sim.minimise.loop import NOT_FINITE, iterate
 from reference_sim.minimise.newton import Newton
 from reference_sim.minimise.result import TOLERANCE, Result, Stop, check_tolerance
-from reference_sim.minimise.scalar_preconditioner import ScalarPreconditioner
 from reference_sim.potential import Potential
 
 if TYPE_CHECKING:
-    from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+    from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
+
 
 SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals at which Newton takes over
 PATIENCE = 100  # iterations after which it does in any case
@@ -157,7 +157,7 @@ class LBFGS:
 
 
 def _compiled(potential: Potential, max_iterations: int, switch: float) -> CompiledLBFGS:
-    from reference_sim.minimise.compiled.minimiser import (
+    from reference_sim.minimise.compiled_lbfgs import (
         CompiledLBFGS,  # its kernels are loaded only where they serve
     )
 
@@ -181,3 +181,32 @@ class LBFGSRun(Descent):
     def solve(self, q: np.ndarray) -> np.ndarray:
         """Return the inverse of the preconditioner times q (3n,)."""
         return self.timed("solve", self.preconditioner.solve, q)
+
+
+# In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions alone;
+# 1 in its place slows the soft bending modes down ten times.
+FLOOR = 1e-4
+
+
+class ScalarPreconditioner:
+    """Scalar stiffness of a potential's terms over the free vertices; one symbolic analysis for all steps."""
+
+    def __init__(self, potential: Potential) -> None:
+        free = potential.cloth.free
+        self._pattern = potential.pattern(free, block=1)
+        self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
+        self._floor = FLOOR * potential.cloth.masses[free] * 30**2
+
+    def assemble(self, x: np.ndarray) -> np.ndarray:
+        """Return values (nnz,) [N/m] at x (V, 3) [m]."""
+        values = self._pattern.assemble(x)
+        values[self._pattern.diagonal] += self._floor
+        return values
+
+    def factorise(self, values: np.ndarray) -> bool:
+        """Factorise the matrix with these values (nnz,); False if it is not positive definite."""
+        return self._solver.factorise(values)
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the last factorisation: b (3n,)."""
+        return self._solver.solve(b.reshape(-1, 3)).ravel()

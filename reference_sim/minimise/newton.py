@@ -24,11 +24,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference_sim.minimise.convergence_check import convergence_check
-from reference_sim.minimise.descent import Descent, Observer, approximate_wolfe, sufficient_decrease
-from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian
+from reference_sim.minimise.descent import (
+    NOT_FINITE,
+    Descent,
+    Observer,
+    approximate_wolfe,
+    iterate,
+    sufficient_decrease,
+)
+from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian, convergence_check
 from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
-from reference_sim.minimise.loop import NOT_FINITE, iterate
 from reference_sim.minimise.result import TOLERANCE, Result, Stop, check_tolerance
 from reference_sim.potential import Potential
 

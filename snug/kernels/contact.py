@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim.contact.anchor_walk import walk_to_foot
+from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.training_lanes import TRAINING_LANES
 from reference_sim.kernels.vector_rows import add_lanes, copy_lanes, mixed_rows
 
 PARTS = 255.0  # of a barycentric coordinate

@@ -21,8 +21,8 @@ import torch
 from llvmlite.binding import get_host_cpu_name
 from torch import Tensor, nn
 
+from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.training_lanes import TRAINING_LANES
 from reference_sim.kernels.vector_rows import copy_lanes
 
 # No assumption on NaN or infinity: the guard of training must see them.

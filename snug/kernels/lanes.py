@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.fast_kernels import TRAINING_LANES
 
 
 def to_lanes(x: Tensor) -> np.ndarray:

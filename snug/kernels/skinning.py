@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.training_lanes import TRAINING_LANES
 from reference_sim.kernels.vector_rows import copy_lanes
 from snug.kernels.lanes import from_lanes, to_lanes
 

@@ -1,6 +1,6 @@
 """Energies of the simulator as terms of the training loss, found by the name that each gives itself.
 
-Whatever stands in the registry `reference_sim.energies.MODULE_OF`, and every other subclass of Energy that
+Whatever `reference_sim.energies` names, and every other subclass of Energy that
 has been imported, can be named in `Recipe.terms`, if the rest state of the garment is all that it needs. No
 list has to be edited: a term that declares no kernel "training_batch" is trained more slowly, and one line
 says so.
@@ -26,7 +26,7 @@ def find_energy(name: str) -> Callable[..., Energy]:
     >>> find_energy("gravity").__name__
     'Gravity'
     """
-    for class_name in energies.MODULE_OF:
+    for class_name in energies.__all__:
         getattr(energies, class_name)  # imported by it
     terms = [term for term in _subclasses(Energy) if hasattr(term, "name")]
     named = [term for term in terms if term.name == name]

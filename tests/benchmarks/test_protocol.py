@@ -16,7 +16,7 @@ from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
 from benchmarks.results import protocol as recorded
 from benchmarks.results.protocol import DIGESTS, NUMBER, OWN, one_protocol
 from benchmarks.scenes import SCENES
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.material import Material
 from snug.motion.library import make_motion
 from tests.benchmarks import protocol_definitions as protocol

@@ -48,7 +48,7 @@ def test_compilation_is_announced_where_no_compiled_kernel_lies_on_disk(tmp_path
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     announce_compilation()
     assert capsys.readouterr().err.startswith("first use: kernels are compiled")
-    folder = tmp_path / "reference_sim.kernels.element_sweeps-0123456789abcdef"
+    folder = tmp_path / "reference_sim.kernels.fast_kernels-0123456789abcdef"
     folder.mkdir()
     (folder / "sweep-1.py311.nbi").touch()
     announce_compilation()

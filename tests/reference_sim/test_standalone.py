@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 
-from reference_sim import Trajectory, energies
-from reference_sim.energies import MODULE_OF
+from reference_sim import Trajectory
 
 ROOT = Path(__file__).resolve().parents[2]
 UNNEEDED = (
@@ -67,20 +65,3 @@ def test_without_the_package_of_its_solver_it_ends_at_the_same_place(tmp_path):
     assert np.ptp(first[:, :, 1]) > 0.01
     # A residual of 1e-10 vertex weights, against a stiffness of at least m/dt^2: 1e-12 m a frame.
     assert np.abs(other - first).max() < 1e-10
-
-
-def test_every_lazy_name_is_defined_by_one_module_of_its_package():
-    package = ROOT / "reference_sim/energies"
-    defined: dict[str, list[str]] = {}
-    for path in package.rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.ClassDef):
-                module = ".".join(path.relative_to(package).with_suffix("").parts)
-                defined.setdefault(node.name, []).append(module)
-    assert {name: defined[name] for name in MODULE_OF} == {name: [file] for name, file in MODULE_OF.items()}
-    nodes = ast.walk(ast.parse((package / "__init__.py").read_text(encoding="utf-8")))
-    named = [alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names]
-    assert sorted(named) == sorted([*MODULE_OF, "TYPE_CHECKING", "import_module"])
-    assert sorted(energies.__all__) == sorted(MODULE_OF)
-    for name in MODULE_OF:
-        assert getattr(energies, name).__name__ == name

@@ -25,7 +25,7 @@ from reference_sim.energies import (
     Gravity,
     StretchStVK,
 )
-from reference_sim.minimise import Newton
+from reference_sim.minimise.newton import Newton
 from reference_sim.progress import progress_bar
 from reference_sim.simulate_command import summarise
 from tests.reference_sim.meshes import box, grid, random_rotation, sphere

@@ -7,7 +7,7 @@ import pytest
 
 from reference_sim import Cloth, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
-from reference_sim.minimise import Newton
+from reference_sim.minimise.newton import Newton
 from reference_sim.time_loop import simulate_with
 from reference_sim.time_step import TimeStepper
 from tests.reference_sim.meshes import grid, sphere

@@ -1,13 +1,13 @@
 """Sweeps over vertices and over constraints, with the kernels of the terms as arguments.
 
-See reference_sim.kernels.element_sweeps for the kernels.
+See reference_sim.kernels.fast_kernels for the kernels.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from reference_sim.kernels.element_sweeps import SCRATCH_SHAPE
+from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE
 from reference_sim.kernels.kernel_argument import call_each
 from reference_sim.kernels.kernel_cache import njit
 

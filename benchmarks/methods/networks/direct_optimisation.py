@@ -22,7 +22,7 @@ from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes.dressed_body import declared_energies
 from reference_sim.cloth import Cloth
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia

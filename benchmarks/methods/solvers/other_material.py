@@ -13,10 +13,10 @@ import numpy as np
 
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.scene import BuiltScene
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.stretch_spring import StretchSpring
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from snug.training.losses.pbns_material import BENDING
 
 

@@ -19,7 +19,7 @@ from benchmarks.methods.solvers.residual_transport import ResidualTransport
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.results.run_folder import model_path
 from benchmarks.scene import BuiltScene
-from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
 from snug.networks.trained_model import TrainedModel

@@ -25,7 +25,7 @@ METRICS = (
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return the mean [J per frame]; empty where the scene's own hinges are not scaled."""
-    from reference_sim.energies.bend_hinge.definition import BendHinge  # loads numba
+    from reference_sim.energies.bend_hinge import BendHinge  # loads numba
 
     hinges = [term for term in roll_out.scene.energies if isinstance(term, BendHinge)]
     if [term.scaling for term in hinges] != ["length_area"]:

@@ -82,7 +82,7 @@ def judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None
 
 def strains(cloth: Cloth, positions: np.ndarray) -> np.ndarray:
     """Return the membrane energy of positions (T,V,3) [m], (T,) [J]; infinite where one is not finite."""
-    from reference_sim.energies.stretch_stvk.definition import StretchStVK  # loads numba
+    from reference_sim.energies.stretch_stvk import StretchStVK  # loads numba
 
     term, finite = StretchStVK(cloth), np.isfinite(positions).all(axis=(1, 2))
     return np.array(

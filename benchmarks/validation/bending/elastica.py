@@ -17,10 +17,10 @@ from benchmarks.fabrics.strip import FAMILY, Strip, clamped_strip
 from benchmarks.meshes import FAMILIES
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential

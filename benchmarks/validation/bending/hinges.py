@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.meshes import in_space, random_rotation, right_grid
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge, dihedral_angles
+from reference_sim.energies.bend_hinge import BendHinge, dihedral_angles
 from reference_sim.material import Material
 from reference_sim.potential import Potential
 

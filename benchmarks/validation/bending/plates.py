@@ -27,7 +27,7 @@ import scipy.sparse.linalg as spla
 
 from benchmarks.meshes import ROW, in_space, rectangle
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.material import Material
 from reference_sim.potential import Potential

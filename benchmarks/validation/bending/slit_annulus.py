@@ -22,9 +22,9 @@ from benchmarks.validation.bending.gaussian_curvature import GaussianCurvature
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential

@@ -7,10 +7,10 @@ import numpy as np
 from benchmarks.meshes import in_space, jittered_patch, lying
 from benchmarks.validation.convergence import demand_converged
 from reference_sim.cloth import Cloth
-from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS, ContactPenalty
+from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS, ContactPenalty
 from reference_sim.energies.energy import Step
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.obstacle import Obstacle

@@ -13,10 +13,10 @@ from benchmarks.scenes import free_fall as fall
 from benchmarks.scenes import hanging_sheet
 from benchmarks.validation.convergence import demand_converged
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential

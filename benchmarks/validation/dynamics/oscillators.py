@@ -16,7 +16,7 @@ from benchmarks.meshes import random_rotation
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim.cloth import Cloth
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
 from reference_sim.time_loop import simulate
 

@@ -18,11 +18,11 @@ from benchmarks.validation.contact.round_bodies import RoundBody
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from benchmarks.validation.dynamics.discrete_laws import HANGING, stretched_membrane
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.obstacle import Planes

@@ -33,8 +33,8 @@ from benchmarks.validation.bending.plates import NU
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 

@@ -8,9 +8,9 @@ from benchmarks.fabrics.elastica import exact_elastica
 from benchmarks.fabrics.fabric import find_fabric
 from benchmarks.fabrics.strip import BENDING_LENGTH, OVERHANG, cantilever
 from benchmarks.validation.convergence import demand_converged
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.time_loop import simulate
 
 SECONDS = 1.5  # [s] in which the strip comes to rest

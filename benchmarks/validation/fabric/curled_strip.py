@@ -19,9 +19,9 @@ from scipy.integrate import solve_bvp
 from benchmarks.fabrics.strip import FAMILY, clamped_strip
 from benchmarks.validation.bending.elastica import MATERIAL
 from benchmarks.validation.convergence import demand_converged
-from reference_sim.energies.bend_hinge.definition import BendHinge, dihedral_angles
+from reference_sim.energies.bend_hinge import BendHinge, dihedral_angles
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential

@@ -11,10 +11,10 @@ from benchmarks.fabrics.disc import DRAPE, Disc, disc
 from benchmarks.fabrics.fabric import find_fabric, isotropic
 from benchmarks.validation.bending.gaussian_curvature import GaussianCurvature
 from benchmarks.validation.convergence import demand_converged
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.time_loop import simulate
 
 SECONDS = 1.5  # [s] in which the disc falls and comes nearly to rest

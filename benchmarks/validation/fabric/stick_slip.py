@@ -24,10 +24,10 @@ from benchmarks.fabrics.strip import FAMILY, Strip, clamped_strip
 from benchmarks.validation.bending.elastica import MATERIAL
 from benchmarks.validation.contact.plane import box
 from benchmarks.validation.convergence import demand_converged
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_friction import ContactFriction
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.contact_penalty import ContactPenalty
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.obstacle import Obstacle
 from reference_sim.potential import Potential
 from reference_sim.time_loop import simulate

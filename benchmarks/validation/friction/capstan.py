@@ -19,8 +19,8 @@ import numpy as np
 from benchmarks.validation.contact.round_bodies import DRUM, RoundBody, strip_over_drum
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim.energies.contact_friction import ContactFriction
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.contact_penalty import ContactPenalty
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.obstacle import Planes
 from reference_sim.time_loop import simulate
 

@@ -18,9 +18,9 @@ from benchmarks.validation.contact.plane import box
 from benchmarks.validation.convergence import demand_converged
 from reference_sim.cloth import Cloth
 from reference_sim.energies.contact_friction import ContactFriction
-from reference_sim.energies.contact_penalty.definition import DEFAULT_STIFFNESS, ContactPenalty
+from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS, ContactPenalty
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
 from reference_sim.obstacle import Obstacle
 from reference_sim.time_loop import simulate

@@ -28,7 +28,7 @@ from benchmarks.meshes import lying, right_grid
 from benchmarks.validation.friction.plane import MU, slid
 from benchmarks.validation.membrane.hanging_strip import MATERIAL, WEIGHT, string_stretch
 from reference_sim.cloth import Cloth
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
 
 SOFT = Material(young_modulus=7e3)  # a tenth of cotton's: the point breaks loose after 14 steps, and swings

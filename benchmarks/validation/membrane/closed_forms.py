@@ -9,9 +9,9 @@ import numpy as np
 from benchmarks.meshes import in_space, jittered_patch, random_rotation
 from benchmarks.validation.membrane.stvk_forms import change_of_strain, strain, stress, virtual_work
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.potential import Potential
 

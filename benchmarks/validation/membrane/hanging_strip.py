@@ -14,7 +14,7 @@ from benchmarks.meshes import in_space, lying, right_grid
 from benchmarks.validation.convergence import demand_converged, fitted_order
 from reference_sim.cloth import Cloth
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential

@@ -19,7 +19,7 @@ from benchmarks.validation.convergence import demand_converged, fitted_order
 from benchmarks.validation.dead_load import DeadLoad
 from benchmarks.validation.membrane.stvk_forms import strain, stress, virtual_work
 from reference_sim.cloth import Cloth
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential

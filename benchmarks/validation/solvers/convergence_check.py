@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from benchmarks.validation.case import RELATIVE_RESIDUAL, Measurement
-from reference_sim.energies.bend_hinge.definition import BendHinge
+from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.geometry.topology import corner_areas
 from reference_sim.minimise.minimisers import minimise

@@ -9,13 +9,13 @@ import numpy as np
 from benchmarks.meshes import in_space, jittered_patch, random_rotation
 from reference_sim.cloth import Cloth
 from reference_sim.energies.area_barrier import AreaBarrier
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
 from reference_sim.energies.stretch_spring import StretchSpring
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import Material
 from reference_sim.potential import Potential
 

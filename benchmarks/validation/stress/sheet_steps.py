@@ -23,12 +23,12 @@ from benchmarks.validation.solvers.convergence_check import (
 from benchmarks.validation.stress.initial_conditions import INITIAL_POSITIONS, REST_SHAPES, initial_velocities
 from reference_sim.cloth import Cloth
 from reference_sim.energies.area_barrier import AreaBarrier
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
 from reference_sim.obstacle import Obstacle
 from reference_sim.potential import Potential

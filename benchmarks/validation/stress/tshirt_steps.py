@@ -13,11 +13,11 @@ from benchmarks.validation.solvers.convergence_check import StressStep, solve_an
 from benchmarks.validation.stress.sheet_steps import DT, prepared
 from benchmarks.validation.stress.sheet_steps import warm_up as warm_up  # that of its cases too
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge.definition import BendHinge
-from reference_sim.energies.contact_penalty.definition import ContactPenalty
+from reference_sim.energies.bend_hinge import BendHinge
+from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk.definition import StretchStVK
+from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body

@@ -20,7 +20,7 @@ import numpy as np
 from reference_sim.contact.anchor_walk import WALK_SLACK, triangle_adjacency
 from reference_sim.contact.closest_point import FaceSearch, Listed
 from reference_sim.energies import ContactPenalty
-from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
 from snug.kernels.contact import PARTS, byte_normals, contact_energy
 

@@ -42,6 +42,8 @@ class SquaredContact(ContactPenalty):
     """
 
     power = 2
+    value_and_gradient, add_hessian = Energy.value_and_gradient, Energy.add_hessian
+    scalar_stiffness = Energy.scalar_stiffness
 
     def __init__(self, cloth: Cloth) -> None:
         super().__init__(cloth, samples="vertices", margin=MARGIN, per_sample_stiffness=CONTACT_STIFFNESS)

@@ -40,8 +40,13 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.energies.inertia import batch_of_windows
-from reference_sim.kernels.fast_kernels import fast_kernel, has_kernel, warn_slow_path
-from reference_sim.kernels.training_lanes import TRAINING_LANES, BatchKernel
+from reference_sim.kernels.fast_kernels import (
+    TRAINING_LANES,
+    BatchKernel,
+    fast_kernel,
+    has_kernel,
+    warn_slow_path,
+)
 from snug.kernels.lanes import from_lanes, to_lanes
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe

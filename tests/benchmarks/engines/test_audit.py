@@ -17,7 +17,7 @@ from benchmarks.validation.engines import audit
 from benchmarks.validation.engines.cases import CASES
 from reference_sim.energies import StretchStVK
 from reference_sim.material import GRAVITY
-from reference_sim.minimise import Newton
+from reference_sim.minimise.newton import Newton
 
 
 class Falling(EngineCloth):

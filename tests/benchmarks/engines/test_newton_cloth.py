@@ -15,7 +15,7 @@ from benchmarks.methods.solvers import newton_physics
 from benchmarks.performance.microbenchmarks import DT, regular_sheet
 from reference_sim import Potential, simulate
 from reference_sim.energies import BendHinge, Gravity, Inertia, Step, StretchStVK
-from reference_sim.minimise import Newton
+from reference_sim.minimise.newton import Newton
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 

@@ -173,10 +173,7 @@ def test_a_scene_without_obstacle_or_body_depends_on_neither():
         "benchmarks.scenes.hanging_sheet",
         "benchmarks.methods.solvers.simulation",
     )
-    assert (
-        "reference_sim/energies/bend_hinge/definition.py" in code
-        and "reference_sim/minimise/newton.py" in code
-    )
+    assert "reference_sim/energies/bend_hinge.py" in code and "reference_sim/minimise/newton.py" in code
     unused = ("snug/", "reports/", "reference_sim/energies/contact", "benchmarks/methods/__init__")
     assert [path for path in code if path.startswith(unused)] == []
 
@@ -184,7 +181,7 @@ def test_a_scene_without_obstacle_or_body_depends_on_neither():
 def test_training_does_not_hang_on_the_solver():
     code = code_of("benchmarks.tasks.training")
     assert "snug/training/losses/physics_loss.py" in code
-    assert "reference_sim/energies/bend_hinge/definition.py" in code
+    assert "reference_sim/energies/bend_hinge.py" in code
     assert [path for path in code if path.startswith("reference_sim/minimise")] == []
 
 

@@ -24,12 +24,11 @@ from reference_sim.energies import (
     Step,
     StretchStVK,
 )
-from reference_sim.energies.bend_hinge.sweeps import fold
-from reference_sim.energies.contact_penalty.definition import sample_depth
-from reference_sim.energies.stretch_stvk.definition import strain
-from reference_sim.kernels.element_sweeps import SCRATCH_SHAPE
-from reference_sim.kernels.fast_kernels import step_terms
-from reference_sim.minimise import Newton
+from reference_sim.energies.bend_hinge_kernels import fold
+from reference_sim.energies.contact_penalty import sample_depth
+from reference_sim.energies.stretch_stvk import strain
+from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE, step_terms
+from reference_sim.minimise.newton import Newton
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 DT = 1 / 30

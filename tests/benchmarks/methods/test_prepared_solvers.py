@@ -14,12 +14,10 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.methods.solvers.warm_started import WarmStarted
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes.self_contact import with_self_contact
-from reference_sim import Cloth, Material, simulate
-from reference_sim.assembly import hessian_pattern
+from reference_sim import Cloth, Material, potential, simulate
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reference_sim.minimise import factorised, scalar_preconditioner
-from reference_sim.minimise.compiled import scalar_factor
-from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+from reference_sim.minimise import factorised, lbfgs, scalar_factor
+from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid
 
@@ -28,10 +26,10 @@ SOLVERS = (
     "xpbd-40",
 )  # fmt: skip
 SET_UP = (  # what analyses a pattern
-    (hessian_pattern, "nested_dissection"),
+    (potential, "nested_dissection"),
     (scalar_factor, "nested_dissection"),
     (factorised, "analyse"),
-    (scalar_preconditioner, "analyse"),
+    (lbfgs, "analyse"),
 )
 
 

@@ -20,7 +20,7 @@ from benchmarks.scenes import of_garment
 from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reference_sim.minimise import Newton
+from reference_sim.minimise.newton import Newton
 from reference_sim.time_loop import simulate
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from reference_sim import Cloth, Potential
-from reference_sim.assembly.cholesky import CholmodSolver, SuperLUSolver, analyse, nested_dissection
+from reference_sim.cholesky import CholmodSolver, SuperLUSolver, analyse, nested_dissection
 from reference_sim.energies import Inertia, StretchStVK
 from tests.reference_sim.meshes import patch
 

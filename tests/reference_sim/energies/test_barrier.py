@@ -19,7 +19,7 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.material import GRAVITY
-from reference_sim.minimise import Newton
+from reference_sim.minimise.newton import Newton
 from reference_sim.minimise.result import Result
 from reference_sim.time_step import State, TimeStepper
 from tests.reference_sim.energies.barriers import cuts, folded, sheet, still

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from reference_sim.energies import MODULE_OF
+from reference_sim import energies
 from tests.reference_sim.energies import regenerate_energies, regression_scenes
 from tests.reference_sim.energies.regenerate_energies import changes, main
 from tests.reference_sim.energies.regression_scenes import SCENES, computed, scales, stored
@@ -37,7 +37,7 @@ def test_the_table_holds_every_term_of_the_paper_and_of_contact(kept):
     assert terms == wanted and {key[0] for key in kept} == set(SCENES) and len(SCENES) == 6
     assert all(size > 1e-6 for size in scales(kept).values()), "a term that does nothing tests nothing"
     # What is not here needs ipctk, which is optional, or is no term.
-    assert len(MODULE_OF) == len(wanted) + 4
+    assert len(energies.__all__) == len(wanted) + 3
 
 
 def test_the_command_prints_the_change_and_keeps_it_only_when_asked(kept, monkeypatch, tmp_path, capsys):

@@ -10,7 +10,7 @@ import pytest
 
 from reference_sim import Cloth, Material, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactBarrier, ContactPenalty, Gravity, StretchStVK
-from reference_sim.minimise import Newton
+from reference_sim.minimise.newton import Newton
 from tests.reference_sim.energies.barriers import assert_free, cuts, folded, sheet
 from tests.reference_sim.meshes import box, grid
 

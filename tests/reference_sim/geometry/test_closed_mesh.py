@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference_sim.cloth import MeshError
-from reference_sim.geometry.closed_mesh import check_closed
+from reference_sim.geometry.topology import check_closed
 from tests.reference_sim.meshes import box, sphere
 
 BALL, FACES = sphere(1)

@@ -12,7 +12,6 @@ import pytest
 
 from reference_sim import Cloth, Potential, energies
 from reference_sim.energies import (
-    MODULE_OF,
     AreaBarrier,
     BendHinge,
     Gravity,
@@ -29,13 +28,13 @@ from reference_sim.kernels.fast_kernels import (
     step_terms,
     terms_without_kernel,
 )
-from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
+from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from reference_sim.minimise.lbfgs import LBFGS
 from snug.recipes.recipe import Recipe
 from snug.training.losses.physics_loss import PhysicsLoss
 from tests.reference_sim.meshes import patch
 
-TERMS = {name: getattr(energies, name) for name in MODULE_OF if name not in ("Energy", "Step")}
+TERMS = {name: getattr(energies, name) for name in energies.__all__ if name not in ("Energy", "Step")}
 
 
 class Softer(StretchStVK):
@@ -47,7 +46,11 @@ class Same(StretchStVK):
 
 
 class Misspelt(StretchStVK):
-    kernels: ClassVar = {"float32": "lanes"}
+    kernels: ClassVar = {"float32": len}
+
+
+class Named(StretchStVK):
+    kernels: ClassVar = {"float32_lanes": "lanes"}
 
 
 @pytest.fixture
@@ -64,9 +67,9 @@ def told_anew():
 
 def test_every_declared_function_is_there_and_takes_the_term():
     for term in TERMS.values():
-        for use in vars(term).get("kernels", {}):
+        for use, function in vars(term).get("kernels", {}).items():
             assert use in USES
-            assert next(iter(inspect.signature(fast_kernels._function(term, use)).parameters)) == "term"
+            assert next(iter(inspect.signature(function).parameters)) == "term"
 
 
 def test_what_a_class_inherits_is_not_its_own(cloth):
@@ -83,6 +86,8 @@ def test_an_unknown_use_is_named(cloth):
         ValueError, match=r"Misspelt\.kernels: unknown use 'float32', choose of vertex_inertia"
     ):
         has_kernel(Misspelt(cloth), "float32_lanes")
+    with pytest.raises(ValueError, match=r"Named\.kernels: 'float32_lanes' is 'lanes': give the function"):
+        has_kernel(Named(cloth), "float32_lanes")
 
 
 def test_weights_of_all_terms_add_up(cloth):

@@ -16,12 +16,12 @@ from benchmarks.scenes.long_motion import repeated_there_and_back
 from benchmarks.scenes.out_of_distribution import faster
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
-from reference_sim.minimise import LBFGS, Newton, lbfgs
-from reference_sim.minimise.compiled import iteration
-from reference_sim.minimise.compiled.iteration import ELEMENTS, evaluate
-from reference_sim.minimise.compiled.minimiser import CompiledLBFGS
-from reference_sim.minimise.compiled.scalar_factor import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.minimise import compiled_lbfgs, lbfgs
+from reference_sim.minimise.compiled_lbfgs import ELEMENTS, CompiledLBFGS, evaluate
+from reference_sim.minimise.lbfgs import LBFGS
+from reference_sim.minimise.newton import Newton
 from reference_sim.minimise.result import Result
+from reference_sim.minimise.scalar_factor import WIDTH, ScalarPattern, factorise, solve
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion
 from tests.benchmarks.runner.tasks_by_hand import small_scene
@@ -155,8 +155,8 @@ def test_many_iterations_end_at_the_minimum():
 def test_a_pair_of_too_little_curvature_leaves_the_remembered_ones_whole(monkeypatch):
     """The loop runs interpreted: a threshold makes such pairs frequent, also where the memory is full."""
     potential, guess = pressed(0)
-    monkeypatch.setattr(iteration, "LEAST_CURVATURE", 0.2)
-    monkeypatch.setattr(iteration, "descend", iteration.descend.py_func)
+    monkeypatch.setattr(compiled_lbfgs, "LEAST_CURVATURE", 0.2)
+    monkeypatch.setattr(compiled_lbfgs, "descend", compiled_lbfgs.descend.py_func)
     for count in range(25, 35):
         solver = CompiledLBFGS(potential, max_iterations=count)
         assert solver.minimise(guess).iterations == count

@@ -7,7 +7,7 @@ import pytest
 import torch
 from numba import njit
 
-from reference_sim.kernels.training_lanes import TRAINING_LANES
+from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.kernels.vector_rows import add_lanes, copy_lanes, mixed_rows
 from snug.kernels.lanes import from_lanes, to_lanes
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from dataclasses import replace
 
@@ -47,7 +48,9 @@ def tethered(tmp_path, monkeypatch):
     """A recipe with the user's term, whose file and whose line in the registry are there."""
     (tmp_path / "tether.py").write_text(SOURCE)
     monkeypatch.setattr(energies, "__path__", [*energies.__path__, str(tmp_path)])
-    monkeypatch.setitem(energies.MODULE_OF, "Tether", "tether")
+    tether = importlib.import_module("reference_sim.energies.tether")
+    monkeypatch.setattr(energies, "Tether", tether.Tether, raising=False)
+    monkeypatch.setattr(energies, "__all__", [*energies.__all__, "Tether"])
     yield replace(PLAIN, name="tethered", terms=(*TERMS, "tether"))
     sys.modules.pop("reference_sim.energies.tether", None)
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
-from reference_sim.energies.bend_hinge.definition import dihedral_angles
+from reference_sim.energies.bend_hinge import dihedral_angles
 from snug.body.skinning import skin
 from snug.kernels.lanes import from_lanes, to_lanes
 from snug.recipes.named import PAPER, PBNS_SPRINGS, RECIPES

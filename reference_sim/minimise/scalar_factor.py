@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from reference_sim.assembly.cholesky import nested_dissection
+from reference_sim.cholesky import nested_dissection
 from reference_sim.kernels.kernel_cache import njit
 
 WIDTH = 4  # numbers a row of right sides: x, y, z and one to fill the lane

@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from reference_sim.cloth import Cloth
+from reference_sim.cloth import Cloth, fingerprint
+from reference_sim.energies.bend_hinge_kernels import batch, constraint, lanes, vertex_block
 from reference_sim.energies.energy import Energy
-from reference_sim.fingerprint import fingerprint
 from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks, arctan2
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from reference_sim.kernels.block_indices import BlockPlaces
+    from reference_sim.kernels.float64_lanes import BlockPlaces
 
 SCALINGS = ("length_area", "none")
 BLOCKS = 39  # rows of lanes before those of the blocks, in _hessian
@@ -44,10 +44,10 @@ class BendHinge(Energy):
 
     name = "bending"
     kernels: ClassVar = {
-        "float32_lanes": "reference_sim.energies.bend_hinge.float32_lanes:lanes",
-        "vertex_block": "reference_sim.energies.bend_hinge.sweeps:vertex_block",
-        "constraint": "reference_sim.energies.bend_hinge.sweeps:constraint",
-        "training_batch": "reference_sim.energies.bend_hinge.training_batch:batch",
+        "float32_lanes": lanes,
+        "vertex_block": vertex_block,
+        "constraint": constraint,
+        "training_batch": batch,
     }
 
     def __init__(

@@ -20,13 +20,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from reference_sim.cloth import Cloth
+from reference_sim.energies.contact_penalty_kernels import constraint, lanes, sample_depth, vertex_block
 from reference_sim.energies.energy import Energy, Step, demand_not_negative
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from reference_sim.kernels.block_indices import BlockPlaces
+    from reference_sim.kernels.float64_lanes import BlockPlaces
     from reference_sim.obstacle import Planes
 
 DEFAULT_STIFFNESS = 3.4e6  # [J/m^5]: some 2800 J/m^3 on a vertex of a T-shirt with 1000 vertices
@@ -50,9 +51,9 @@ class ContactPenalty(Energy):
     name = "collision"
     power = 3  # of the depth
     kernels: ClassVar = {
-        "float32_lanes": "reference_sim.energies.contact_penalty.float32_lanes:lanes",
-        "vertex_block": "reference_sim.energies.contact_penalty.sweeps:vertex_block",
-        "constraint": "reference_sim.energies.contact_penalty.sweeps:constraint",
+        "float32_lanes": lanes,
+        "vertex_block": vertex_block,
+        "constraint": constraint,
     }
 
     def __init__(
@@ -177,16 +178,6 @@ def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
         weights += [np.tile([0.5, 0.5, 0.0], (len(edges), 1)), np.full((len(faces), 3), 1 / 3)]
         areas += [np.bincount(cloth.sides.ravel(), np.repeat(cloth.areas / 3, 3), len(edges)), cloth.areas]
     return np.concatenate(stencils), np.concatenate(weights), np.concatenate(areas)
-
-
-@njit(cache=True, inline="always")
-def sample_depth(x, stencil, weight, margin, c, n):
-    """Return max(eps - n.(x_s - c), 0) of one contact sample [m]."""
-    distance = 0.0
-    for i in range(3):
-        sample = weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
-        distance += n[i] * (sample - c[i])
-    return max(margin - distance, 0.0)
 
 
 @njit(cache=True)

@@ -1,6 +1,6 @@
-"""The contact penalty in float32, LANES_FLOAT32 samples at a time: the kernel of early-stopped L-BFGS.
+"""Kernels of the contact penalty for solvers: float32 lanes, sweeps.
 
-See kernels.float32_layout for the layout.
+See kernels.float32_layout and kernels.fast_kernels for the layouts.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reference_sim.contact.closest_point import halved
+from reference_sim.kernels.fast_kernels import Constraints, VertexBlocks
 from reference_sim.kernels.float32_layout import FAST, THREE, Float32Lanes, empty_state, lay_out, to_blocks
 from reference_sim.kernels.float32_layout import LANES_FLOAT32 as L
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
-    from reference_sim.energies.contact_penalty.definition import ContactPenalty
+    from reference_sim.energies.contact_penalty import ContactPenalty
 
 
 def lanes(term: ContactPenalty) -> Float32Lanes:
@@ -128,4 +129,66 @@ def contact_stiffness(data, values):
                     if place >= 0:
                         weights = constants[b, i * L + g] * constants[b, j * L + g]
                         values[place] += curvature * weights
+    return 0.0
+
+
+@njit(cache=True, inline="always")
+def sample_depth(x, stencil, weight, margin, c, n):
+    """Return max(eps - n.(x_s - c), 0) of one contact sample [m]."""
+    distance = 0.0
+    for i in range(3):
+        sample = weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
+        distance += n[i] * (sample - c[i])
+    return max(margin - distance, 0.0)
+
+
+def vertex_block(term: ContactPenalty) -> VertexBlocks:
+    """Hand the samples of the term to vertex block descent."""
+    return VertexBlocks(_add_block, term.stencils, term.weights > 0.0, lambda: _arrays(term))
+
+
+def constraint(term: ContactPenalty) -> Constraints:
+    """Hand the samples of the term to XPBD: C = depth^(3/2) of each."""
+    return Constraints(_solve, lambda: (*_arrays(term), np.zeros(len(term.stencils))))
+
+
+def _arrays(term: ContactPenalty) -> tuple:
+    """Return stencils, weights, stiffness, margin, points and normals, as the step has frozen them."""
+    planes = np.ascontiguousarray(term.points), np.ascontiguousarray(term.normals)
+    return term.stencils, term.weights, term.stiffness, term.margin, *planes
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _add_block(data, x, v, g, H, scratch):
+    """Add gradient and block of vertex v."""
+    first, corners, stencils, shares, stiffness, margin, points, normals = data
+    for at in range(first[v], first[v + 1]):
+        e, corner = corners[at] // 3, corners[at] % 3
+        d = sample_depth(x, stencils[e], shares[e], margin, points[e], normals[e])
+        if d > 0.0:
+            share = shares[e, corner]
+            for i in range(3):
+                g[i] -= 3.0 * stiffness[e] * d * d * share * normals[e, i]
+                for j in range(3):
+                    H[i, j] += 6.0 * stiffness[e] * d * share * share * normals[e, i] * normals[e, j]
+    return 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(data, x, w):
+    """Solve one sample after the other."""
+    stencils, shares, stiffness, margin, points, normals, force = data
+    for e in range(len(stencils)):
+        d = sample_depth(x, stencils[e], shares[e], margin, points[e], normals[e])
+        if d > 0.0 or force[e] != 0.0:
+            compliance = 1.0 / (2.0 * stiffness[e])
+            slope = -1.5 * np.sqrt(d)  # of C along the normal
+            total = compliance
+            for c in range(3):
+                total += w[stencils[e, c]] * (slope * shares[e, c]) ** 2
+            change = -(d * np.sqrt(d) + compliance * force[e]) / total
+            force[e] += change
+            for c in range(3):
+                for i in range(3):
+                    x[stencils[e, c], i] += w[stencils[e, c]] * slope * shares[e, c] * normals[e, i] * change
     return 0.0

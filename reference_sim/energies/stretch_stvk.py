@@ -16,13 +16,14 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
+from reference_sim.energies.stretch_stvk_kernels import batch, constraint, lanes, strain, vertex_block
 from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from reference_sim.kernels.block_indices import BlockPlaces
+    from reference_sim.kernels.float64_lanes import BlockPlaces
 
 BLOCKS = 29  # rows of lanes before those of the blocks, in _hessian
 
@@ -33,10 +34,10 @@ class StretchStVK(Energy):
     name = "strain"
     constant = (1,)
     kernels: ClassVar = {
-        "float32_lanes": "reference_sim.energies.stretch_stvk.float32_lanes:lanes",
-        "vertex_block": "reference_sim.energies.stretch_stvk.sweeps:vertex_block",
-        "constraint": "reference_sim.energies.stretch_stvk.sweeps:constraint",
-        "training_batch": "reference_sim.energies.stretch_stvk.training_batch:batch",
+        "float32_lanes": lanes,
+        "vertex_block": vertex_block,
+        "constraint": constraint,
+        "training_batch": batch,
     }
 
     def __init__(self, cloth: Cloth) -> None:
@@ -116,20 +117,6 @@ class StretchStVK(Energy):
         b = np.concatenate([-self.Dm_inverse.sum(axis=1, keepdims=True), self.Dm_inverse], axis=1)
         scale = (self.mu + 0.5 * self.lam) * self.areas
         return np.arange(len(self.areas)), scale[:, None, None] * (b @ b.transpose(0, 2, 1))
-
-
-@njit(cache=True, inline="always")
-def strain(x, face, D, fa, fb):
-    """Return G00, G11, G01 of the Green strain; the columns of F are written into fa and fb."""
-    p, q, r = face[0], face[1], face[2]
-    for i in range(3):
-        first, second = x[q, i] - x[p, i], x[r, i] - x[p, i]
-        fa[i] = first * D[0, 0] + second * D[1, 0]
-        fb[i] = first * D[0, 1] + second * D[1, 1]
-    aa = fa[0] * fa[0] + fa[1] * fa[1] + fa[2] * fa[2]
-    bb = fb[0] * fb[0] + fb[1] * fb[1] + fb[2] * fb[2]
-    ab = fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
-    return 0.5 * (aa - 1.0), 0.5 * (bb - 1.0), 0.5 * ab
 
 
 @njit(cache=True, error_model="numpy")

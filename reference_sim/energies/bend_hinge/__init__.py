@@ -1,1 +1,0 @@
-"""Bending by hinges: its definition with kernels in float64, and its kernels for solvers and training."""

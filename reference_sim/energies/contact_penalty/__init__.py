@@ -1,1 +1,0 @@
-"""Contact penalty: its definition with kernels in float64, and its kernels for solvers."""

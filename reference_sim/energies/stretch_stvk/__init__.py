@@ -1,1 +1,0 @@
-"""StVK membrane: its definition with kernels in float64, and its kernels for solvers and training."""

@@ -1,0 +1,309 @@
+"""Preconditioned L-BFGS that is stopped early, compiled as a whole and in float32.
+
+The method of minimise.LBFGS without its finish by Newton: the same preconditioner (mass over dt^2, the
+cotangent Laplacian, contacts at the start), the same two-loop recursion, the same sufficient decrease. What
+it leaves out: float64, the check of convergence (nothing but a factorised Hessian can say "converged"), and
+all terms that declare no kernel "float32_lanes" (kernels.fast_kernels). Evaluation, two-loop recursion,
+solves and line search are one compiled function, of which the kernels of the terms are arguments.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import namedtuple
+from typing import Any
+
+import numpy as np
+
+from reference_sim.kernels.fast_kernels import StepTerms, step_terms
+from reference_sim.kernels.float32_layout import FAST, HALF, SCRATCH, Float32Lanes, to_blocks
+from reference_sim.kernels.kernel_argument import call_each, kernel_argument
+from reference_sim.kernels.kernel_cache import njit
+from reference_sim.minimise.descent import SUFFICIENT_DECREASE, mean_weight
+from reference_sim.minimise.lbfgs_history import LEAST_CURVATURE
+from reference_sim.minimise.result import TOLERANCE, Result
+from reference_sim.minimise.scalar_factor import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.potential import Potential
+
+HALVINGS = 12  # of a step before its direction is given up
+INERTIA, WEIGHT, ELEMENTS = range(3)  # places of energies: the terms of elements come last, in their order
+
+# What is constant of the vertices: inertia [N/m] and weights [N] (V,); pinned: 3 times the vertex.
+Vertices = namedtuple("Vertices", "inertia weights pinned")
+# The preconditioner: constant values (nnz,), the pattern and the factor.
+Factor = namedtuple(
+    "Factor",
+    "constant order row_starts row_columns factor_rows factor_columns starts rows values L D y filled b",
+)
+Memory = namedtuple("Memory", "S Y rho")  # of steps (m, 3V) [m] and changes of the gradient (m, 3V) [N]
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def vertex_gradient(u, inertia, target, weights, gradient):
+    """Return the energies [J] of inertia and weight, and set gradient (3V,) [N].
+
+    inertia (V,) [N/m] pulls towards target (3V,) [m]; the energy of weights (V,) [N] is counted from x_0 on.
+    """
+    kinetic, potential = 0.0, 0.0
+    for v in range(len(inertia)):
+        part = np.float32(0.0)
+        for a in range(3 * v, 3 * v + 3):
+            offset = u[a] - target[a]
+            gradient[a] = inertia[v] * offset
+            part += offset * offset
+        kinetic += HALF * inertia[v] * part
+        gradient[3 * v + 1] += weights[v]
+        potential += weights[v] * u[3 * v + 1]
+    return kinetic, potential
+
+
+@njit(cache=True)
+def evaluate(u, target, vertices, terms, gradient, scratch, energies):
+    """Return the sum of the energies [J] at u (3V,), and set its gradient (3V,) [N], zero at pinned vertices.
+
+    terms: (kernel, data) of each term of elements, as `call_each` takes them. energies (2 + terms,) [J].
+    """
+    energies[INERTIA], energies[WEIGHT] = vertex_gradient(
+        u, vertices.inertia, target, vertices.weights, gradient
+    )
+    call_each(terms, energies[ELEMENTS:], u, gradient, scratch)
+    for i in vertices.pinned:
+        for a in range(3):
+            gradient[i + a] = np.float32(0.0)
+    return energies.sum()
+
+
+@njit(cache=True, error_model="numpy")
+def precondition(stiffening, factor):
+    """Factorise the constant stiffness plus that which terms ((kernel, data), ...) have in this step."""
+    values = factor.values
+    values[:] = factor.constant
+    call_each(stiffening, np.empty(len(stiffening)), values)
+    return factorise(
+        values, factor.row_starts, factor.row_columns, factor.factor_rows, factor.factor_columns,
+        factor.starts, factor.rows, factor.L, factor.D, factor.y, factor.filled,
+    )  # fmt: skip
+
+
+@njit(cache=True, fastmath=FAST)
+def dot(a, b):
+    """Return the inner product of a and b (n,), in float32."""
+    total = np.float32(0.0)
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True, fastmath=FAST)
+def add_scaled(a, scale, b):
+    """Add scale times b to a (n,)."""
+    for i in range(len(a)):
+        a[i] += scale * b[i]
+
+
+@njit(cache=True)
+def apply_inverse(q, factor):
+    """Replace q (3V,) by the preconditioner's inverse times q."""
+    b, order = factor.b, factor.order
+    for k in range(len(order)):
+        i = 3 * order[k]
+        b[k, 0], b[k, 1], b[k, 2] = q[i], q[i + 1], q[i + 2]
+    solve(factor.starts, factor.rows, factor.L, factor.D, b)
+    for k in range(len(order)):
+        i = 3 * order[k]
+        q[i], q[i + 1], q[i + 2] = b[k, 0], b[k, 1], b[k, 2]
+
+
+@njit(cache=True, error_model="numpy")
+def descend(
+    u, target, vertices, terms, factor, memory, iterations, tolerance, first_step, work, scratch, energies,
+    counts,
+):  # fmt: skip
+    """Run L-BFGS from u (3V,), which becomes the end.
+
+    tolerance: [N] of the largest component of the gradient. first_step: share of the first direction that is
+    tried first. work (4, 3V): room. counts: becomes iterations and first share taken; returns the largest
+    component of the gradient at the end [N].
+    """
+    gradient, trial_gradient, trial, p = work[0], work[1], work[2], work[3]
+    value = evaluate(u, target, vertices, terms, gradient, scratch, energies)
+    counts[0], counts[1] = 0.0, first_step
+    trial_energies = np.empty_like(energies)
+    most, held, newest = len(memory.rho), 0, -1
+    alphas = np.empty(most, np.float32)
+    while counts[0] < iterations and np.abs(gradient).max() > tolerance and np.isfinite(value):
+        p[:] = -gradient
+        for back in range(held):
+            k = (newest - back) % most
+            alphas[k] = memory.rho[k] * dot(memory.S[k], p)
+            add_scaled(p, -alphas[k], memory.Y[k])
+        apply_inverse(p, factor)
+        for back in range(held - 1, -1, -1):
+            k = (newest - back) % most
+            add_scaled(p, alphas[k] - memory.rho[k] * dot(memory.Y[k], p), memory.S[k])
+        slope, share, accepted, trial_value = dot(gradient, p), np.float32(1.0), False, value
+        if counts[0] == 0:
+            share = np.float32(first_step)
+        for _ in range(HALVINGS if slope < 0 else 0):
+            trial[:] = u
+            add_scaled(trial, share, p)
+            trial_value = evaluate(trial, target, vertices, terms, trial_gradient, scratch, trial_energies)
+            if np.isfinite(trial_value) and trial_value <= value + SUFFICIENT_DECREASE * share * slope:
+                accepted = True
+                break
+            share *= np.float32(0.5)
+        if not accepted:
+            if held == 0:
+                break
+            held = 0
+            continue
+        if counts[0] == 0:
+            counts[1] = share
+        for i in range(
+            len(u)
+        ):  # the direction has done its work: it becomes the step, the gradient its change
+            p[i] = trial[i] - u[i]
+            gradient[i] = trial_gradient[i] - gradient[i]
+        curvature = dot(p, gradient)
+        if curvature > LEAST_CURVATURE * np.sqrt(dot(p, p) * dot(gradient, gradient)):
+            newest, held = (newest + 1) % most, min(held + 1, most)
+            memory.S[newest], memory.Y[newest], memory.rho[newest] = p, gradient, np.float32(1.0) / curvature
+        u[:] = trial
+        gradient[:] = trial_gradient
+        energies[:] = trial_energies
+        value = trial_value
+        counts[0] += 1
+    return np.abs(gradient).max()
+
+
+MEMORY = 10
+
+
+class CompiledLBFGS:
+    """A minimiser bound to one potential.
+
+    Args:
+        max_iterations: after which it stops.
+        tolerance: relative residual, as in Newton, at which it stops sooner.
+
+    Raises:
+        ValueError: a term that it has no kernel for, or no inertia.
+    """
+
+    def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = TOLERANCE) -> None:
+        self.potential, self.max_iterations = potential, max_iterations
+        self._terms = terms = step_terms(potential, "float32_lanes", "CompiledLBFGS")
+        self._lanes: tuple[Float32Lanes, ...] = terms.kernels
+        self._gradients = [kernel_argument(lanes.gradient) for lanes in self._lanes]
+        self._weight = mean_weight(potential)
+        self._tolerance = tolerance * self._weight
+        cloth = potential.cloth
+        count = cloth.vertex_count
+        self._vertices = Vertices(
+            (terms.inertia.masses / terms.inertia.dt**2).astype(np.float32),
+            terms.weights.astype(np.float32),
+            3 * np.asarray(cloth.pins, np.int64),
+        )
+        self._factor, self._stiffening = _factor(cloth.free, cloth.rest_positions, terms)
+        size = (MEMORY, 3 * count)
+        self._memory = Memory(
+            np.empty(size, np.float32), np.empty(size, np.float32), np.empty(MEMORY, np.float32)
+        )
+        self._work = np.empty((4, 3 * count), np.float32)
+        self._scratch = np.empty(SCRATCH, np.float32)
+        self._energies, self._counts = np.zeros(ELEMENTS + len(self._lanes)), np.zeros(2)
+        self.start_again()
+
+    def start_again(self) -> None:
+        """Forget what the last step taught, as before a first one."""
+        self._first_step = 1.0  # what the first direction of the last step allowed: most of the next too
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Run from x0 (V, 3) [m]: status "max_iterations", "stalled" or "diverged"."""
+        start = time.perf_counter()
+        x0 = np.ascontiguousarray(x0, np.float64)
+        target = (self._terms.inertia.x_hat - x0).astype(np.float32).ravel()
+        terms = self.freeze(x0)
+        stiffening = tuple((kernel, (*terms[k][1], places)) for k, kernel, places in self._stiffening)
+        self._energies[:], self._counts[:] = np.nan, 0.0  # nothing of the step before is reported
+        u = np.zeros(x0.size, np.float32)
+        middle = time.perf_counter()
+        if not precondition(stiffening, self._factor):
+            return self._result(x0, "stalled", "the preconditioner is not positive definite", {}, np.nan)
+        begun = time.perf_counter()
+        residual = descend(
+            u, target, self._vertices, terms, self._factor, self._memory, self.max_iterations,
+            self._tolerance, min(2.0 * self._first_step, 1.0), self._work, self._scratch, self._energies,
+            self._counts,
+        )  # fmt: skip
+        self._first_step = float(self._counts[1])
+        seconds = {"assemble": middle - start, "factorise": begun - middle}
+        seconds["descend"] = time.perf_counter() - begun
+        x = x0 + u.reshape(x0.shape)
+        if not np.isfinite(self._energies.sum()):
+            return self._result(x, "diverged", "the energy is not finite", seconds, residual)
+        return self._result(x, "max_iterations", self._reason(residual), seconds, residual)
+
+    def freeze(self, x0: np.ndarray) -> tuple[tuple[np.ndarray, tuple[Any, ...]], ...]:
+        """Return kernel and data of each term of elements for a step from x0 (V, 3) [m]."""
+        return tuple(zip(self._gradients, (lanes.freeze(x0) for lanes in self._lanes)))
+
+    def _reason(self, residual: float) -> str:
+        """Say why the iterations ended where the largest component of the gradient is `residual` [N]."""
+        count = int(self._counts[0])
+        if residual <= self._tolerance:
+            return f"gradient within tolerance after {count} iterations; curvature not checked"
+        if count < self.max_iterations:
+            return f"no step along the quasi-Newton direction lowers the energy, after {count} iterations"
+        return f"stopped after {count} iterations"
+
+    def _result(
+        self, x: np.ndarray, status: str, reason: str, seconds: dict[str, float], residual: float
+    ) -> Result:
+        inertia, _, *elements = self._energies.tolist()
+        values = {self._terms.inertia.name: inertia}
+        values |= {term.name: term.value_and_gradient(x)[0] for term in self._terms.weighing}
+        values |= {term.name: value for term, value in zip(self._terms.elements, elements)}
+        terms = {energy.name: values[energy.name] for energy in self.potential.energies}
+        return Result(
+            positions=x,
+            status=status,
+            reason=reason,
+            iterations=int(self._counts[0]),
+            factorisations=1,
+            gradient_norm=float(residual) / self._weight,
+            energy=sum(terms.values()),
+            terms=terms,
+            seconds=seconds,
+        )
+
+
+def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, list[tuple]]:
+    """Lay the preconditioner of free vertices (V,) bool out.
+
+    Returns pattern and constant values, at positions rest (V, 3) [m], with room for the factor; and of each
+    term whose stiffness changes from step to step its number, its kernel and the places of its lanes.
+    """
+    number = np.full(len(free), -1)
+    number[free] = np.arange(free.sum())
+    fixed = [e for e in (terms.inertia, *terms.elements) if 1 in e.constant]
+    changing = [(k, lanes) for k, lanes in enumerate(terms.kernels) if lanes.stiffness is not None]
+    stencils = [number[e.stencils] for e in fixed] + [number[lanes.stencils] for _, lanes in changing]
+    pattern = ScalarPattern(int(free.sum()), stencils)
+    constant = np.zeros(pattern.entries)
+    for energy in fixed:
+        elements, values = energy.scalar_stiffness(rest)
+        places = pattern.places(number[energy.stencils[elements]])
+        np.add.at(constant, places[places >= 0], values[places >= 0])
+    n, entries = pattern.count, len(pattern.rows)
+    factor = Factor(
+        constant, np.flatnonzero(free)[pattern.order], pattern.row_starts, pattern.row_columns,
+        pattern.factor_rows, pattern.factor_columns, pattern.starts, pattern.rows, np.empty_like(constant),
+        np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64), np.zeros((n, WIDTH)),
+    )  # fmt: skip
+    stiffening = []
+    for k, lanes in changing:
+        places = pattern.places(number[lanes.stencils])
+        blocks = to_blocks(places.reshape(len(places), -1))
+        stiffening.append((k, kernel_argument(lanes.stiffness), blocks))
+    return factor, stiffening
