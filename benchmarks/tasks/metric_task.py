@@ -6,6 +6,7 @@ import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
 from benchmarks.process.errors import one_line
 from benchmarks.results.ensemble import spread
 from benchmarks.results.frame_energies import SECONDS
-from benchmarks.results.row import USABLE
+from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.cell_task import build_scene
 from benchmarks.tasks.task import Context, Outcome, Task
@@ -132,12 +133,24 @@ def measured(
                     find_metric(metric, outside).name: number(metric, v) for metric, v in values.items()
                 }
                 curves |= module.series(roll_out) if hasattr(module, "series") else {}
-                ended = (module.judge(roll_out, values) if hasattr(module, "judge") else None) or ended
+                ended = judgement(module, roll_out, values) or ended
         except Exception as error:
             if name in outside:
                 raise RuntimeError(f"{name}: {one_line(error)}") from error
             raise
     return metrics, curves, ended
+
+
+def judgement(
+    module: ModuleType, roll_out: RollOut, values: dict[str, float | Estimate]
+) -> tuple[str, str] | None:
+    """Return status and reason by judge() of a module, None where it has none. Raises ValueError."""
+    ended = module.judge(roll_out, values) if hasattr(module, "judge") else None
+    if ended is None or (isinstance(ended, tuple) and len(ended) == 2 and ended[0] in STATUSES):
+        return ended
+    raise ValueError(
+        f"judge() gives {ended!r}: expected None, or a status ({', '.join(STATUSES)}) and a reason"
+    )
 
 
 def number(metric: str, value: Any) -> float | Estimate:

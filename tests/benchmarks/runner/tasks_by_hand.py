@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
-from benchmarks.tasks.task import Context
+from benchmarks.tasks.task import Context, failure
 from benchmarks.tasks.training import TrainNetwork
 
 
@@ -83,15 +84,22 @@ class InProcess:
             context = self.context()
             for task in tasks:
                 clock = time.perf_counter()
-                outcome = task.run(context, needed)
+                outcome = self.outcome(task, context, needed)
                 yield task, dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
+
+    def outcome(self, task, context, needed):
+        try:
+            return task.run(context, needed)
+        except Exception as error:
+            return failure(error)
 
     def begin(self, tasks):
         for task, _ in tasks:
-            task.begin(self._named.setdefault(task.process, self.context()))
+            with suppress(Exception):
+                task.begin(self._named.setdefault(task.process, self.context()))
 
     def alone(self, task, needed):
-        return task.run(self._named.setdefault(task.process, self.context()), needed)
+        return self.outcome(task, self._named.setdefault(task.process, self.context()), needed)
 
     def release(self, process):
         self._named.pop(process, None)
