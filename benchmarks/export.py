@@ -20,9 +20,12 @@ EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick
   python -m benchmarks.export hanging_sheet --preset smoke -o sheet --reference
   python -m benchmarks.export tshirt/01_01 --motions clips/ --test-motions 01_01 --body mine.npz -o out
+  python -m benchmarks.export tshirt/training-motions -o motions.h5    training motions, simulated, in a file
   python -m benchmarks.score mine.npz --scene tshirt/kick        what came of it, judged
   python -m reports.film RUN --scene tshirt/kick --methods snug -o kick.pc2    another command: a roll-out
 
+A file of training motions is what snug.train --dataset learns from; the run that simulates them is kept in
+  FILE.parts until the file is there, and the same command goes on with it.
 The folder's README.txt says what each file holds: units, axes, order of vertices.
 exit status: 0 written; 2 the scene is not known or cannot be made, or the folder is not empty: one line says
   why and nothing is written; 130 interrupted."""
@@ -36,8 +39,8 @@ def make_export_parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("scene", metavar="SCENE", help="as in benchmarks.run --list")
-    add("-o", "--out", required=True, metavar="DIR", help="a new or empty folder")
+    add("scene", metavar="SCENE", help="as in benchmarks.run --list, or GARMENT/training-motions")
+    add("-o", "--out", required=True, metavar="DIR", help="a new or empty folder; of training motions a file")
     add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
     add_scene_options(parser)
     return parser
@@ -51,6 +54,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from reference_sim.files.atomic_files import demand_new
 
     folder = Path(options.out)
+    garment, _, motion = options.scene.rpartition("/")
+    if motion == "training-motions":
+        from benchmarks.runner.training_motions import plan_training_motions, write_training_motions
+
+        written = write_training_motions(garment, plan_training_motions(garment, options), folder)
+        print(f"{len(written)} training motions of {garment} in {folder}")
+        return 0
     demand_new(folder)
     plan = plan_scene(options.scene, options)
     try:

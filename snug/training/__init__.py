@@ -9,7 +9,7 @@
 | losses | the physics loss, distances from simulated vertices, PBNS's own material |
 | contact | contact planes from cached anchors, searched anew as the network learns |
 | training_set, augmentation | frames and windows of motions; clips made from limbs of other clips |
-| simulated_data | data sets of simulated motions in files |
+| simulated_data | simulated motions in a file |
 | hidden_state_cache | states that windows of a recurrent network start from |
 | divergence_guard, validation | batches that are too high; roll-outs of held-out motions |
 | device, process_group, stopwatch | where it runs, with how many processes, how long each part takes |

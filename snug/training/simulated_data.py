@@ -1,23 +1,23 @@
-"""Data sets: simulated motions in the files of one folder, and an index of them, dataset.json.
+"""Simulated motions in one file, which training reads a few frames at a time.
 
-A sequence is three files: its simulation (.vtkhdf), the motion (.npz), and the simulated vertices as networks
-see them (.npy), of which training reads a few frames at a time. The index says what all sequences share (the
-settings), and of each its files with their digests, its frames and how it ended. `python -m
-benchmarks.dataset` builds such folders.
+The file is HDF5: attribute `settings` says of what body and garment the simulations are (`settings_of`); a
+group for each motion, called by its place, has attributes `name`, `fps` and `digest` of its vertices, and
+poses (T,24,3) [rad], translations (T,3) [m] and vertices (T,V,3) [m] from the pelvis, float32.
+`python -m benchmarks.export GARMENT/training-motions` writes such a file.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from pathlib import Path, PurePosixPath
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 
-from reference_sim.files.array_file import read_arrays, write_array
 from reference_sim.files.atomic_files import replacing
 from snug.motion.motion import Motion
 
@@ -26,127 +26,89 @@ if TYPE_CHECKING:
     from snug.garments.garment import Garment
     from snug.training.losses.vertex_targets import StoredVertices
 
-INDEX, DATA_SET_FORMAT = "dataset.json", 1
-MISSING = "missing"  # status of a sequence that was asked for and is not there yet
-_TYPES: dict[str, Any] = {
-    "name": str, "trajectory": str, "motion": str, "vertices": str, "digests": dict, "frames": int,
-    "status": str, "reason": str, "usable": bool, "seconds": int | float, "hardware": str, "commit": str,
-}  # fmt: skip
+DATA_SET_FORMAT = 2
 MICROMETRES = 6  # decimals of positions [m] that count: another processor may tailor the last bits otherwise
 
 
 class DataSetError(ValueError):
-    """A folder that holds no data set, or not the one that is wanted; the message names what is wrong."""
-
-
-@dataclass(frozen=True)
-class SimulatedSequence:
-    """A line of the index.
-
-    Attributes:
-        name: of the motion.
-        trajectory, motion, vertices: names of its files in the folder.
-        digests: of these files, by name.
-        frames: number of simulated frames.
-        status: of the simulation, or MISSING.
-        reason: of a failure.
-        usable: whether it has all frames of the motion.
-        seconds: wall time of the simulation [s].
-        hardware: on which it ran.
-        commit: of the code that ran.
-    """
-
-    name: str
-    trajectory: str = ""
-    motion: str = ""
-    vertices: str = ""
-    digests: Mapping[str, str] = field(default_factory=dict)
-    frames: int = 0
-    status: str = MISSING
-    reason: str = ""
-    usable: bool = False
-    seconds: float = 0.0
-    hardware: str = ""
-    commit: str = ""
+    """A file that holds no simulated motions, or not the ones that are wanted; the message names it."""
 
 
 @dataclass(frozen=True)
 class DataSet:
-    """A folder and its index.
+    """Simulated motions and the file that holds their vertices.
 
     Attributes:
-        folder: holds the index and all files.
-        settings: common to all sequences, see `settings_of`.
-        sequences: lines of the index.
-        commands: those that made the data set.
+        path: the file.
+        settings: common to all simulations, see `settings_of`.
+        motions: that were simulated.
+        targets: name -> vertices of each motion, which stay in the file.
     """
 
-    folder: Path
+    path: Path
     settings: Mapping[str, Any]
-    sequences: tuple[SimulatedSequence, ...] = ()
-    commands: tuple[str, ...] = ()
+    motions: list[Motion]
+    targets: dict[str, StoredVertices]
 
     @classmethod
-    def read(cls, folder: str | Path) -> DataSet:
-        """Read the index of a folder; the other files are not opened. Raises DataSetError."""
-        path = Path(folder) / INDEX
-        try:
-            index = json.loads(path.read_text(encoding="utf-8"))
-            if index["format"] != DATA_SET_FORMAT:
-                raise DataSetError(
-                    f"{path}: format {str(index['format'])[:20]!r}; this version reads {DATA_SET_FORMAT}"
-                )
-            lines = tuple(_line(line) for line in index["sequences"])
-            if len({line.name for line in lines}) < len(lines):
-                raise ValueError("two sequences have one name")
-            settings = dict(index["settings"].items())
-            return cls(Path(folder), settings, lines, tuple(map(str, index["commands"])))
-        except DataSetError:
-            raise
-        except FileNotFoundError:
-            raise DataSetError(f"{path}: no such file; make one by python -m benchmarks.dataset") from None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
-            raise DataSetError(f"{path}: no index of a data set ({reason})") from None
-
-    def write(self) -> None:
-        """Write the index, whole or not at all."""
-        index = {
-            "format": DATA_SET_FORMAT,
-            "settings": self.settings,
-            "commands": self.commands,
-            "sequences": [asdict(line) for line in self.sequences],
-        }
-        with replacing(self.folder / INDEX) as temporary:
-            temporary.write_text(json.dumps(index, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-
-    @property
-    def usable(self) -> list[SimulatedSequence]:
-        """Sequences to learn from."""
-        return [line for line in self.sequences if line.usable]
-
-    def motions(self) -> list[Motion]:
-        """Read the motions of the usable sequences. Raises ValueError for an unfit file."""
-        return [read_motion(self.folder / line.motion, line) for line in self.usable]
-
-    def targets(self) -> dict[str, StoredVertices]:
-        """Return name -> vertices of each usable sequence; they stay in their files."""
+    def read(cls, file: str | Path) -> DataSet:
+        """Read everything but the vertices. Raises DataSetError."""
         from snug.training.losses.vertex_targets import StoredVertices
 
-        count = int(self.settings["vertices"])
-        return {
-            line.name: StoredVertices(
-                self.folder / line.vertices, (line.frames, count, 3), line.digests[line.vertices]
-            )
-            for line in self.usable
-        }
+        path, motions, targets = Path(file), list[Motion](), dict[str, StoredVertices]()
+        if not path.is_file():
+            raise DataSetError(f"{path}: no such file; python -m benchmarks.export writes one")
+        try:
+            with h5py.File(path) as data:
+                if (number := int(data.attrs["format"])) != DATA_SET_FORMAT:
+                    raise DataSetError(f"{path}: format {number}; this version reads {DATA_SET_FORMAT}")
+                settings = dict(json.loads(data.attrs["settings"]))
+                for place in map(str, range(len(data))):
+                    group = data[place]
+                    name, fps = str(group.attrs["name"]), float(group.attrs["fps"])
+                    poses, translations = group["poses"][:], group["translations"][:]
+                    motions.append(Motion(name, poses, translations, fps, "simulated"))
+                    shape = (len(poses), int(settings["vertices"]), 3)
+                    targets[name] = StoredVertices(
+                        path, shape, str(group.attrs["digest"]), f"{place}/vertices"
+                    )
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RuntimeError) as error:
+            if isinstance(error, DataSetError):
+                raise
+            reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
+            raise DataSetError(f"{path}: no file of simulated motions ({reason})") from None
+        return cls(path, settings, motions, targets)
 
     def check(self, settings: Mapping[str, Any]) -> None:
-        """Raise DataSetError unless the data set has these settings."""
+        """Raise DataSetError unless the simulations have these settings."""
         for name, value in settings.items():
             if (stored := self.settings.get(name)) != value:
                 values = f": {stored} there, {value} here" if isinstance(value, str | int | float) else ""
-                raise DataSetError(f"{self.folder}: a data set of another {name}{values}")
+                raise DataSetError(f"{self.path}: simulations of another {name}{values}")
+
+
+def write_data_set(
+    path: Path, body: Body, garment: Garment, simulations: Iterable[tuple[Motion, np.ndarray]]
+) -> None:
+    """Write simulated motions to a file, whole or not at all.
+
+    Args:
+        path: the file.
+        body: wears the garment.
+        garment: that was simulated.
+        simulations: motions of T frames and world positions (T, V, 3) [m].
+    """
+    joint = body.joints()[0]
+    with replacing(path) as temporary, h5py.File(temporary, "w") as data:
+        data.attrs["format"] = DATA_SET_FORMAT
+        data.attrs["settings"] = json.dumps(settings_of(body, garment))
+        for place, (motion, positions) in enumerate(simulations):
+            pelvis = joint + motion.translations
+            vertices = (positions - pelvis[:, None]).astype(np.float32)
+            group = data.create_group(str(place))
+            group.attrs.update(name=motion.name, fps=motion.fps, digest=_digest([vertices]))
+            group["poses"], group["translations"] = motion.poses, motion.translations
+            group["vertices"] = vertices
 
 
 def settings_of(body: Body, garment: Garment) -> dict[str, Any]:
@@ -167,31 +129,6 @@ def settings_of(body: Body, garment: Garment) -> dict[str, Any]:
     }
 
 
-def write_motion(path: Path, motion: Motion) -> None:
-    """Write poses (T, 24, 3) [rad], translations (T, 3) [m] and fps to an .npz file."""
-    with replacing(path) as temporary:
-        np.savez(temporary, poses=motion.poses, translations=motion.translations, fps=motion.fps)
-
-
-def write_vertices(path: Path, positions: np.ndarray, motion: Motion, body: Body) -> None:
-    """Write simulated world positions (T, V, 3) [m] as training reads them: from the pelvis, float32."""
-    pelvis = body.joints()[0] + motion.translations[: len(positions)]
-    with replacing(path) as temporary:
-        write_array(temporary, (positions - pelvis[:, None]).astype(np.float32))
-
-
-def read_motion(path: Path, line: SimulatedSequence) -> Motion:
-    """Read the motion of a sequence. Raises ValueError for a file that does not hold it."""
-    arrays = read_arrays(path, ("poses", "translations", "fps"))
-    try:
-        motion = Motion(line.name, arrays["poses"], arrays["translations"], float(arrays["fps"]), "simulated")
-    except (KeyError, TypeError) as error:
-        raise DataSetError(f"{path}: no motion of a data set ({error}); build the data set again") from None
-    if motion.frames != line.frames:
-        raise DataSetError(f"{path}: {motion.frames} frames, {line.frames} by {INDEX}; make it again")
-    return motion
-
-
 def _digest(arrays: Sequence[np.ndarray]) -> str:
     """Return a digest of shapes and values; a zero has no sign."""
     digest = hashlib.sha256()
@@ -199,18 +136,3 @@ def _digest(arrays: Sequence[np.ndarray]) -> str:
         plain = np.asarray(array, np.float64) + 0.0
         digest.update(repr(plain.shape).encode() + plain.tobytes())
     return digest.hexdigest()[:16]
-
-
-def _line(line: Mapping[str, Any]) -> SimulatedSequence:
-    """Read a line. Raises ValueError for an invalid entry, or a file outside of the folder."""
-    sequence = SimulatedSequence(**line)
-    for name, kind in _TYPES.items():
-        if not isinstance(value := getattr(sequence, name), kind):
-            raise ValueError(f"sequence {str(sequence.name)[:60]!r}: {name} is {str(value)[:40]!r}")
-    files = {sequence.trajectory, sequence.motion, sequence.vertices}
-    for name in filter(None, (*files, *sequence.digests)):
-        if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-            raise ValueError(f"sequence {sequence.name!r}: its file {name!r} lies outside of the folder")
-    if sequence.usable and not files <= set(sequence.digests):
-        raise ValueError(f"sequence {sequence.name!r}: no digest of its files")
-    return sequence

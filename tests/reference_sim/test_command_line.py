@@ -13,7 +13,7 @@ import pytest
 from reference_sim.command_line import command
 
 COMMANDS = (
-    "snug.check", "snug.train", "benchmarks.check", "benchmarks.dataset",
+    "snug.check", "snug.train", "benchmarks.check",
     "benchmarks.export", "benchmarks.merge", "benchmarks.run", "benchmarks.score",
     "reports.build", "reports.check", "reports.compare",
     "reports.film",

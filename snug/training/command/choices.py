@@ -83,7 +83,7 @@ def output_files(out: Path, garments: Sequence[ChosenGarment]) -> list[Path]:
 def choose_motions(options: argparse.Namespace, data: DataSet | None) -> tuple[list[Motion], list[Motion]]:
     """Return the motions to train on and those to validate with. Raises ValueError for an unknown name."""
     reading = parse_motion_options(options)
-    motions = data.motions() if data else [make_motion(name) for name in TRAIN]
+    motions = data.motions if data else [make_motion(name) for name in TRAIN]
     if options.motions:
         motions = load_motions(options.motions, options=reading)
     names = [motion.name for motion in motions]

@@ -23,13 +23,13 @@ EXAMPLES = """examples:
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
   python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
   python -m snug.train --recipe paper --vertices 4400    the paper's text (see snug.recipes.named on contact)
-  python -m snug.train --dataset data/walks --model supervised    learn from the simulations of a data set
+  python -m snug.train --dataset motions.h5 --model supervised    learn from simulated motions
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
   torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
 
-supervised, santesteban2019 and tailornet learn from simulated motions, which python -m benchmarks.dataset
-makes; python -m benchmarks.run makes its own. With --dataset, name the --garment, --vertices and --body that
-it was built with."""
+supervised, santesteban2019 and tailornet learn from simulated motions, which python -m benchmarks.export
+GARMENT/training-motions writes; python -m benchmarks.run makes its own. With --dataset, name the --garment,
+--vertices and --body that it was written with."""
 
 
 def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
@@ -51,8 +51,7 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         "--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl (default: the package's)"
     )
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
-    add("--dataset", metavar="DIR",
-        help="motions and simulations of a data set, read from its files a few frames at a time")  # fmt: skip
+    add("--dataset", metavar="FILE", help="simulated motions, read from the file a few frames at a time")
     add_motion_options(add)
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
@@ -109,7 +108,7 @@ def check_options(options: argparse.Namespace) -> None:
         raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
     simulated = not find_kind(options.model).physics
     if simulated and not options.dataset:
-        raise ValueError(f"--model {options.model}: learns from simulations; add --dataset DIR")
+        raise ValueError(f"--model {options.model}: learns from simulations; add --dataset FILE")
     if options.recipe and simulated:
         raise ValueError(f"--recipe {options.recipe}: {options.model} has its own; leave out --recipe")
     if options.patience and not options.validation:

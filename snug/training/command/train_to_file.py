@@ -68,7 +68,7 @@ def train_to_file(
     trajectories = None
     if data is not None:
         data.check(settings_of(body, dressed.garment))
-        trajectories = None if find_kind(options.model).physics else data.targets()
+        trajectories = None if find_kind(options.model).physics else data.targets
     learned_from = digest_inputs(dressed, motions, held_out, trajectories or {})
     if options.resume and output.is_file() and not checkpoint.path.is_file():
         _check_finished(output, options, recipe, dressed.vertices, learned_from)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+import h5py
 import numpy as np
 import torch
 from torch import Tensor
@@ -50,29 +51,31 @@ def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class StoredVertices:
-    """Simulated vertices (T, V, 3) [m] relative to the pelvis, in an .npy file of float32.
+    """Simulated vertices (T, V, 3) [m] relative to the pelvis, float32 in an HDF5 file.
 
     Attributes:
         path: the file.
         shape: expected, (T, V, 3).
-        content: digest of the file, which tells it from another.
+        content: digest of them, which tells them from others.
+        place: in the file.
     """
 
     path: Path
     shape: tuple[int, int, int]
-    content: str = ""
+    content: str
+    place: str
 
     def read(self, frames: slice, motion: str) -> Tensor:
         """Read those frames. Raises TargetError for a file that does not hold them, or no finite numbers."""
         try:
-            whole = np.load(self.path, mmap_mode="r", allow_pickle=False)
-            positions = np.array(whole[frames])
-        except (OSError, ValueError, EOFError, SyntaxError) as error:
-            raise TargetError(f"{self.path}: {' '.join(str(error).split())[:200]}") from None
-        if whole.shape != self.shape or whole.dtype != np.float32:
-            raise TargetError(
-                f"{self.path}: {whole.shape} of {whole.dtype}, expected {self.shape} of float32"
-            )
+            with h5py.File(self.path) as file:
+                whole = file[self.place]
+                shape, dtype = whole.shape, whole.dtype
+                positions = whole[frames] if shape == self.shape else np.empty(0)
+        except (OSError, ValueError, KeyError, AttributeError, RuntimeError) as error:
+            raise TargetError(f"{self.path}: {motion}: {' '.join(str(error).split())[:200]}") from None
+        if shape != self.shape or dtype != np.float32:
+            raise TargetError(f"{self.path}: {motion}: {shape} of {dtype}, expected {self.shape} of float32")
         _check_finite(positions, motion, frames.start or 0)
         return torch.from_numpy(positions)
 

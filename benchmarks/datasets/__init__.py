@@ -1,1 +1,0 @@
-"""Data sets of simulated motions, for training on more frames than fit into memory: their building."""

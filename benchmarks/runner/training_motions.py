@@ -1,0 +1,68 @@
+"""The training motions of a run, simulated in one garment and written as one file for snug.train."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import scene_fields
+from benchmarks.plan.plan import DEFAULT_ONLY, Network, Plan, PlanError
+from benchmarks.plan.request import Request
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.executor import Executor
+from benchmarks.runner.lock import held
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.schedule import Schedule
+from benchmarks.tasks.ground_truth import SimulateMotion
+from reference_sim.trajectory import Trajectory
+from snug.training.simulated_data import write_data_set
+
+WORD = "training-motions"  # in the place of a motion
+LEARNER = "supervised"  # the network that learns from the training motions, simulated to convergence
+
+
+def plan_training_motions(garment: str, options: argparse.Namespace) -> Plan:
+    """Return the plan of a run that simulates the training motions. Raises ValueError, one line."""
+    asked = Request(
+        scenes=(f"{garment}/*",), methods=(LEARNER,), suites=("garments",), **scene_fields(options)
+    )
+    return make_plan(asked)
+
+
+def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
+    """Simulate what the folder `out`.parts lacks, write the file and remove the folder.
+
+    Args:
+        garment: name of the garment.
+        plan: of `plan_training_motions`.
+        out: the file.
+
+    Returns:
+        Names of the motions that were written.
+
+    Raises:
+        PlanError: a simulation failed, or did not reach its last frame.
+    """
+    run, assets = RunFolder(out.with_name(f"{out.name}.parts")), plan.open_assets()
+    tasks = Schedule(plan).ground_truth(Network(LEARNER, 0, garment))
+    with held(run.path):
+        run.remove_parts()
+        runner = Runner(tasks, Cache(run, only=(*DEFAULT_ONLY, "failed")))
+        runner.run(Executor(run, assets, plan.workers))
+        files: dict[str, str] = {}
+        for task in tasks:
+            assert isinstance(task, SimulateMotion)
+            outcome = runner.outcomes[task.id]
+            if outcome.failed or not outcome.result["whole"]:
+                why = outcome.reason or outcome.result.get("reason", "")
+                raise PlanError(f"training motion {task.scene.motion}: {outcome.status}: {why}")
+            files[task.scene.motion] = outcome.files[0]
+        simulations = (
+            (assets.motions[name], Trajectory.load(run.path / file).positions) for name, file in files.items()
+        )
+        write_data_set(out, assets.body, assets.garments[garment], simulations)
+        shutil.rmtree(run.path)
+    return list(files)
