@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -254,13 +253,3 @@ def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:
     if same.size:
         pair = sorted(order[same[0] : same[0] + 2].tolist())
         raise MeshError(f"vertices {pair[0]} and {pair[1]} coincide: merge them")
-
-
-def fingerprint(*arrays: np.ndarray | None) -> str:
-    """Return a short hash of shapes, types and contents: equal for equal arrays only; None is skipped."""
-    digest = hashlib.blake2b(digest_size=12)
-    for array in arrays:
-        if array is not None:
-            digest.update(f"{array.shape}{array.dtype.str}".encode())
-            digest.update(np.ascontiguousarray(array).data)
-    return digest.hexdigest()

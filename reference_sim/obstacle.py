@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from reference_sim.cloth import MeshError, fingerprint
+from reference_sim.cloth import MeshError
 from reference_sim.contact.closest_point import Closest, FaceSearch, Listed
 from reference_sim.geometry.surface import carry, faces_around, plane_normals
 from reference_sim.geometry.topology import check_closed
@@ -138,11 +138,6 @@ class Obstacle:
         fine._substeps = self._substeps * substeps
         fine._forget()
         return fine
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """Hash of everything that decides how it touches."""
-        return fingerprint(self.positions, self.faces, self.rest_centroids, np.array(self.region))
 
     @cached_property
     def _around(self) -> tuple[np.ndarray, np.ndarray]:

@@ -37,26 +37,25 @@ EXAMPLES = """examples:
 The output is in metres with y up, whatever the input was in. ParaView opens it as it is; for Blender see
 reference_sim.point_cache.write_point_cache.
 Exit status: 0 all frames converged, 1 some frame did not, 2 bad input (nothing is written)."""
-_PENALTY, _BARRIER = "ContactPenalty(cloth, stiffness=, margin=, samples=)", "ContactBarrier(cloth, ...)"
-REPLACED = {
-    **dict.fromkeys(("--resume", "--overwrite"), "begin again, under a name that does not exist yet"),
-    "--pc2": "write_point_cache('out.pc2', Trajectory.load('out.vtkhdf')) in Python",
-    **dict.fromkeys(("--rest", "--uv-scale"), "Cloth(..., rest_uv=rest_chart(surface, scale)) in Python"),
-    "--region": "Obstacle(..., region=0.2) in Python",
-    **{
-        f"--{name.replace('_', '-')}": f"{name} = ... in the file of --material"
-        for name in ("young_modulus", "poisson_ratio", "thickness", "density", "bending_stiffness")
-    },
-    "--bending-scaling": "BendHinge(cloth, scaling='none') in Python",
-    "--rest-angles": "BendHinge(cloth, rest_angles='rest') in Python",
-    **{f"--contact-{name}": f"{_PENALTY} in Python" for name in ("stiffness", "margin", "samples")},
-    **dict.fromkeys(("--barrier", "--barrier-distance", "--barrier-stiffness"), f"{_BARRIER} in Python"),
-    "--area-barrier": "AreaBarrier(cloth, stiffness=100) in Python",
-    **{
-        f"--{name.replace('_', '-')}": f"simulate(..., {name}=) in Python"
-        for name in ("substeps", "tolerance", "method", "max_iterations")
-    },
-    "--quiet": "> /dev/null 2>&1",
+REPLACED = {  # former option -> what serves in its place
+    f"--{option}": remedy
+    for remedy, options in {
+        "begin again, under a name that does not exist yet": "resume overwrite",
+        "a line in the file of --material": "young-modulus poisson-ratio thickness density bending-stiffness",
+        "write_point_cache('out.pc2', Trajectory.load('out.vtkhdf')) in Python": "pc2",
+        "Cloth(..., rest_uv=rest_chart(surface, scale)) in Python": "rest uv-scale",
+        "Obstacle(..., region=0.2) in Python": "region",
+        "BendHinge(cloth, scaling='none', rest_angles='rest') in Python": "bending-scaling rest-angles",
+        "ContactPenalty(cloth, stiffness=..., margin=..., samples=...) in Python": "contact-stiffness "
+        "contact-margin contact-samples",
+        "ContactBarrier(cloth, distance=..., stiffness=...) in Python": "barrier barrier-distance "
+        "barrier-stiffness",
+        "AreaBarrier(cloth, stiffness=100) in Python": "area-barrier",
+        "simulate(..., substeps=2, tolerance=1e-8, method='newton') in Python": "substeps tolerance method "
+        "max-iterations",
+        "> /dev/null 2>&1": "quiet",
+    }.items()
+    for option in options.split()
 }
 
 

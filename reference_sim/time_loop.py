@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.cloth import Cloth, fingerprint
+from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.minimise.result import Result, severity
 from reference_sim.progress import progress_bar
@@ -154,7 +154,7 @@ def simulate_with(
         raise ValueError(f"simulate: frames = {frames}: must be at least 1")
     x = _checked(start, cloth.rest_positions, "start")
     v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
-    record = _Record(cloth, stepper.provenance() | {"start": fingerprint(x, v)})
+    record = _Record(cloth, stepper.provenance())
     stepper.check_start(x, v)
     state = State(x, v)
     record.add(x, 0.0, 0.0, _fields_of_start(stepper.potential.energies))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.cloth import Cloth, fingerprint
+from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.inertia import Inertia
 from reference_sim.minimise.result import Result
@@ -174,8 +174,8 @@ class TimeStepper:
         self.potential.prepare(Step(x, v, guess, self.dt, self.obstacle, step))
 
     def provenance(self) -> dict[str, Any]:
-        """Return JSON values of everything that decides the result."""
-        cloth, obstacle, minimiser = self.cloth, self.obstacle, self.minimiser
+        """Return JSON values of the choices that decide the result, meshes apart."""
+        minimiser = self.minimiser
         # The options have "newton" by default as well as by request, but L-BFGS opens a step by default.
         opening = {"opening": minimiser.opening_method} if minimiser.opening_method else {}
         return {
@@ -188,9 +188,7 @@ class TimeStepper:
             "options": {name: _as_json(value) for name, value in minimiser.options.items()},
             **opening,
             "terms": {energy.name: energy.parameters() for energy in self.potential.energies},
-            "material": asdict(cloth.material),
-            "cloth": fingerprint(cloth.rest_positions, cloth.faces, np.asarray(cloth.pins), cloth.rest_uv),
-            "obstacle": None if obstacle is None else f"{type(obstacle).__name__} {obstacle.fingerprint}",
+            "material": asdict(self.cloth.material),
         }
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from reference_sim.cloth import Cloth, fingerprint
+from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge_kernels import batch, constraint, lanes, vertex_block
 from reference_sim.energies.energy import Energy
 from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks, arctan2
@@ -70,13 +70,9 @@ class BendHinge(Energy):
         self.rest_angles = np.array(angles)  # its own: a broadcast view is read-only
 
     def parameters(self) -> dict[str, Any]:
-        """Return scaling, mean stiffness and a fingerprint of stiffness and rest angles."""
+        """Return scaling and mean stiffness [J]."""
         mean = float(self.stiffness.mean()) if len(self.stiffness) else 0.0
-        return {
-            "scaling": self.scaling,
-            "mean_stiffness_J": mean,
-            "rest": fingerprint(self.stiffness, self.rest_angles),
-        }
+        return {"scaling": self.scaling, "mean_stiffness_J": mean}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return vertices (H, 4), stiffness (H,) [J] and rest angles (H,) [rad] of the hinges."""

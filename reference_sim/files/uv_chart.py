@@ -20,12 +20,12 @@ LARGEST_STRETCH = 1.5  # from chart to mesh, or its inverse: no cloth is sewn so
 STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
 
 
-def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
+def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
     """Join the doubled vertices of a surface in metres: those closer than a micrometre are one.
 
     Returns:
-        The surface, of each vertex left its number in the file (V,), and of each vertex in the file its
-        number now. A surface without doubled vertices stays as it is.
+        The surface, and of each vertex left its number in the file (V,). A surface without doubled vertices
+        stays as it is.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -34,7 +34,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
     count = len(surface.positions)
     pairs = cKDTree(surface.positions).query_pairs(JOIN_DISTANCE, output_type="ndarray")
     if not len(pairs):
-        return surface, np.arange(count), np.arange(count)
+        return surface, np.arange(count)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     of_vertex = connected_components(graph, directed=False)[1]
     _, first = np.unique(of_vertex, return_index=True)
@@ -45,7 +45,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray, np.ndarray]:
     joined = replace(
         surface, positions=surface.positions[kept], faces=place[of_vertex][surface.faces], vertex_data=data
     )
-    return joined, kept, place[of_vertex]
+    return joined, kept
 
 
 def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndarray:

@@ -110,7 +110,7 @@ def examine_file(file: GarmentFile, form: DressForm) -> Examination:
         raise GarmentError(str(error)) from None
     authored = read_authored_weights(file.path, raw.vertex_data, file.weights, len(raw.positions))
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
-    surface, kept, _ = join_seams(replace(raw, positions=positions))
+    surface, kept = join_seams(replace(raw, positions=positions))
     examination = Examination(surface=surface)
     _describe_mesh(examination, raw, surface, kept)
     fits = _check_place(examination, file, form, raw)
