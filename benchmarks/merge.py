@@ -1,4 +1,4 @@
-"""python -m benchmarks.merge: runs of several machines in one folder, for one report.
+"""Runs of several machines joined into one folder, for one report.
 
 Everything but times is compared first, and refused by name where it differs: the requests, the inputs and
 the code of every task, and each number that two runs have. Times are those of one machine, the first named
@@ -7,9 +7,7 @@ that measured any; those of others become the reason of a skipped row.
 
 from __future__ import annotations
 
-import shlex
 import shutil
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import fields, replace
@@ -24,19 +22,8 @@ from benchmarks.results.run_config import OF_SCENES
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import read_entry
 from benchmarks.tasks.training import TrainNetwork
-from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
 
-PROGRAM = "benchmarks.merge"
-EXAMPLES = """examples:
-  python -m benchmarks.merge runs/first runs/second -o runs/both
-  python -m reports.build runs/both                                   tables, figures and the report
-
-Runs of one preset and of the same code: say, some seeds on each machine, or some methods. Times (and peak
-memory) are kept of the first machine named that measured them; another machine's are told in the reason of a
-skipped row. Runs go on in their own folders, not in the merged one.
-exit status: 0 written; 2 the runs differ in what has to be the same, or a file is damaged: one line says
-  which, and nothing is written."""
 MACHINE = "machine"  # the input of a task that says where it ran
 CASE_TIMES = {"engine/time", "engine/reference_time"}  # cases declare no metric that says so
 SAME = ("format", "protocol", "split", *OF_SCENES)  # entries of run.json
@@ -48,23 +35,6 @@ OF_ONE_RUN = ("uncertainty", "moved", "reason", "commit", "hardware")
 
 class MergeError(ValueError):
     """Folders that do not belong together; the message names what differs, and where."""
-
-
-@command(PROGRAM)
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    argv = list(sys.argv[1:] if arguments is None else arguments)
-    parser = Parser(prog=f"python -m {PROGRAM}", description="Join runs into one folder.", epilog=EXAMPLES)
-    parser.add_argument("runs", metavar="RUN", nargs="+", help="folders of benchmarks.run, two or more")
-    parser.add_argument("-o", "--out", metavar="DIR", required=True, help="a new folder")
-    options = parser.parse_args(argv)
-    line = shlex.join(["python", "-m", PROGRAM, *argv])
-    rows = merge([Path(run) for run in options.runs], Path(options.out), command=line)
-    timed = of_machines(RunFolder(Path(options.out)).read_config())
-    if left_out := sum(row.status == "skipped" and row.metric in timed for row in rows):
-        print(f"{left_out} times of other machines stand in the reasons of skipped rows", file=sys.stderr)
-    print(f"{len(rows)} rows in {options.out}; python -m reports.build {shlex.quote(options.out)}")
-    return 0
 
 
 def merge(paths: Sequence[Path], out: Path, *, command: str = "") -> list[Row]:
@@ -251,7 +221,3 @@ def copied(name: str, digest: str, source: Path, target: Path) -> dict[str, str]
     if digest_of_file(path) != digest:
         raise ResultsError(f"{source / name}: is damaged; make it again there")
     return {name: digest}
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,10 +7,11 @@ source differ, it is taken, and every row says so.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.cell import TaskId
@@ -18,15 +19,20 @@ from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.tasks.task import Context, Outcome, Task
 from benchmarks.tasks.training import TrainNetwork, facts_of
+from reference_sim.files.atomic_files import replacing
 from snug.networks.tensor_file import TensorFileError, read_header
-from snug.trained import SUFFIX, network_name
+from snug.trained import FOLDER, SUFFIX, network_name
+
+if TYPE_CHECKING:
+    from snug.networks.trained_model import TrainedModel
 
 NAME = "pretrained"  # in the result of a task: name of the file that its network is of
 MACHINE = "machine"  # the input of a task that says where it runs
 PACKAGE = "package "  # how the name of a package begins among the parts of a task
 # Files of benchmarks that decide the bits of a network; others carry out, store and report.
 DECIDING = ("benchmarks/assets/", "benchmarks/tasks/training.py")
-MAKE = "python -m benchmarks.networks -o DIR trains it, --trained DIR takes it"
+MAKE = "benchmarks.run -o DIR trains it, --trained DIR takes it"
+PRESET = "quick"  # of the package's networks
 
 Parts = Mapping[str, str]  # name -> digest or version
 
@@ -141,3 +147,52 @@ def without_machine(parts: Parts) -> dict[str, str]:
 def _decides(part: tuple[str, str]) -> bool:
     name, _ = part
     return not name.startswith("benchmarks/") or name.startswith(DECIDING)
+
+
+def put_into_package(run: str | Path, package: Path = FOLDER) -> list[str]:
+    """Put the networks that a run has trained into the package, in place of those of the same names.
+
+    Args:
+        run: folder of a run of preset quick with the package's body, garments and motions.
+        package: where they are put.
+
+    Returns:
+        A line on each network: its name, and how its weights differ from those that were there.
+
+    Raises:
+        ValueError: the run is of another preset, or of other data.
+    """
+    from snug.motion.library import TRAIN
+    from snug.networks.trained_model import TrainedModel
+
+    folder = RunFolder(run)
+    config, lines = folder.read_config(), list[str]()
+    expected = {"preset": PRESET, "body": "of the package", "garment": "tailored", "pretrained": None}
+    for name, value in expected.items():
+        if config.get(name) != value:
+            raise ValueError(f"{run}: its {name} is {config.get(name)}; the package has networks of {value}")
+    for path in sorted(folder.models.rglob("*.safetensors")):
+        model = TrainedModel.load(path)
+        if model.origin["motions"] != list(TRAIN):
+            raise ValueError(f"{path}: learned from other motions than the library's")
+        if not model.steps:  # untrained
+            continue
+        name = network_name(model.origin["network"], model.origin["garment"], model.seed)
+        target = package / f"{name}{SUFFIX}"
+        lines.append(f"{target.stem}: {_compared(model, target)}")
+        with replacing(target) as unfinished:
+            shutil.copyfile(path, unfinished)
+    return lines
+
+
+def _compared(model: TrainedModel, packaged: Path) -> str:
+    """Return in words how the weights of a model differ from those in a file of the package."""
+    from snug.networks.trained_model import TrainedModel
+
+    if not packaged.is_file():
+        return "the package had none"
+    weights, other = (m.network.state_dict() for m in (model, TrainedModel.load(packaged)))
+    if weights.keys() != other.keys() or any(weights[n].shape != other[n].shape for n in weights):
+        return "the package's had another architecture"
+    largest = max(float((weights[name] - other[name]).abs().max()) for name in weights)
+    return f"differs from the package's by up to {largest:.2g}" if largest else "the bits of the package's"

@@ -1,6 +1,6 @@
 """Each deviation of the default recipe from the paper's text, measured on the validation motions.
 
-    python -m benchmarks.networks --methods 'snug,snug-paper,snug-without-*,snug-paper-with-*' -o nets
+    python -m benchmarks.run --methods 'snug,snug-paper,snug-without-*,snug-paper-with-*' -o nets
     python docs/notebook/deviations.py nets
 
 prints a line for each network in the folder: relative excess of its total energy [%], typical and on the

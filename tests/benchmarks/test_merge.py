@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from benchmarks import merge as command
 from benchmarks.fingerprint.digest import digest_of_file
-from benchmarks.merge import MergeError, joined_rows, of_machines
+from benchmarks.merge import MergeError, joined_rows, merge, of_machines
 from benchmarks.results.row import DECLARED, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -71,7 +70,7 @@ def folder(tmp_path):
     return made
 
 
-def test_seeds_of_two_machines_are_one_run(folder, tmp_path, capsys):
+def test_seeds_of_two_machines_are_one_run(folder, tmp_path):
     one = folder("one", [row("energy/total", 1.0), row("cost/frame", 2.0, "ms")], cells=("a", "b"))
     two = folder(
         "two", [row("energy/total", 3.0, seed=1, hardware="B"),
@@ -82,10 +81,9 @@ def test_seeds_of_two_machines_are_one_run(folder, tmp_path, capsys):
                  "tasks": {"training": {"snug seed 1 (tshirt)": {"seconds": 4.0}}}},
     )  # fmt: skip
     out = RunFolder(tmp_path / "both")
-    assert command.main([str(one), str(two), "-o", str(out.path)]) == 0
-    streams = capsys.readouterr()
-    assert "4 rows in" in streams.out and "1 times of other machines" in streams.err
+    written = merge([one, two], out.path)
     config, rows = out.read_config(), out.read_rows()
+    assert len(rows) == len(written) == 4
     assert config["seeds"] == [0, 1] and config["suites"] == ["garments", "speed"]
     assert list(config["methods"]) == ["snug", "pbns"] and "started" not in config
     assert config["finished"].startswith("2026-01-02") and len(config["test_looks"]) == 2
@@ -109,7 +107,7 @@ def test_energies_of_frames_are_those_of_all_runs(folder, tmp_path):
         config = RunFolder(run).read_config()
         config["digests"][path.name] = digest_of_file(path)
         RunFolder(run).write_config(config)
-    assert command.main([*map(str, runs), "-o", str(tmp_path / "both")]) == 0
+    merge(runs, tmp_path / "both")
     both = RunFolder(tmp_path / "both")
     assert both.frame_energies_path.read_text().splitlines() == [
         "scene,method,seed,seconds,strain,bending", "tshirt/kick,snug,0,0.1,1,", "tshirt/kick,snug,1,0.1,2,3",
@@ -122,12 +120,12 @@ def test_nobody_goes_on_in_a_merged_folder_or_merges_it_again(folder, tmp_path, 
     from benchmarks import run
 
     one, two = folder("one", [row("energy/total", 1.0)]), folder("two", [row("energy/total", 1.0)])
-    out = str(tmp_path / "both")
-    assert command.main([str(one), str(two), "-o", out]) == 0
-    assert run.main(["--dry-run", "-o", out]) == 2
+    out = tmp_path / "both"
+    merge([one, two], out)
+    assert run.main(["--dry-run", "-o", str(out)]) == 2
     assert "is merged of several runs" in capsys.readouterr().err
-    assert command.main([str(one), out, "-o", str(tmp_path / "more")]) == 2
-    assert "is merged already" in capsys.readouterr().err
+    with pytest.raises(MergeError, match="is merged already"):
+        merge([one, out], tmp_path / "more")
 
 
 @pytest.mark.parametrize(
@@ -144,22 +142,21 @@ def test_nobody_goes_on_in_a_merged_folder_or_merges_it_again(folder, tmp_path, 
         ({}, {"speed": 1}, None),
     ],
 )
-def test_runs_of_other_inputs_are_refused_by_name(folder, tmp_path, changes, inputs, message, capsys):
+def test_runs_of_other_inputs_are_refused_by_name(folder, tmp_path, changes, inputs, message):
     one = folder("one", [row("energy/total", 1.0)])
     two = folder("two", [row("energy/total", 1.0)], changes=changes, **inputs)
-    status = command.main([str(one), str(two), "-o", str(tmp_path / "both")])
     if message is None:
-        assert status == 0
+        merge([one, two], tmp_path / "both")
         return
-    error = capsys.readouterr().err
-    assert status == 2 and message in error and error.count("\n") == 1 and str(two) in error
+    with pytest.raises(MergeError, match=message) as refused:
+        merge([one, two], tmp_path / "both")
+    assert "\n" not in str(refused.value) and str(two) in str(refused.value)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "two"]
 
 
-def test_two_networks_of_one_name_are_refused(folder, tmp_path, capsys):
+def test_two_networks_of_one_name_are_refused(folder, tmp_path):
     """Processors of two kinds train two networks of one seed, and no row need tell."""
     folders = [folder(name, [row("energy/total", 1.0)]) for name in ("one", "two")]
-    arguments = [*map(str, folders), "-o", str(tmp_path / "both")]
 
     def trained(path: Path, weight: float, seconds: float) -> None:
         file = path / "models/snug.safetensors"
@@ -172,28 +169,25 @@ def test_two_networks_of_one_name_are_refused(folder, tmp_path, capsys):
 
     trained(folders[0], 1.0, seconds=5.0)
     trained(folders[1], 1.5, seconds=5.0)
-    assert command.main(arguments) == 2
-    assert "network snug seed 0: other weights in" in capsys.readouterr().err
+    with pytest.raises(MergeError, match="network snug seed 0: other weights in"):
+        merge(folders, tmp_path / "both")
     trained(folders[1], 1.0, seconds=6.0)
-    assert command.main(arguments) == 0
+    merge(folders, tmp_path / "both")
 
 
-def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path, monkeypatch, capsys):
+def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path, monkeypatch):
     one = folder("one", [row("energy/total", 1.0)])
     monkeypatch.setattr(
         "benchmarks.fingerprint.dependencies.code_of", lambda *_: {"benchmarks/results/json_file.py": "other"}
     )
     two = folder("two", [row("energy/total", 1.0, seed=1)], cells=("other",))
-    assert command.main([str(one), str(two), "-o", str(tmp_path / "both")]) == 2
-    error = capsys.readouterr().err
-    assert (
-        "cell other: another benchmarks/results/json_file.py in" in error
-        and "run both by the same code" in error
-    )
+    other = r"cell other: another benchmarks/results/json_file\.py in .*run both by the same code"
+    with pytest.raises(MergeError, match=other):
+        merge([one, two], tmp_path / "both")
 
 
 @pytest.mark.parametrize("what", ["file", "entry", "no cache", "twice", "no run", "taken", "outside"])
-def test_what_cannot_be_merged_is_named(folder, tmp_path, what, refused):
+def test_what_cannot_be_merged_is_named(folder, tmp_path, what):
     import shutil
 
     one, two = folder("one", [row("energy/total", 1.0)]), folder("two", [row("energy/total", 1.0)])
@@ -216,7 +210,8 @@ def test_what_cannot_be_merged_is_named(folder, tmp_path, what, refused):
         (tmp_path / "both").mkdir()
         (tmp_path / "both" / "letter").write_text("dear")
     names = [one, one] if what == "twice" else [one, tmp_path / "none"] if what == "no run" else names
-    refused(message, command.main, [*map(str, names), "-o", str(tmp_path / "both")])
+    with pytest.raises(ValueError, match=message):
+        merge(names, tmp_path / "both")
 
 
 def test_numbers_that_differ_are_refused_by_their_cell():

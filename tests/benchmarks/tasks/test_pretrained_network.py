@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,6 @@ import torch
 
 from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.networks import __main__ as command
-from benchmarks.networks import training_run
 from benchmarks.plan.make_plan import check_trained
 from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import Motions, Network, Plan, PlanError
@@ -22,14 +21,14 @@ from benchmarks.runner.console import remarks
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import described
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.tasks.pretrained_network import TakeNetwork, take_network, without_machine
+from benchmarks.tasks.pretrained_network import TakeNetwork, put_into_package, take_network, without_machine
 from benchmarks.tasks.task import Outcome
 from benchmarks.tasks.training import TrainNetwork
 from benchmarks.training import Training
 from snug import trained
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import PBNS
-from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, run_in_this_process
+from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene
 from tests.benchmarks.tasks.test_cell_tasks import TINY, plan_of
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -115,9 +114,7 @@ def test_other_code_packages_and_processors_are_said(made, tmp_path, part, diffe
 
 def test_what_is_no_network_of_ours_is_refused_in_one_line(made, tmp_path):
     task = training_of(plan_with(tmp_path, "pbns"))
-    assert "no pretrained network pbns-tshirt: python -m benchmarks.networks" in take_network(
-        task, tmp_path
-    ).skip({})
+    assert "no pretrained network pbns-tshirt: benchmarks.run -o DIR" in take_network(task, tmp_path).skip({})
     path = tmp_path / "pbns-tshirt.safetensors"
     path.write_bytes(b"half")
     assert "pbns-tshirt.safetensors: not a safetensors file" in take_network(task, tmp_path).refusal
@@ -179,37 +176,30 @@ def test_the_option_takes_the_package_or_a_folder(tmp_path):
         check_trained(Request(trained=tmp_path), tmp_path / "deeper" / "..")
 
 
-def test_the_command_trains_what_is_missing_and_compares_it_with_the_package(tmp_path, monkeypatch, capsys):
-    packaged = tmp_path / "packaged"
-    monkeypatch.setattr(training_run, "FOLDER", packaged)
-    run_in_this_process(monkeypatch)
-    monkeypatch.setattr(Plan, "open_assets", lambda plan: assets_of(tube_dress(), WALK))
-    requests = []
-
-    def planned(request):
-        requests.append(request)
-        return plan_with(request.folder, *request.methods)
-
-    monkeypatch.setattr(command, "make_plan", planned)
-    options = ["--methods", "pbns", "-o", str(tmp_path / "nets")]
-    assert command.main([*options, "--into-package"]) == 0
-    assert "the package has none" in capsys.readouterr().out
-    assert set(requests[0].only) == {"failed", "stale", "missing"}
-    first = (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes()
-    assert (packaged / "pbns-tshirt.safetensors").read_bytes() == first
-    assert command.main(options) == 0  # nothing to do
-    assert (tmp_path / "nets/models/pbns-seed0.safetensors").read_bytes() == first
-    assert "the bits of the package's" in capsys.readouterr().out
-    model = TrainedModel.load(packaged / "pbns-tshirt.safetensors")
+def test_networks_of_a_run_become_those_of_the_package(made, tmp_path, monkeypatch):
+    package = tmp_path / "package"
+    package.mkdir()
+    run = RunFolder(shutil.copytree(made[0], tmp_path / "run"))
+    config = {"preset": "quick", "body": "of the package", "garment": "tailored", "pretrained": None}
+    run.write_config(config)
+    monkeypatch.setattr("snug.motion.library.TRAIN", ("walk",))
+    assert put_into_package(run.path, package) == ["pbns-tshirt: the package had none"]
+    file = package / "pbns-tshirt.safetensors"
+    assert file.read_bytes() == (run.models / "pbns-seed0.safetensors").read_bytes()
+    assert put_into_package(run.path, package) == ["pbns-tshirt: the bits of the package's"]
+    model = TrainedModel.load(file)
     model.network.offsets.weight.data += 0.5
-    model.save(packaged / "pbns-tshirt.safetensors")
-    assert command.main(options) == 0
-    assert "differs from the package's by up to 0.5" in capsys.readouterr().out
-    assert command.main([*options, "--preset", "smoke", "--into-package"]) == 2
-    assert "networks of preset quick" in capsys.readouterr().err
-    assert command.main([*options, "--motions", "library", "--into-package"]) == 2
-    assert command.main([*options, "--validation-motions", "05_04", "--into-package"]) == 2
-    assert "its own body, garments and motions" in capsys.readouterr().err
+    model.save(file)
+    assert "differs from the package's by up to 0.5" in put_into_package(run.path, package)[0]
+    before = file.read_bytes()
+    monkeypatch.setattr("snug.motion.library.TRAIN", ("walk", "kick"))
+    with pytest.raises(ValueError, match="learned from other motions"):
+        put_into_package(run.path, package)
+    for name, other in {"preset": "smoke", "body": ["mine.npz", "1"], "garment": ["cape.obj", {}]}.items():
+        run.write_config(config | {name: other})
+        with pytest.raises(ValueError, match=f"its {name} is "):
+            put_into_package(run.path, package)
+    assert file.read_bytes() == before
 
 
 def test_parts_of_simulations_do_not_depend_on_the_machine():

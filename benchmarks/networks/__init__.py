@@ -1,1 +1,0 @@
-"""The command python -m benchmarks.networks: trainings of a run without its measurements."""
