@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import Delaunay
 
 from reference_sim.geometry.topology import half_edges
 
@@ -23,6 +22,8 @@ def jittered_patch(cells: int) -> tuple[np.ndarray, np.ndarray]:
 
 def delaunay_faces(points: np.ndarray) -> np.ndarray:
     """Return Delaunay triangles (F,3) of points (V,2), counter-clockwise, without flat ones on borders."""
+    from scipy.spatial import Delaunay
+
     faces = Delaunay(points).simplices.astype(np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
     signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]

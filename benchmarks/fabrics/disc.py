@@ -3,7 +3,7 @@
     DC = 100 (area of the shadow - plate) / (specimen - plate)   [%]
 
 Only the ring that overhangs is meshed, by triangles that the map r = exp keeps equilateral: there hinges are
-an isotropic plate of stiffness k/4 and Poisson's ratio -1/3 (see validation.bending.plates).
+an isotropic plate of stiffness k/4 and Poisson's ratio -1/3 (see validation.shells.plates).
 """
 
 from __future__ import annotations

@@ -227,23 +227,37 @@ def _files_behind(base: str, name: str, importer: str, top: str) -> Iterator[str
     """Yield the files below the folder `top` that `from base import name` needs.
 
     A package that has the name neither as a module nor in its own text loads it on first use. Then the module
-    counts that its stub names, else that of its modules which defines the name, else all of them.
+    counts that its stub names, else that of its modules which defines the name, else all of them. Of a
+    package that loads names on first use and is imported as a whole, all modules count.
     """
     path, inner = _file_of(base, top), _file_of(f"{base}.{name}", top) if name else None
     if path is None or not name or not path.endswith("/__init__.py"):
-        yield from filter(None, [inner or path])
+        yield from _whole(inner or path)
     elif name in _exported(path):
         yield path
         yield from _files_behind(_exported(path)[name], name, importer, top)
     elif inner and (path == importer or name not in _names(path).bound):
-        yield inner
+        yield from _whole(inner)
     else:
         yield path
         if name not in _names(path).bound:
-            folder = (ROOT / path).parent
-            files = sorted(p for p in folder.rglob("*.py") if p.name != "__init__.py")
-            modules = [f"{path.rpartition('/')[0]}/{file.relative_to(folder).as_posix()}" for file in files]
+            modules = _modules_of(path)
             yield from [module for module in modules if name in _names(module).defined] or modules
+
+
+def _whole(path: str | None) -> list[str]:
+    """Return the file, and all modules of a package that loads names on first use."""
+    if path is None:
+        return []
+    lazy = path.endswith("/__init__.py") and "__getattr__" in _names(path).defined
+    return [path, *(_modules_of(path) if lazy else ())]
+
+
+def _modules_of(package: str) -> list[str]:
+    """Return the modules in the folder of a package's `__init__.py`, and in those below it."""
+    folder = (ROOT / package).parent
+    files = sorted(p for p in folder.rglob("*.py") if p.name != "__init__.py")
+    return [f"{package.rpartition('/')[0]}/{file.relative_to(folder).as_posix()}" for file in files]
 
 
 @cache

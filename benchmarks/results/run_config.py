@@ -46,10 +46,6 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and abs(value) < MOST_SECONDS
 
 
-def _is_point(value: Any) -> bool:
-    return not value or (isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)))
-
-
 _EXPECTED: dict[str, tuple[Any, str]] = {
     "metrics": (
         {...: dict.fromkeys(("title", "definition", "table", "unit"), _is_text)},
@@ -57,10 +53,7 @@ _EXPECTED: dict[str, tuple[Any, str]] = {
     ),
     "methods": ({...: {"label": _is_text}}, "method -> what it declares"),
     "scenes": ({...: {}}, "scene -> what it declares"),
-    "cases": (
-        {...: {"scene": _is_text, "metric": _is_text, "map_point": _is_point}},
-        "case -> what it declares",
-    ),
+    "cases": ({...: {"scene": _is_text, "metric": _is_text}}, "case -> what it declares"),
     "digests": ({...: _is_text}, "file -> digest"),
     "stages": ([{"name": _is_name, "seconds": _is_number}], "a list of names and seconds"),
     "earlier": ([lambda value: True], "a list of earlier runs"),

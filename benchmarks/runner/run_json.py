@@ -208,7 +208,7 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     cases = {
         case.name: {
             "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
-            "metric": case.metric, "map_point": case.map_point,
+            "metric": case.metric,
         }
         for case in plan.cases
     }  # fmt: skip

@@ -1,15 +1,13 @@
-"""Validation: known answers and stress tests. Each room declares its cases; registry.py lists them.
+"""Validation: known answers and extreme steps. registry.py lists the modules whose functions declare them.
 
-| room | known answers |
+| where | known answers |
 | --- | --- |
-| membrane, bending | closed forms, scikit-fem, plates, the elastica, buckling |
-| contact, friction | planes, spheres, drums, slopes, belts |
-| dynamics | discrete laws of backward Euler, orders in dt, dependence on mesh and time step |
-| curvature | the curvature metric on known surfaces |
-| fabric | textile tests: the master curve, bending lengths and drape, of suite fabric |
-| engines | laws that any engine owes, and its distance from its own limit, of suite engines |
-| solvers | derivatives of all terms but friction and IPC's barrier, properties of the minimisers |
-| stress | single steps that converge truly or fail and say so |
+| shells | membrane and hinges: closed forms, scikit-fem, plates, large bending |
+| motion | contact, friction, laws of backward Euler, orders in dt |
+| known_surfaces | the curvature metric |
+| derivatives, minimisers | derivatives of all terms but friction and IPC's barrier; the minimisers |
+| extreme_steps | single steps that converge truly or fail and say so |
+| fabric, engines | textile tests of suite fabric; laws that any engine owes, of suite engines |
 
 >>> from benchmarks.validation import CASES
 >>> next(case for case in CASES if case.name == "membrane_pull").run().status

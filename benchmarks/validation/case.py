@@ -1,19 +1,30 @@
-"""Case: one row whose answer is known before anything is computed, or whose failure has to be reported."""
+"""Case: one row whose answer is known before anything is computed, or whose failure has to be reported.
+
+A known answer stands on the function that measures it:
+
+    @known_answer(expected=6.0, tolerance=0.0, reason="three translations and three rotations, no other")
+    def rigid_zero_modes() -> float: ...
+
+A module of cases is imported to list them, so it loads what it measures with where it is used: inside its
+functions, or by names of the faces `reference_sim` and `reference_sim.energies`, which load on first use.
+"""
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import math
 import warnings
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from benchmarks.results.row import Row
 
 METHOD = "simulation"
-RELATIVE_RESIDUAL = 1e-6  # of a stress step: largest gradient component over the mean weight of a vertex
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +42,8 @@ class Case:
     """Declaration of one row: function, expected value and tolerance. `reason` defends the tolerance.
 
     `function` of `module`, called with `options`, returns a number, (measured, expected) where the reference
-    has to be solved first, or a Measurement. A number without a tolerance is reported, not judged.
+    has to be solved first, a Measurement, or any of these by name of the case. A number without a tolerance
+    is reported, not judged.
 
     Attributes:
         name: unique over all cases, and the row's scene unless `scene` is given.
@@ -39,7 +51,6 @@ class Case:
         smoke: whether the smallest preset runs it.
         long: whether it is left out where no suite is named.
         seconds: after which the case's process is ended; None: never.
-        map_point: (factor on the stiffness, time step [s]) of a point of a stability map, which its scene is.
         method: of its row.
         process: where it has a name, the case is timed: it runs alone on the machine, in the process of this
             name, after others of this name.
@@ -60,7 +71,6 @@ class Case:
     smoke: bool = False
     long: bool = False
     seconds: float | None = None
-    map_point: tuple[float, float] | None = None
     method: str = METHOD
     process: str = ""
 
@@ -69,6 +79,8 @@ class Case:
         try:
             with slow_paths_allowed():
                 measured = self._imported(self.function)(**self.options)
+            if isinstance(measured, Mapping):
+                measured = measured[self.name]
             if isinstance(measured, Measurement):
                 return self.row(measured.value, measured.status, measured.reason, terms=measured.terms)
             value, expected = measured if isinstance(measured, tuple) else (measured, self.expected)
@@ -123,6 +135,40 @@ class Case:
         return getattr(importlib.import_module(self.module), *name_and_default)
 
 
+_declared: dict[str, list[Case]] = defaultdict(list)  # by module
+
+
+def known_answer(
+    cases: Sequence[str] | Mapping[str, Mapping[str, Any]] = (), /, *, smoke: bool = True, **declared: Any
+) -> Callable[[Function], Function]:
+    """Declare a function as one or more cases: their names, or name -> options of the function.
+
+    Without names the case has the function's; for several cases at once it returns name -> number. What its
+    docstring says that it returns describes the case. declared: further fields of Case.
+    """
+
+    def declare(function: Function) -> Function:
+        sentence = (inspect.getdoc(function) or "").partition("\n\n")[0].removeprefix("Return the ")
+        named = cases if isinstance(cases, Mapping) else {name: {} for name in cases}
+        for name, options in (named or {function.__name__: {}}).items():
+            values = ", ".join(f"{option} = {value}" for option, value in options.items())
+            description = f"{sentence.rstrip('.')}: {values}".removesuffix(": ")
+            case = Case(
+                name=name, description=description, module=function.__module__, function=function.__name__,
+                options=dict(options), smoke=smoke, **declared,
+            )  # fmt: skip
+            _declared[function.__module__].append(case)
+        return function
+
+    return declare
+
+
+def cases_of(module: str) -> tuple[Case, ...]:
+    """Import a module and return the cases that its functions declare."""
+    importlib.import_module(module)
+    return tuple(_declared[module])
+
+
 @contextmanager
 def slow_paths_allowed() -> Iterator[None]:
     """Say nothing of terms without a fast kernel: a case is not timed."""
@@ -131,15 +177,3 @@ def slow_paths_allowed() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SlowPathWarning)
         yield
-
-
-def known_answer(
-    name: str, description: str, module: str, function: str, *, smoke: bool = True, **declared: Any
-) -> Case:
-    """Return a case of suite validation, measured by `function` of benchmarks.validation.<module>.
-
-    >>> known_answer("one", "a number", "membrane.closed_forms", "zero_modes", expected=6.0).suite
-    'validation'
-    """
-    module = f"benchmarks.validation.{module}"
-    return Case(name=name, description=description, module=module, function=function, smoke=smoke, **declared)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from reference_sim.minimise.result import Result
-from reference_sim.trajectory import Trajectory
+if TYPE_CHECKING:
+    import reference_sim as sim
 
-Solved = TypeVar("Solved", Result, Trajectory)
+Solved = TypeVar("Solved", "sim.Result", "sim.Trajectory")
 
 
 def demand_converged(solved: Solved, name: str) -> Solved:

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy
+import reference_sim as sim
+from reference_sim import energies
 
 if TYPE_CHECKING:
     from torch import Tensor
 
 
-class DeadLoad(Energy):
+class DeadLoad(energies.Energy):
     """Dead load of each vertex, E = -f . x with constant forces f (V, 3) [N]."""
 
     name = "load"
 
-    def __init__(self, cloth: Cloth, forces: np.ndarray) -> None:
+    def __init__(self, cloth: sim.Cloth, forces: np.ndarray) -> None:
         self.cloth = cloth
         self.stencils = np.arange(cloth.vertex_count)[:, None]
         self.forces = forces

@@ -18,7 +18,6 @@ from reports.figures.figure import Figure
 from reports.figures.hem import hem
 from reports.figures.histograms import histograms
 from reports.figures.known_answers import known_answers
-from reports.figures.stability_maps import stability_maps
 from reports.figures.training_curves import training_curves
 from reports.pictures.colour_maps import colour_maps
 from reports.pictures.failures import failures
@@ -76,7 +75,6 @@ BLOCKS: tuple[Block, ...] = (
     Figure("known_answers", known_answers),
     TableBlock("validation", printed=failed_checks),
     Heading("Stress"),
-    Figure("stability_maps", stability_maps),
     TableBlock("extremes", printed=not_converged),
     Heading("Training"),
     TableBlock("trainings"),

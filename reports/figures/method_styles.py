@@ -12,14 +12,6 @@ from dataclasses import dataclass, replace
 
 from reports.run.finished_run import Method, Run
 
-STATUS_COLOURS = {
-    "stalled": "#E69F00",
-    "timeout": "#CC79A7",
-    "out-of-memory": "#882255",
-    "diverged": "#D55E00",
-    "failed": "#8B2C00",
-    "skipped": "#B8B8B8",
-}
 Line = str | tuple[float, tuple[float, ...]]  # matplotlib's: a name, or an offset and the dashes [points]
 
 

@@ -38,16 +38,9 @@ def tolerances_away(row: Any) -> float | None:
 
 
 def stress_tests(run: Run) -> pd.DataFrame:
-    """Return the rows of single cases of suite extremes."""
+    """Return the rows of the cases of suite extremes."""
     rows = run.suite("extremes")
-    return rows[(rows["case"] != "") & ~rows["case"].isin(map_points(run)) & (rows["status"] != "skipped")]
-
-
-def map_points(run: Run) -> dict[str, tuple[float, float]]:
-    """Return case -> factor on the stiffness and time step [s], of the cases of stability maps."""
-    cases = run.config.get("cases") or {}
-    points = {name: case.get("map_point") for name, case in cases.items()}
-    return {name: (float(point[0]), float(point[1])) for name, point in points.items() if point}
+    return rows[(rows["case"] != "") & (rows["status"] != "skipped")]
 
 
 def counted(run: Run) -> dict[str, Counter[str]]:

@@ -48,7 +48,7 @@ def _result(row: Any) -> str:
 
 
 def extremes(run: Run) -> list[Table]:
-    """List the stress tests and how each ended; points of stability maps stand in a figure."""
+    """List the stress tests and how each ended."""
     rows = stress_tests(run)
     lines = [(r.scene, r.method, "converged" if r.status == "ok" else r.status, r.value, r.reason)
         for r in rows.itertuples()]  # fmt: skip

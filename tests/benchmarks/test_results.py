@@ -114,7 +114,7 @@ def test_an_absent_or_broken_config_is_named(tmp_path):
         ('{"format": 4, "seeds": ' + "9" * 5000 + "}", "not readable as JSON"),
         ('{"format": 4, "metrics": []}', "'metrics' should be metric -> what it declares"),
         ('{"format": 4, "metrics": {"a": {"title": 3}}}', "'metrics' should be"),
-        ('{"format": 4, "cases": {"a": {"map_point": ["x"]}}}', "'cases' should be"),
+        ('{"format": 4, "cases": {"a": {"metric": ["x"]}}}', "'cases' should be"),
         ('{"format": 4, "stages": [{"name": "a", "seconds": Infinity}]}', "'stages' should be"),
         ('{"format": 4, "digests": {"a": 1}}', "'digests' should be file -> digest"),
         ('{"format": 4, "earlier": 1}', "'earlier' should be a list"),

@@ -19,8 +19,7 @@ from benchmarks.plan.request import Request
 from benchmarks.plan.suites import SUITES, Extent
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.validation.registry import KNOWN_ANSWERS
-from benchmarks.validation.stress.cases import MAPS, STEPS
+from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from reference_sim.files.array_file import array_names
 from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
 
@@ -40,8 +39,7 @@ def test_the_help_names_every_exit_status(capsys):
 def test_the_list_names_everything(capsys):
     assert run.main(["--list"]) == 0
     listing = capsys.readouterr().out
-    names = [m.name for m in METHODS] + [c.name for c in KNOWN_ANSWERS]
-    names += [c.name for c in STEPS] + [f"{name}/*" for name in MAPS]
+    names = [m.name for m in METHODS] + [c.name for c in (*KNOWN_ANSWERS, *STRESS_TESTS)]
     for name in [*names, "tshirt/", "garments", "paper", "walk"]:
         assert name in listing
 

@@ -28,10 +28,10 @@ from numpy.polynomial import legendre
 from scipy.linalg import eigh
 
 from benchmarks.meshes import ROW, in_space, rectangle
-from benchmarks.validation.bending.lateral_buckling import MATERIAL, ROWS, K, buckling_factor
-from benchmarks.validation.bending.plates import NU
 from benchmarks.validation.convergence import demand_converged
 from benchmarks.validation.dead_load import DeadLoad
+from benchmarks.validation.shells.lateral_buckling import MATERIAL, ROWS, K, buckling_factor
+from benchmarks.validation.shells.plates import NU
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.stretch_stvk import StretchStVK

@@ -6,21 +6,23 @@ from collections.abc import Sequence
 from typing import Any
 
 from benchmarks.fabrics.fabric import FABRICS, Fabric, find_fabric
-from benchmarks.validation.case import Case, known_answer
+from benchmarks.validation.case import Case
 
 GAMMAS = tuple(round(10 ** (power / 2), 2) for power in range(-2, 7))  # four decades
 COLUMNS = (80, 160, 320)
 
 
 def _case(name: str, description: str, module: str, function: str, **declared: Any) -> Case:
-    declared = {"suite": "fabric", "smoke": False, **declared}
-    return known_answer(name, description, module, function, **declared)
+    module = f"benchmarks.validation.{module}"
+    return Case(
+        name=name, suite="fabric", description=description, module=module, function=function, **declared
+    )
 
 
 MASTER_CURVE = tuple(
     _case(f"master_curve_{gamma:g}_{columns}",
         f"height over width of a cantilever at Gamma = {gamma:g}, {columns} cells, over the elastica's",
-        "bending.elastica", "slenderness", options={"gamma": gamma, "columns": columns}, expected=1.0,
+        "shells.elastica", "slenderness", options={"gamma": gamma, "columns": columns}, expected=1.0,
         tolerance=0.01, reason="the aim; what is left falls with the square of the cell",
         smoke=(gamma, columns) == (GAMMAS[4], COLUMNS[0]))
     for gamma in GAMMAS
@@ -43,7 +45,7 @@ CANTILEVER = (
     ),
     _case("lateral_buckling_own_weight",
         "weight at which a strip on edge buckles sideways, over 12.85 (EI GJ)^0.5 / L^2",
-        "bending.lateral_buckling", "critical_load", options={"where": "weight", "slender": 0.02},
+        "shells.lateral_buckling", "critical_load", options={"where": "weight", "slender": 0.02},
         expected=1.0, tolerance=0.03, reason="the clamp holds back warping over a width, 2 % of the length"),
 )  # fmt: skip
 

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.integrate import solve_bvp
 
 from benchmarks.fabrics.strip import FAMILY, clamped_strip
-from benchmarks.validation.bending.elastica import MATERIAL
 from benchmarks.validation.convergence import demand_converged
+from benchmarks.validation.shells.elastica import MATERIAL
 from reference_sim.energies.bend_hinge import BendHinge, dihedral_angles
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK

@@ -21,9 +21,9 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
 from benchmarks.fabrics.strip import FAMILY, Strip, clamped_strip
-from benchmarks.validation.bending.elastica import MATERIAL
-from benchmarks.validation.contact.plane import box
 from benchmarks.validation.convergence import demand_converged
+from benchmarks.validation.motion.resting_sheet import box
+from benchmarks.validation.shells.elastica import MATERIAL
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_friction import ContactFriction
 from reference_sim.energies.contact_penalty import ContactPenalty

@@ -88,16 +88,12 @@ def test_every_case_has_an_identity_of_its_own(tmp_path):
     assert len({RunFolder(tmp_path).cache / f"{task.name}.json" for task in tasks}) == len(CASES)
 
 
-def test_a_stress_test_depends_on_how_it_is_checked_and_on_the_body_that_it_reads_but_not_on_the_others(
-    tmp_path,
-):
+def test_a_stress_test_depends_on_how_it_is_checked_and_on_energies_but_on_no_list_and_no_body(tmp_path):
     from benchmarks.runner.cache import dependencies
 
-    tasks = {task.name: dependencies(task) for task in tasks_of(plan_of(tmp_path, cases=STRESS_TESTS))}
-    for files in tasks.values():
-        assert {"benchmarks/validation/case.py", "benchmarks/validation/solvers/convergence_check.py"} < set(
-            files
-        )
-        assert "benchmarks/validation/stress/cases.py" not in files
-        assert not any(name.startswith("reports/") for name in files)
-    assert "snug/data/body.npz" in tasks["shirt_step"] and "snug/data/body.npz" not in tasks["twisted"]
+    (task,) = tasks_of(plan_of(tmp_path, cases=STRESS_TESTS[:1]))
+    files, rooms = dependencies(task), ("benchmarks/validation", "reference_sim")
+    checked = {f"{rooms[0]}/case.py", f"{rooms[0]}/convergence_check.py", f"{rooms[0]}/extreme_steps.py"}
+    assert checked | {f"{rooms[1]}/energies/inertia.py", f"{rooms[1]}/minimise/newton.py"} < set(files)
+    assert "benchmarks/validation/registry.py" not in files and "snug/data/body.npz" not in files
+    assert not any(name.startswith(("reports/", "snug/networks")) for name in files)

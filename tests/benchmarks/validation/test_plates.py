@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import rectangle
-from benchmarks.validation.bending.gaussian_curvature import GaussianCurvature
-from benchmarks.validation.bending.plates import NU, hinges, patch_energy
-from benchmarks.validation.bending.slit_annulus import INNER, OUTER, annulus
+from benchmarks.validation.shells.gaussian_curvature import GaussianCurvature
+from benchmarks.validation.shells.plates import NU, hinges, patch_energy
+from benchmarks.validation.shells.slit_annulus import INNER, OUTER, annulus
 from reference_sim.cloth import Cloth
 from reference_sim.geometry.topology import corner_angles
 from reference_sim.material import Material

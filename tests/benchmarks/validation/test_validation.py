@@ -11,19 +11,17 @@ import pytest
 from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.plan import Motions
 from benchmarks.presets import find_preset
-from benchmarks.validation.case import Case
+from benchmarks.validation.case import Case, cases_of, known_answer
 from benchmarks.validation.convergence import fitted_order
-from benchmarks.validation.dynamics.time_steps import VISCOSITY, Viscosity, halving_order
+from benchmarks.validation.motion.time_step_orders import VISCOSITY, Viscosity, halving_order
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import Step
 
 
 def marked(case):
-    """A case for the tests; those of the slit plate take half a minute, reported ones have a judged twin."""
-    reported = case.tolerance is None and case.name.startswith(("plate_morley", "hanging_sheet"))
-    marks = [pytest.mark.slow] if reported or case.name.startswith("slit_annulus") else []
-    return pytest.param(case, id=case.name, marks=marks)
+    """A case for the tests: those of the smallest preset by default, the others as slow tests."""
+    return pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow])
 
 
 @pytest.mark.parametrize("case", [marked(case) for case in KNOWN_ANSWERS])
@@ -40,9 +38,10 @@ def test_there_are_enough_of_every_kind():
     assert len(judged) >= 40
     assert sum(name.endswith("_order") for name in names) >= 9
     assert all(case.reason for case in KNOWN_ANSWERS)
-    # A number is judged against a number: declared, or solved by the check itself.
+    # A number is judged against a number: declared, or given by the check itself.
     modules = {case.module.rpartition(".")[2] for case in judged if case.expected is None}
-    assert modules <= {"closed_forms", "oscillators", "hanging_strip", "clamped_stretch"}
+    exact = {"membrane", "oscillators", "hanging_strip", "clamped_stretch", "plates", "slit_annulus"}
+    assert modules == exact
 
 
 def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
@@ -72,12 +71,12 @@ def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
     ],
 )
 def test_how_a_number_is_judged(monkeypatch, number, expected, tolerance, status):
-    from benchmarks.validation.curvature import known_surfaces
+    from benchmarks.validation import known_surfaces
 
-    monkeypatch.setattr(known_surfaces, "torus_order", lambda: number)
+    monkeypatch.setattr(known_surfaces, "curvature_torus_order", lambda: number)
     case = Case(
         name="planted", description="", reason="planted", module=known_surfaces.__name__,
-        function="torus_order",
+        function="curvature_torus_order",
         expected=expected, tolerance=tolerance,
     )  # fmt: skip
     row = case.run()
@@ -87,6 +86,28 @@ def test_how_a_number_is_judged(monkeypatch, number, expected, tolerance, status
         assert (row.value, row.expected) == number
     broken = dataclasses.replace(case, function="nothing").run()
     assert broken.status == "failed" and "nothing" in broken.reason
+
+
+@known_answer(["planted_sum", "planted_exact"], tolerance=0.5, reason="planted")
+@known_answer({"planted_option": {"sign": -1.0}}, smoke=False, expected=3.0, reason="planted")
+def two_at_once(sign: float = 1.0) -> dict[str, object]:
+    """Return the planted numbers of several cases.
+
+    Not described by this.
+    """
+    return {"planted_sum": (sign, 1.2), "planted_exact": 2.0, "planted_option": 2.0 + sign}
+
+
+def test_a_declaration_stands_on_its_function():
+    cases = {case.name: case for case in cases_of(__name__)}
+    assert list(cases) == ["planted_option", "planted_sum", "planted_exact"]
+    assert [case.smoke for case in cases.values()] == [False, True, True]
+    assert cases["planted_sum"].description == "planted numbers of several cases"
+    assert cases["planted_option"].description == "planted numbers of several cases: sign = -1.0"
+    rows = {name: case.run() for name, case in cases.items()}
+    found = {name: (row.value, row.expected, row.status) for name, row in rows.items()}
+    assert found["planted_sum"] == (1.0, 1.2, "ok") and found["planted_option"] == (1.0, 3.0, "ok")
+    assert found["planted_exact"] == (2.0, None, "failed")  # a tolerance, but nothing to compare with
 
 
 def test_order_is_the_slope():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.figures import hem, histograms, known_answers, method_styles, stability_maps
+from reports.figures import hem, histograms, known_answers, method_styles
 from reports.figures.chosen_roll_outs import SceneRollOuts
 from reports.figures.dots import dots
 from reports.figures.plotting import file_name, printable
@@ -12,7 +12,6 @@ from reports.figures.training_curves import training_curves
 from reports.run import reading
 from reports.run.finished_run import shown_seeds
 from reports.run.reading import read_run_with_trainings
-from reports.statistics.outcomes import map_points, stress_tests
 from tests.reports.report_folder import FRAMES, mesh, row, run_folder, run_of, sheet, write_model
 
 
@@ -132,35 +131,6 @@ def test_every_garment_has_its_training_curves(tmp_path):
     drawings = list(training_curves(read_run_with_trainings(folder)))
     assert [drawing.name for drawing in drawings] == ["training", "training_tunic"]
     assert [drawing.caption.partition(":")[0] for drawing in drawings] == ["tshirt", "tunic"]
-
-
-def point(stiffness: float, dt: float, status="ok"):
-    more = {"suite": "extremes", "metric": "map", "unit": "iterations", "status": status}
-    value = 3.0 if status == "ok" else None
-    return row("map_sheet", "simulation", value=value, **{**more, "metric": f"map/{stiffness:g}/{dt:.3g}"})
-
-
-def test_a_map_of_every_outcome_is_drawn_from_what_its_cases_declare():
-    statuses = ("ok", "stalled", "failed", "timeout", "diverged")
-    rows, cases = [], {}
-    for k, status in enumerate(statuses):
-        for dt in (1e-4, 1 / 30):
-            rows.append(point(10.0**k, dt, status))
-            cases[f"case {len(rows)}"] = {
-                "suite": "extremes", "scene": "map_sheet", "metric": rows[-1].metric,
-                "map_point": [10.0**k, dt],
-            }  # fmt: skip
-    other = row("another", "simulation", "outcome", 1.0, suite="extremes")
-    cases["another"] = {"suite": "extremes", "map_point": None}
-    run = run_of([*rows, other], cases=cases)
-    assert set(map_points(run).values()) >= {(1.0, 1e-4), (1e4, 1 / 30)} and len(map_points(run)) == 10
-    assert list(stress_tests(run)["scene"]) == ["another"]
-    (drawing,) = stability_maps.stability_maps(run)
-    (axes,) = drawing.canvas.axes
-    assert len(axes.patches) == len(rows) and axes.get_title() == "map sheet"
-    assert list(stability_maps.stability_maps(run_of([other], cases=cases))) == []
-    blues = [stability_maps.shade(n)[0] for n in (1.0, 2.0, 20.0, 300.0, 1e6)]
-    assert blues == sorted(blues, reverse=True) and blues[0] == blues[1] and blues[3] == blues[4]
 
 
 def test_a_dot_stands_for_each_motion_and_seed():

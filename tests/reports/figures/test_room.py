@@ -90,27 +90,14 @@ def rows_of_all():
     for k in range(60):
         more = {"suite": "validation", "expected": 0.0, "tolerance": 1.0}
         rows.append(row(f"case {k}", "simulation", "check", 0.01 * k, **more))
-    for scene, factor, dt in itertools.product(MAPS, 10.0 ** np.arange(9), STEPS):
-        status = {"status": "stalled"} if dt > 0.1 else {}
-        metric = f"map/{factor:g}/{dt:g}"
-        rows.append(row(scene, "simulation", metric, None if status else 12.0, suite="extremes", **status))
     return rows
-
-
-MAPS, STEPS = ("sheared_sheet", "map_sheet"), (1e-4, 1e-3, 1e-2, 1 / 30, 0.1, 0.3)
 
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    points = {
-        f"{scene} {factor:g} {dt:g}": {
-            "suite": "extremes", "scene": scene, "metric": f"map/{factor:g}/{dt:g}", "map_point": [factor, dt]
-        }
-        for scene, factor, dt in itertools.product(MAPS, 10.0 ** np.arange(9), STEPS)
-    }  # fmt: skip
     checks = {f"case {k}": {"suite": "validation", "scene": f"case {k}"} for k in range(60)}
     labels = {name: {"label": LABELS.get(name, name.replace("-", " ").capitalize())} for name in ROLES}
-    run = run_of(rows_of_all(), cases=checks | points, methods=labels)
+    run = run_of(rows_of_all(), cases=checks, methods=labels)
     lines = [
         (SCENES[0], method, 0, k / 30, *(0.01 * (2 + place + np.sin(k / 5 + place)) for _ in range(3)))
         for place, method in enumerate(ROLES)

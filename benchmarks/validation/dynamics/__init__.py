@@ -1,1 +1,0 @@
-"""Known answers: backward Euler against its discrete laws, and orders in dt. `cases.py` declares them."""

@@ -1,1 +1,0 @@
-"""Known answers: Coulomb friction on planes and drums. `cases.py` declares them."""

@@ -1,1 +1,0 @@
-"""Known answers: the membrane against closed forms and scikit-fem. `cases.py` declares them."""

@@ -1,0 +1,153 @@
+"""Properties of a minimiser: one step on a quadratic, order two near the end, no rise, no saddle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import reference_sim as sim
+from benchmarks.meshes import in_space, jittered_patch, lying, right_grid
+from benchmarks.validation.case import known_answer
+from benchmarks.validation.convergence import demand_converged, fitted_order
+from reference_sim import energies
+
+LBFGS_STEPS = 60
+TWO_CYCLE = 1.0886617668
+
+
+@known_answer(expected=2.0, tolerance=0.0, reason="Newton's method ends a quadratic in one step")
+def newton_quadratic() -> float:
+    """Return the factorisations for inertia and weight alone: one to step, one to confirm the minimum."""
+    cloth = _patch(5)
+    inertia = energies.Inertia(cloth, 1 / 30)
+    inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.1, cloth.rest_positions.shape)
+    result = demand_converged(
+        sim.minimise(sim.Potential([inertia, energies.Gravity(cloth)]), cloth.rest_positions), "the minimiser"
+    )
+    return float(result.factorisations)
+
+
+@known_answer(expected=2.0, tolerance=0.4, reason="three steps are left between 1e-3 m and round-off")
+def newton_order() -> float:
+    """Return the order of the last steps of Newton's method: slope of log error over log error before."""
+    potential, start = _stretched()
+    end = demand_converged(sim.minimise(potential, start, tolerance=1e-13), "the minimiser").positions
+    errors = [
+        float(np.abs(sim.minimise(potential, start, max_iterations=k, tolerance=1e-13).positions - end).max())
+        for k in range(1, 12)
+    ]
+    near = [k for k in range(len(errors) - 1) if errors[k] < 1e-3 and errors[k + 1] > 1e-15]
+    return fitted_order([errors[k + 1] for k in near], [errors[k] for k in near])
+
+
+@known_answer(expected=0.0, tolerance=1e-12, reason="round-off of the energy")
+def newton_never_rises() -> float:
+    """Return the largest rise of the energy from one kept point to the next, over the first energy.
+
+    From random places; and from the edge of a two-cycle: for log cosh y, Newton's method goes from y to
+    y - sinh y cosh y, which is -y at TWO_CYCLE. A little further out every full step rises a little.
+    """
+    cloth = _patch(2)
+    start = np.full(cloth.rest_positions.shape, TWO_CYCLE + 1e-6)
+    return max(_rise(*_crumpled(), 25), _rise(sim.Potential([LogCosh(cloth)]), start, 3))
+
+
+def _rise(potential: sim.Potential, start: np.ndarray, steps: int) -> float:
+    values = [potential.value(start)]
+    for k in range(1, steps):
+        values.append(sim.minimise(potential, start, max_iterations=k).energy)
+    return float(max(np.diff(values).max(), 0.0) / abs(values[0]))
+
+
+class LogCosh(energies.Energy):
+    """Sum of log cosh of every coordinate: convex, and too flat outside for full Newton steps."""
+
+    name = "log_cosh"
+
+    def __init__(self, cloth: sim.Cloth) -> None:
+        self.cloth = cloth
+        self.stencils = np.arange(cloth.vertex_count)[:, None]
+
+    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the sum and its gradient, tanh."""
+        return float(np.log(np.cosh(x)).sum()), np.tanh(x)
+
+    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
+        """Return 1 / cosh^2 on the diagonals, (V, 3, 3)."""
+        return np.eye(3) / np.cosh(x)[:, :, None] ** 2
+
+
+@known_answer(expected=0.0, tolerance=1e-3, reason="what Newton's method calls a negligible step")
+def newton_wants_small_steps() -> float:
+    """Return the edge lengths from rest at which the default tolerance leaves a very soft strip.
+
+    Its own weight, of a ten millionth of the Earth's gravity, is below that tolerance from the start; but the
+    strip sags by a fifth of an edge.
+    """
+    points, faces = right_grid(2, 20, 0.1, 1.0)
+    flat = lying(points)
+    material = sim.Material(bending_stiffness=1e-5)
+    cloth = sim.Cloth(flat, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.06))
+    potential = _potential(cloth, energies.Gravity(cloth, acceleration=3e-6))
+    results = [sim.minimise(potential, flat, tolerance=tolerance) for tolerance in (1e-6, 1e-10)]
+    loose, tight = (demand_converged(result, "the minimiser").positions for result in results)
+    if np.abs(tight - flat).max() < 0.005:
+        raise RuntimeError("the strip hardly sags: nothing is proved")
+    return float(np.linalg.norm(loose - tight, axis=1).max() / cloth.edge_lengths.mean())
+
+
+@known_answer(expected=0.0, tolerance=0.0, reason="a minimum has none")
+def newton_leaves_saddles() -> float:
+    """Return the number of negative eigenvalues where a flat, compressed sheet is said to have come to rest.
+
+    It starts perfectly flat: without a force out of its plane, but not at a minimum.
+    """
+    points, faces = jittered_patch(6)
+    border = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
+    cloth = sim.Cloth(0.3 * in_space(points), faces, sim.Material(), pins=np.flatnonzero(border))
+    potential, flat = _potential(cloth), cloth.rest_positions * [0.9, 1.0, 1.0]
+    result = demand_converged(sim.minimise(potential, flat), "the minimiser")
+    free = np.repeat(~border, 3)
+    values = np.linalg.eigvalsh(potential.hessian(result.positions).toarray()[np.ix_(free, free)])
+    return float((values < -1e-9 * values[-1]).sum())
+
+
+@known_answer(unit="m", expected=0.0, tolerance=1e-6, reason="2e-7, and 15 times that without its memory")
+def lbfgs_distance() -> float:
+    """Return the distance of the end of 60 steps of L-BFGS to Newton's, where there is one minimiser."""
+    potential, start = _stretched()
+    newton = demand_converged(sim.minimise(potential, start, tolerance=1e-12), "the minimiser").positions
+    result = sim.minimise(
+        potential, start, "lbfgs", finish=False, max_iterations=LBFGS_STEPS, tolerance=1e-12
+    )
+    return float(np.linalg.norm(result.positions - newton, axis=1).max())
+
+
+def _patch(cells: int, pins: np.ndarray | tuple[int, ...] = ()) -> sim.Cloth:
+    points, faces = jittered_patch(cells)
+    return sim.Cloth(0.3 * in_space(points), faces, sim.Material(), pins=pins)
+
+
+def _potential(cloth: sim.Cloth, *further: energies.Energy) -> sim.Potential:
+    return sim.Potential([energies.StretchStVK(cloth), energies.BendHinge(cloth), *further])
+
+
+def _stretched() -> tuple[sim.Potential, np.ndarray]:
+    """Return one step of a sheet pulled to 1.2 of its width: tension everywhere, and one minimiser."""
+    points, faces = right_grid(8, 8, 0.3, 0.3)
+    border = (points[:, 0] < 1e-9) | (points[:, 0] > 0.3 - 1e-9)
+    cloth = sim.Cloth(in_space(points), faces, sim.Material(poisson_ratio=0.0), pins=np.flatnonzero(border))
+    inertia = energies.Inertia(cloth, 1 / 30)
+    start = cloth.rest_positions * [1.2, 1.0, 1.0]
+    inertia.x_hat = start
+    noise = np.random.default_rng(3).normal(0, 0.003, start.shape)
+    potential = _potential(cloth, energies.Gravity(cloth), inertia)
+    return potential, np.where(border[:, None], start, start + noise)
+
+
+def _crumpled() -> tuple[sim.Potential, np.ndarray]:
+    """Return one step of a sheet whose vertices start anywhere."""
+    cloth = _patch(6)
+    inertia = energies.Inertia(cloth, 1 / 30)
+    start = np.random.default_rng(4).uniform(-0.15, 0.15, cloth.rest_positions.shape)
+    inertia.x_hat = start
+    return _potential(cloth, energies.Gravity(cloth), inertia), start

@@ -1,0 +1,1 @@
+"""Known answers of contact, friction and time steps."""

@@ -1,0 +1,220 @@
+"""Backward Euler's own discrete laws: exact for the scheme, whatever the time step."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import reference_sim as sim
+from benchmarks.meshes import in_space, jittered_patch, right_grid
+from benchmarks.scene import Scene
+from benchmarks.validation.case import known_answer
+from benchmarks.validation.convergence import demand_converged
+from reference_sim import energies
+
+DT = 1.0 / 30.0
+SPACING = 0.015  # [m] of the sheet that takes one step
+
+FALL = Scene(name="free_fall", description="a thrown sheet", module="benchmarks.scenes.free_fall")
+HANGING = Scene(
+    name="hanging_sheet", description="held at two corners", module="benchmarks.scenes.hanging_sheet"
+)
+
+
+@known_answer(unit="m", expected=0.0, tolerance=1e-12, reason="round-off over a fall of 11 m")
+def free_fall() -> float:
+    """Return the largest distance to backward Euler's own fall, x_0 + n dt v_0 + g dt^2 n (n+1)/2."""
+    from benchmarks.scenes import free_fall as fall
+
+    scene = fall.build(FALL, sheet_cells=14, sheet_frames=45)
+    trajectory = sim.simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, velocity=scene.start_velocity
+    )
+    assert scene.exact is not None
+    return float(np.linalg.norm(trajectory.positions - scene.exact, axis=2).max())
+
+
+@known_answer(unit="m", expected=0.0, tolerance=1e-12, reason="round-off over a fall of half a metre")
+def free_fall_in_substeps() -> float:
+    """Return the largest distance of four steps a frame to the fall with a quarter of the time step."""
+    from benchmarks.scenes import free_fall as fall
+
+    scene, steps = fall.build(FALL, sheet_cells=6, sheet_frames=10), 4
+    trajectory = sim.simulate(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.start, substeps=steps
+    )
+    n = steps * np.arange(scene.frames)
+    drop = 9.81 * (scene.dt / steps) ** 2 * n * (n + 1) / 2
+    exact = scene.start - drop[:, None, None] * np.array([0.0, 1.0, 0.0])
+    return float(np.linalg.norm(trajectory.positions - exact, axis=2).max())
+
+
+@known_answer(
+    unit="m", expected=0.0, tolerance=1e-9, reason="round-off of the times at which the pins are asked for"
+)
+def moving_pins_in_substeps() -> float:
+    """Return the distance of a sheet pulled by its pins, four steps a frame, to that of a quarter of dt.
+
+    Between frames pins move straight on.
+    """
+    from benchmarks.scenes import hanging_sheet
+
+    scene, steps, frames = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10), 4, 10
+    places = scene.start[scene.cloth.pins]
+    pulled = np.array([0.01, 0.02, 0.0]) * np.square(np.arange(frames))[:, None, None] / frames
+
+    def between(step: int) -> np.ndarray:
+        frame, part = divmod(step, steps)
+        return places + pulled[frame] + part / steps * (pulled[min(frame + 1, frames - 1)] - pulled[frame])
+
+    def run(**options: Any) -> np.ndarray:
+        trajectory = sim.simulate(scene.cloth, scene.energies, start=scene.start, **options)
+        return demand_converged(trajectory, "the pulled sheet").positions
+
+    coarse = run(dt=scene.dt, frames=frames, substeps=steps, pin_positions=lambda n: places + pulled[n])
+    fine = run(dt=scene.dt / steps, frames=steps * (frames - 1) + 1, pin_positions=between)
+    return float(np.linalg.norm(coarse - fine[::steps], axis=2).max())
+
+
+def stretched_membrane(amplitude: float) -> tuple[sim.Cloth, np.ndarray, np.ndarray, float]:
+    """Make a square membrane of 1 m, held at its border, that starts in its lowest mode.
+
+    With stretch s, spacing h and lumped masses: S = (lam + mu)(s^2 - 1),
+    omega^2 = (S/rho_a) (4/h^2) 2 sin^2(pi h/2).
+
+    Returns:
+        sim.Cloth, start (V,3) [m] with the mode of that amplitude [m], the mode (V,), and omega^2 [1/s^2].
+    """
+    cells, s, material = 8, 1.2, sim.Material()
+    points, faces = right_grid(cells, cells, 1.0, 1.0)
+    on_border = (np.abs(points - 0.5) > 0.5 - 1e-9).any(axis=1)
+    cloth = sim.Cloth(in_space(points), faces, material, pins=np.flatnonzero(on_border))
+    mode = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])
+    start = s * in_space(points)
+    start[:, 2] = amplitude * mode
+    S = (material.lame_lambda + material.lame_mu) * (s**2 - 1)
+    omega2 = S / material.areal_density * 4 * cells**2 * 2 * np.sin(np.pi / (2 * cells)) ** 2
+    return cloth, start, mode, float(omega2)
+
+
+@known_answer(expected=0.0, tolerance=1e-8, reason="the mode's own nonlinearity, (pi amplitude)^2")
+def stretched_membrane_vibration() -> float:
+    """Return the largest error of a stretched membrane's lowest mode over 30 steps, over its first amplitude.
+
+    The discrete motion is z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega^2 dt^2).
+    """
+    amplitude, frames = 1e-5, 31
+    cloth, start, mode, omega2 = stretched_membrane(amplitude)
+    trajectory = sim.simulate(
+        cloth, [energies.StretchStVK(cloth)], dt=DT, frames=frames, start=start, tolerance=1e-12
+    )
+    z = [amplitude, amplitude]  # the frame before the start: no velocity
+    for _ in range(frames - 1):
+        z.append((2 * z[-1] - z[-2]) / (1 + omega2 * DT**2))
+    measured = trajectory.positions[:, :, 2] @ mode / (mode @ mode)
+    return float(np.abs(measured - z[1:]).max() / amplitude)
+
+
+@known_answer(expected=0.0, tolerance=2e-6, reason="the residual gradient that the solver may leave")
+def momentum_balance() -> float:
+    """Return the largest |P' - P - dt weight| of a crumpled sheet thrown freely, over dt times weight.
+
+    Strain and bending are internal: their forces sum to zero.
+    """
+    trajectory, cloth = _thrown_sheet()
+    velocities = np.diff(trajectory.positions, axis=0) / DT
+    momentum = np.einsum("v,tvi->ti", cloth.masses, velocities)
+    weight = energies.Gravity(cloth).weights.sum()
+    errors = np.diff(momentum, axis=0) - [0.0, -DT * weight, 0.0]
+    return float(np.abs(errors).max() / (DT * weight))
+
+
+@known_answer(expected=0.0, tolerance=2e-6, reason="the residual gradient that the solver may leave")
+def angular_momentum_balance() -> float:
+    """Return the largest error of L' = L - dt sum m v x v' + dt tau(x'), over the largest |L|.
+
+    Backward Euler loses angular momentum by the second term; strain and bending have no torque.
+    """
+    trajectory, cloth = _thrown_sheet()
+    x, m = trajectory.positions, cloth.masses
+    v = np.diff(x, axis=0) / DT
+    L = np.einsum("v,tvi->ti", m, np.cross(x[1:], v))
+    lost = np.einsum("v,tvi->ti", m, np.cross(v[:-1], v[1:]))
+    torque = np.cross(x[2:], [0.0, -1.0, 0.0]) * energies.Gravity(cloth).weights[:, None]
+    errors = np.diff(L, axis=0) + DT * lost - DT * torque.sum(axis=1)
+    return float(np.abs(errors).max() / np.abs(L).max())
+
+
+@cache
+def _thrown_sheet() -> tuple[sim.Trajectory, sim.Cloth]:
+    points, faces = jittered_patch(6)
+    cloth = sim.Cloth(0.3 * in_space(points), faces, sim.Material())
+    random = np.random.default_rng(2)
+    start = cloth.rest_positions + random.normal(0, 0.004, cloth.rest_positions.shape)
+    trajectory = sim.simulate(
+        cloth,
+        [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)],
+        dt=DT,
+        frames=12,
+        start=start,
+        velocity=random.normal(0, 0.5, start.shape),
+    )
+    return demand_converged(trajectory, "the simulation"), cloth
+
+
+@known_answer(
+    {"ambiguous_step": {"share": None}},
+    unit="m", smoke=False, reason="reported: vertex by vertex agreement means nothing there",
+)  # fmt: skip
+@known_answer(
+    {"unique_step": {"share": 0.9}},
+    unit="m", expected=0.0, tolerance=1e-12, reason="one minimiser; Newton ends at round-off",
+)  # fmt: skip
+def step_distance(share: float | None) -> float:
+    """Return the largest distance of the ends of one step, thrown into disorder, from two far guesses.
+
+    The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter than
+    h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
+
+    Args:
+        share: of that bound; None: the step is 1/30 s, far above it, where two valid solvers may differ.
+    """
+    material = sim.Material()
+    bound = SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
+    dt = DT if share is None else share * bound
+    cells = 12
+    points, faces = right_grid(cells, cells, cells * SPACING, cells * SPACING)
+    cloth = sim.Cloth(in_space(points), faces, material)
+    inertia = energies.Inertia(cloth, dt)
+    random = np.random.default_rng(5)
+    inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
+    potential = sim.Potential([energies.StretchStVK(cloth), inertia])
+    ends = []
+    for _ in range(2):
+        start = random.uniform(-SPACING * cells, SPACING * cells, cloth.rest_positions.shape)
+        ends.append(demand_converged(sim.minimise(potential, start, tolerance=1e-12), "the step").positions)
+    return float(np.linalg.norm(ends[0] - ends[1], axis=1).max())
+
+
+@known_answer(expected=0.0, tolerance=1e-9, reason="backward Euler only ever loses energy; round-off")
+def energy_inequality() -> float:
+    """Return the largest excess of Phi' + |v' - v|_M^2/2 over Phi + |v|_M^2/2, over the kinetic energy.
+
+    Both sides are the step's objective, at its end and at the previous positions: a step that ends above the
+    place it came from is wrong. Measured on the hanging sheet.
+    """
+    from benchmarks.scenes import hanging_sheet
+
+    scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10)
+    trajectory = sim.simulate(scene.cloth, scene.energies, dt=scene.dt, frames=20, start=scene.start)
+    x, masses = demand_converged(trajectory, "the simulation").positions, scene.cloth.masses
+    potential = sim.Potential(scene.energies)
+    phi = np.array([potential.value(frame) for frame in x])
+    v = np.concatenate([np.zeros_like(x[:1]), np.diff(x, axis=0) / scene.dt])
+    kinetic = 0.5 * np.einsum("v,tvi,tvi->t", masses, v, v)
+    change = np.diff(v, axis=0)
+    lost = 0.5 * np.einsum("v,tvi,tvi->t", masses, change, change)
+    rise = phi[1:] + lost - phi[:-1] - kinetic[:-1]
+    return float(np.maximum(rise, 0.0).max() / kinetic.max())

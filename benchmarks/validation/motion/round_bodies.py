@@ -1,0 +1,178 @@
+"""Contact with round bodies: a point that leaves a sphere, a strip drawn over a cylinder.
+
+The bodies here are exact, not meshes of triangles: they answer what an `Obstacle` answers.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import reference_sim as sim
+from benchmarks.meshes import lying, right_grid
+from benchmarks.validation.case import known_answer
+from benchmarks.validation.convergence import demand_converged, fitted_order
+from reference_sim import energies
+
+if TYPE_CHECKING:
+    from reference_sim.obstacle import Planes
+
+RADIUS = 1.0  # [m] of the sphere
+START = 0.3  # [rad] from the top
+HARD = 1e11  # [J/m^5] of the sphere, so that the point never lags behind its resting depth
+DRUM = 0.2  # [m] radius of the cylinder
+SLACK = 0.1  # [m] of each end of the strip below the axis
+PULL = 2.0  # [N/m] at its ends, about, so that it never hangs slack
+
+
+class RoundBody:
+    """Sphere about the origin, or (axis=2) cylinder about the z axis, of `radius` [m]."""
+
+    fingerprint = "round"
+
+    def __init__(self, radius: float, axis: int | None = None) -> None:
+        self.radius = radius
+        self.keep = np.ones(3)
+        if axis is not None:
+            self.keep[axis] = 0.0
+
+    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+        """Return tangent planes below points (S, 3); faces and places on them do not exist."""
+        from reference_sim.obstacle import Planes
+
+        radial = points * self.keep
+        normals = radial / np.linalg.norm(radial, axis=1, keepdims=True)
+        count = len(points)
+        nowhere = np.zeros(count, dtype=np.int64), np.zeros((count, 3))
+        return Planes(points - radial + self.radius * normals, normals, *nowhere)
+
+
+@known_answer(expected=1.0, tolerance=2e-3, reason="second order in dt; the point's depth over R")
+def leaving_point() -> float:
+    """Return the cos theta at which a point leaves a sphere, over 2/3 cos theta_0, extrapolated in dt."""
+    coarse, fine = _leaving(480), _leaving(960)
+    return (2 * fine - coarse) / (2 / 3 * np.cos(START))
+
+
+@known_answer(expected=1.0, tolerance=0.15, reason="backward Euler; the place is extrapolated from the force")
+def leaving_order() -> float:
+    """Return the order in dt of where a point leaves a sphere."""
+    rates = (240, 480, 960)
+    exact = 2 / 3 * np.cos(START)
+    return fitted_order([abs(_leaving(rate) - exact) for rate in rates], [1 / rate for rate in rates])
+
+
+@cache
+def _leaving(rate: int) -> float:
+    """Return cos theta where the contact force reaches zero, with `rate` steps a second.
+
+    The point is a triangle of 4 mm. It starts at rest, as deep in the margin as its weight presses it.
+    """
+    material = sim.Material()
+    corners = 0.004 / 3**0.5 * np.array([[np.cos(a), 0.0, np.sin(a)] for a in 2 * np.pi / 3 * np.arange(3)])
+    cloth = sim.Cloth(corners, np.array([[0, 2, 1]]), material)
+    contact = energies.ContactPenalty(cloth, samples="vertices", stiffness=HARD)
+    density = contact.stiffness[0] / contact.sample_areas[0]
+    depth = np.sqrt(material.areal_density * sim.GRAVITY * np.cos(START) / (3 * density))
+    turn = np.array([[np.cos(START), np.sin(START), 0], [-np.sin(START), np.cos(START), 0], [0, 0, 1.0]])
+    start = (corners + np.array([0.0, RADIUS, 0.0])) @ turn.T
+    start *= (RADIUS + contact.margin - depth) / np.linalg.norm(start, axis=1, keepdims=True)
+    body: Any = RoundBody(RADIUS)
+    trajectory = sim.simulate(
+        cloth,
+        [energies.StretchStVK(cloth), energies.Gravity(cloth), contact],
+        dt=1 / rate,
+        frames=round(1.2 * rate),
+        obstacle=body,
+        start=start,
+        guess="extrapolated",
+    )
+    demand_converged(trajectory, "the slide")
+    middle = trajectory.positions.mean(axis=1)
+    cosine = middle[:, 1] / np.linalg.norm(middle, axis=1)
+    outside = np.linalg.norm(trajectory.positions, axis=2) - RADIUS
+    # The force, but for a factor.
+    press = (np.maximum(contact.margin - outside, 0.0) ** 2).mean(axis=1)
+    # The force falls to zero along a line in cos theta: follow it from where a tenth to a third is left.
+    share = press / press[0]
+    left = np.flatnonzero((share > 0.1) & (share < 0.33))
+    return float(np.polyval(np.polyfit(share[left], cosine[left], 2), 0.0))
+
+
+@known_answer(expected=0.0, tolerance=5e-3, reason="120 cells, and one of contact at each end of the arc")
+def drum_tension() -> float:
+    """Return the worst error of the tension along a strip over a frictionless cylinder, over the mean."""
+    tension, expected, _, _ = _strip_on_drum()
+    return float(np.abs(tension - expected).max() / expected.mean())
+
+
+@known_answer(expected=1.0, tolerance=2e-3, reason="120 cells; the strip's depth in the margin over R")
+def drum_pressure() -> float:
+    """Return the mean over the arc of contact pressure over (tension/R + w cos phi)."""
+    _, _, pressure, expected = _strip_on_drum()
+    return float((pressure / expected).mean())
+
+
+def _strip_on_drum() -> tuple[np.ndarray, ...]:
+    """Return tension [N/m] and pressure [N/m^2] along a strip whose ends are held: ours, exact, each.
+
+    Without friction only weight changes the tension N along the strip: dN/ds = w dy/ds, and an arc of radius
+    R under tension N presses with N/R + w cos phi, where phi is the angle from the top.
+    """
+    from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
+
+    cloth, points, x = strip_over_drum(120, DEFAULT_STIFFNESS)
+    contact = energies.ContactPenalty(cloth, samples="vertices")
+    potential = sim.Potential([energies.StretchStVK(cloth), energies.Gravity(cloth), contact])
+    body = RoundBody(DRUM, axis=2)
+    for _ in range(6):  # the planes follow the strip until both agree
+        still: Any = energies.Step(previous=x, velocity=np.zeros_like(x), guess=x, dt=1 / 30, obstacle=body)  # type: ignore[arg-type]
+        contact.prepare(still)
+        result = sim.minimise(potential, x, tolerance=1e-9)
+        x = result.positions
+    demand_converged(result, "the strip")
+    return _profiles(cloth, contact, x, points, cloth.material.areal_density * sim.GRAVITY)
+
+
+def strip_over_drum(columns: int, stiffness: float) -> tuple[sim.Cloth, np.ndarray, np.ndarray]:
+    """Return a strip held at both ends, its points in the plane (V,2), and on the drum (V,3) [m].
+
+    It is pulled by PULL, and its ends hang straight down. stiffness: of contact [J/m^5], by which it lies in
+    the margin. The strip is a hundred times stiffer than cotton: it keeps its length, and the exact formulas
+    need no stretch.
+    """
+    from reference_sim.energies.contact_penalty import DEFAULT_MARGIN
+
+    material = sim.Material(young_modulus=7e6, poisson_ratio=0.0)
+    radius = DRUM + DEFAULT_MARGIN - np.sqrt(PULL / DRUM / (3 * stiffness))
+    length = np.pi * radius + 2 * SLACK
+    points, faces = right_grid(2, columns, 2 * length / columns, length)
+    rest = lying(points)
+    ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > length - 1e-9))
+    s = (rest[:, 0] - length / 2) * (1 + PULL / material.membrane_modulus)
+    angle = np.clip(s / radius, -np.pi / 2, np.pi / 2)
+    below = np.abs(s) - np.pi / 2 * radius
+    x = np.stack([radius * np.sin(angle), radius * np.cos(angle), rest[:, 2]], axis=1)
+    x[:, 1] -= np.maximum(below, 0.0)
+    return sim.Cloth(rest, faces[:, ::-1], material, pins=ends), points, x
+
+
+def _profiles(
+    cloth: sim.Cloth, contact: energies.ContactPenalty, x: np.ndarray, points: np.ndarray, weight: float
+) -> tuple[np.ndarray, ...]:
+    columns = len(np.unique(points[:, 0])) - 1
+    grid = x.reshape(3, columns + 1, 3).mean(axis=0)  # the middle line
+    width, cell = np.ptp(points[:, 1]), np.ptp(points[:, 0]) / columns
+    # Force through each cell from the forces on all vertices to its left: equilibrium by free-body cut.
+    strain = energies.StretchStVK(cloth).value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    tension = np.linalg.norm(np.cumsum(strain, axis=0)[:-1], axis=1) / width
+    middle = 0.5 * (grid[1:] + grid[:-1])
+    expected = tension[0] + weight * (middle[:, 1] - middle[0, 1])
+    push = -contact.value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    upper = grid[:, 1] > 0.15 * DRUM
+    pressure = np.linalg.norm(push, axis=1)[upper] / (width * cell)
+    radius = np.linalg.norm(grid[upper, :2], axis=1)
+    inner = 0.5 * (tension[1:] + tension[:-1])[upper[1:-1]]
+    return tension, expected, pressure, inner / radius + weight * grid[upper, 1] / radius

@@ -1,0 +1,1 @@
+"""Known answers of membrane and hinges: closed forms, scikit-fem, plates, large bending."""

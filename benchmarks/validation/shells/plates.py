@@ -1,0 +1,173 @@
+"""Hinges as a plate: the stiffness that they stand for on each family of triangles.
+
+Kirchhoff's plate has the energy D/2 [(w_xx + w_yy)^2 - 2 (1 - nu) (w_xx w_yy - w_xy^2)]. Hinges are no such
+plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles, and on
+equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the edges of
+direction t, summed over the three directions of an equilateral mesh of spacing l:
+C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)), there
+1/(2 3^0.5), C11 = k/4.
+
+No other family is isotropic: their stiffness depends on the direction of the fold by up to a factor of 3, see
+the table in docs/notebook/simulator.md. So a plate that can be compared with one of another program has
+equilateral triangles.
+
+Squares with both diagonals, w = x^2/2 at the corners and d above that at the centres: per cell the hinges
+of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy over
+k/2 is 1 - 8 d + 64 d^2, at least 3/4; scaled by l^2/(4 (A1 + A2)) it is 3/8 - 2 d + 24 d^2, at least 1/3.
+Alternating diagonals are the same tiling turned by 45 degrees: 3/4 again, and 5/24.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import reference_sim as sim
+from benchmarks.meshes import FAMILIES, ROW, in_space, rectangle
+from benchmarks.validation.case import known_answer
+from reference_sim import energies
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+
+STIFFNESS = 1.0  # [J] k; every result is divided by it
+NU = -1 / 3  # Poisson's ratio of hinges on equilateral triangles
+CYLINDER = np.diag([1.0, 0.0])  # [1/m] curvature of a plate rolled up along x
+
+SCALINGS = {"unscaled": "none", "scaled": "length_area"}
+C11 = {  # over k: of the families on which it is rational or sqrt(3)/2
+    "right": (1.0, 0.25), "cross": (3 / 4, 1 / 3), "union_jack": (3 / 4, 5 / 24),
+    "equilateral": (3**0.5 / 2, 0.25),
+}  # fmt: skip
+Terms = Callable[[sim.Cloth], Sequence[energies.Energy]]
+
+
+def _of(name: str, families: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return the variants of a known answer on families of triangles, with hinges unscaled and scaled."""
+    return {
+        f"{name}_{family}_{title}": {"family": family, "scaling": scaling}
+        for family in families
+        for title, scaling in SCALINGS.items()
+    }
+
+
+@known_answer(_of("plate_stiffness", ["delaunay"]), smoke=False, reason="reported: a mean of one patch")
+@known_answer(
+    _of("plate_stiffness", [*C11]), smoke=False, tolerance=3e-4, reason="the corners leave (1/24)^2"
+)
+def plate_stiffness(family: str, scaling: str) -> tuple[float, float | None]:
+    """Return the C11/k of hinges, twice the energy per area of a patch bent to a cylinder."""
+    exact = C11.get(family, (None, None))[scaling != "none"]
+    return 2 * patch_energy(family, CYLINDER, hinges(scaling)), exact
+
+
+def hinges(scaling: str) -> Terms:
+    """Return the terms of a plate of hinges alone."""
+    return lambda cloth: [energies.BendHinge(cloth, scaling=scaling)]
+
+
+def patch_energy(family: str, curvature: np.ndarray, terms: Terms) -> float:
+    """Return the energy per area and k of a patch with a constant curvature at its border, inside at rest.
+
+    Energy of an n x n patch = a n^2 + b n + c with the border in b and c; three sizes give a. The
+    unstructured family has no cell that repeats, so there one larger patch is divided by its area.
+
+    Args:
+        family: of meshes.FAMILIES.
+        curvature: (2,2) [1/m]; the two outer rings of vertices have w = x . curvature x / 2.
+        terms: energies of the plate, where a cloth has k = 1 J.
+    """
+    height = ROW if family == "equilateral" else 1.0
+    if family == "delaunay":
+        energy, area = _bent(family, 48, 1.0, curvature, terms)
+        return energy / area
+    small, middle, large = (_bent(family, n, height, curvature, terms)[0] for n in (16, 24, 32))
+    return (small - 2 * middle + large) / 128 / height
+
+
+def _bent(family: str, cells: int, height: float, curvature: np.ndarray, terms: Terms) -> tuple[float, float]:
+    """Return the energy over k of a patch in equilibrium, and the area of its hinges."""
+    import scipy.sparse.linalg as spla
+
+    size = np.array([cells, cells * height])
+    points, faces = rectangle(family, cells, cells, *size)
+    cloth, K = _stiffness(points, faces, terms)
+    ring = ((points < 1.01) | (points > size - 1.01)).any(axis=1)
+    w = 0.5 * np.einsum("vi,ij,vj->v", points, curvature, points)
+    inside = np.flatnonzero(~ring)
+    w[inside] = spla.spsolve(K[inside][:, inside], -(K[inside][:, ring] @ w[ring]))
+    return 0.5 * float(w @ (K @ w)) / STIFFNESS, float(cloth.hinge_areas.sum() / 3)
+
+
+# Only equilateral triangles make an isotropic plate: there the number is known, elsewhere it is the price.
+@known_answer(
+    _of("plate_morley", [family for family in FAMILIES if family != "equilateral"]),
+    smoke=False, reason="reported: no plate of one D",
+)  # fmt: skip
+@known_answer(
+    {"plate_morley_equilateral_unscaled": {"family": "equilateral", "scaling": "none"}},
+    smoke=False, expected=3**0.5 / 2, tolerance=0.03 * (3**0.5 / 2),
+    reason="edges on the border have no hinge",
+)  # fmt: skip
+@known_answer(
+    {"plate_morley_equilateral_scaled": {"family": "equilateral", "scaling": "length_area"}},
+    smoke=False, expected=0.25, tolerance=0.03 * 0.25, reason="edges on the border have no hinge",
+)  # fmt: skip
+def supported_plate(family: str, scaling: str) -> float:
+    """Return the D/k of the Kirchhoff plate that sags as much, on the mean, as hinges on the unit square.
+
+    Simply supported along straight sides, uniform load: there the deflection does not depend on nu, so this
+    is the isotropic part of the plate. The reference is solved with Morley's element in scikit-fem.
+    """
+    import scipy.sparse.linalg as spla
+
+    columns = 24
+    rows = round(columns / ROW) if family == "equilateral" else columns
+    width = rows * ROW / columns if family == "equilateral" else 1.0
+    points, faces = rectangle(family, columns, rows, 1.0, width)
+    cloth, K = _stiffness(points, faces, hinges(scaling))
+    border = (points < 1e-9).any(axis=1) | (points > np.array([1.0, width]) - 1e-9).any(axis=1)
+    inside = np.flatnonzero(~border)
+    areas = cloth.vertex_areas
+    w = np.zeros(len(points))
+    w[inside] = spla.spsolve(K[inside][:, inside], areas[inside])
+    return morley_deflection(width) / (float(areas @ w) / width) / STIFFNESS
+
+
+def morley_deflection(width: float) -> float:
+    """Return the mean deflection of a simply supported plate 1 x width [m], D = 1, unit load.
+
+    Morley's element is of second order here; two meshes are extrapolated.
+    """
+    coarse, fine = (_morley(width, cells) for cells in (24, 48))
+    return (4 * fine - coarse) / 3
+
+
+def _morley(width: float, cells: int) -> float:
+    import skfem
+
+    line = np.linspace(0, 1, cells + 1)
+    mesh = skfem.MeshTri.init_tensor(line, line * width)
+    basis = skfem.Basis(mesh, skfem.ElementTriMorley(), intorder=4)
+
+    @skfem.BilinearForm
+    def bending(u, v, _):
+        return np.einsum("ij...,ij...->...", u.hess, v.hess)  # nu = 0: any nu sags the same
+
+    @skfem.LinearForm
+    def load(v, _):
+        return v
+
+    K, f = bending.assemble(basis), load.assemble(basis)
+    supported = basis.nodal_dofs[0, mesh.boundary_nodes()]
+    w = skfem.solve(*skfem.condense(K, f, D=supported))
+    return float(f @ w) / width
+
+
+def _stiffness(points: np.ndarray, faces: np.ndarray, terms: Terms) -> tuple[sim.Cloth, sp.csr_matrix]:
+    """Return the cloth of a flat mesh (V,2) and the Hessian (V,V) of its terms out of the plane."""
+    cloth = sim.Cloth(in_space(points), faces, sim.Material(bending_stiffness=STIFFNESS))
+    hessian = sim.Potential(list(terms(cloth))).hessian(cloth.rest_positions).tocsr()
+    return cloth, hessian[2::3][:, 2::3]
