@@ -28,8 +28,8 @@ EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/punch --methods snug,pbns --speed 0.25 -o punch.mp4
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods snug -o kick.pc2
 
-A .pc2 is no film: it gives kick_snug.pc2 and kick_body.pc2, the vertices of each method and of the body, with an
-.obj each, in metres, y up, for Blender's Mesh Cache modifier.
+A .pc2 is no film: it gives kick_snug.pc2 and kick_body.pc2, the vertices of each method and of the body, with
+an .obj each, in metres, y up, for Blender's Mesh Cache modifier.
 
 An .mp4 needs pip install 'neural-garment-benchmark[film]'; a .gif does not. No screen is needed.
 The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference_sim.geometry.topology import unique_edges
+from reference_sim.geometry.topology import edge_uses
 
 Index = np.ndarray  # of whole numbers
 
@@ -151,7 +151,7 @@ def _third(faces: Index) -> dict[tuple[int, int], int] | None:
 
 def _colours(faces: Index, vertices: int) -> Index:
     """Return colours (V,), equal where the mesh within ROUNDS edges of two vertices is alike."""
-    edges = unique_edges(faces)
+    edges, _ = edge_uses(faces)
     both = np.concatenate([edges, edges[:, ::-1]])
     colour = np.bincount(faces.ravel(), minlength=vertices).astype(np.uint64)
     for _ in range(ROUNDS):

@@ -16,9 +16,12 @@ def half_edges(faces: Index) -> Index:
     return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
-def unique_edges(faces: Index) -> Index:
-    """Return the edges (E,2) of faces (F,3), sorted, the lower vertex first."""
-    return np.unique(np.sort(half_edges(faces), axis=1), axis=0)
+def edge_uses(faces: Index) -> tuple[Index, Index]:
+    """Return the edges (E,2) of faces (F,3), the lower vertex first, and the number of their faces (E,).
+
+    Edges are sorted. One of the boundary has one face.
+    """
+    return np.unique(np.sort(half_edges(faces), axis=1), axis=0, return_counts=True)
 
 
 def boundary_loops(faces: Index) -> list[Index]:

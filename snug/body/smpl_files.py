@@ -52,39 +52,7 @@ SYNONYMS = {
 REQUIRED = ("v_template", "f", "weights", "kintree_table")
 
 
-class _File:
-    """Arrays of a body file by the first of their names, and errors that name the file."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        names = [name for synonyms in SYNONYMS.values() for name in synonyms]
-        try:
-            pickled = path.suffix.lower() in (".pkl", ".pickle")
-            content = read_pickled_arrays(path, names) if pickled else read_arrays(path, names)
-        except ArrayFileError as error:
-            remedy = "expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
-            raise BodyError(f"{error}; {remedy}") from error
-        self.arrays: dict[str, np.ndarray] = {}
-        for key, synonyms in SYNONYMS.items():
-            if present := [content[name] for name in synonyms if name in content]:
-                self.arrays[key] = present[0]
-
-    def error(self, problem: str) -> BodyError:
-        """Return the error that names the file."""
-        return BodyError(f"{self.path}: {problem}")
-
-    def numbers(self, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
-        """Return an array of that shape (None: any length) as float64. Raises BodyError."""
-        array = self.arrays[key]
-        fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
-        if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
-            wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
-            raise self.error(f"{key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
-        array = array.astype(np.float64)
-        if len(bad := np.argwhere(~np.isfinite(array))):
-            first, place = array[tuple(bad[0])], ", ".join(map(str, bad[0]))
-            raise self.error(f"{key}[{place}] is {first}: not finite, as are {len(bad)} of its values")
-        return array
+Arrays = dict[str, np.ndarray]
 
 
 def read_body(path: str | Path | None) -> Body:
@@ -101,65 +69,100 @@ def read_body(path: str | Path | None) -> Body:
     """
     if path is None:
         return Body.load()
-    file = _File(Path(path))
-    return _in_t_pose(file, _make_body(file))
+    path = Path(path)
+    try:
+        return _in_t_pose(_make_body(_read_arrays(path)))
+    except ArrayFileError as error:
+        remedy = "expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
+        raise BodyError(f"{error}; {remedy}") from error
+    except BodyError as error:
+        raise BodyError(f"{path}: {error}") from error
 
 
-def _make_body(file: _File) -> Body:
+def _read_arrays(path: Path) -> Arrays:
+    """Return the arrays of a body by the first of their synonyms."""
+    names = [name for synonyms in SYNONYMS.values() for name in synonyms]
+    read = read_pickled_arrays if path.suffix.lower() in (".pkl", ".pickle") else read_arrays
+    content = read(path, names)
+    arrays = {}
+    for key, synonyms in SYNONYMS.items():
+        if present := [content[name] for name in synonyms if name in content]:
+            arrays[key] = present[0]
+    if missing := [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in arrays]:
+        raise BodyError(f"no array {', '.join(missing)}; expected SMPL's layout")
+    return arrays
+
+
+def _numbers(arrays: Arrays, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Return an array of that shape (None: any length) as float64. Raises BodyError."""
+    array = arrays[key]
+    fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
+    if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
+        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+        raise BodyError(f"{key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
+    array = array.astype(np.float64)
+    if len(bad := np.argwhere(~np.isfinite(array))):
+        first, place = array[tuple(bad[0])], ", ".join(map(str, bad[0]))
+        raise BodyError(f"{key}[{place}] is {first}: not finite, as are {len(bad)} of its values")
+    return array
+
+
+def _make_body(arrays: Arrays) -> Body:
     """Make the body in the pose of its file. Raises BodyError."""
-    missing = [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in file.arrays]
-    if missing:
-        raise file.error(f"no array {', '.join(missing)}; expected SMPL's layout")
-    template = file.numbers("v_template", (None, 3))
+    template = _numbers(arrays, "v_template", (None, 3))
     count = len(template)
     if count > MAX_VERTICES:
-        raise file.error(f"v_template has {count} vertices; at most {MAX_VERTICES} are read")
-    weights, places, folded = _skeleton(file, count)
+        raise BodyError(f"v_template has {count} vertices; at most {MAX_VERTICES} are read")
+    weights, places, folded = _skeleton(arrays, count)
     directions = np.zeros((count, 3, 0))
-    if "shapedirs" in file.arrays:
-        directions = file.numbers("shapedirs", (count, 3, None))[:, :, :SHAPES]
-    joints, joint_directions = _joints(file, template, directions, len(folded))
+    if "shapedirs" in arrays:
+        directions = _numbers(arrays, "shapedirs", (count, 3, None))[:, :, :SHAPES]
+    joints, joint_directions = _joints(arrays, template, directions, len(folded))
+    correctives = None
+    if "posedirs" in arrays:  # folded fingers, jaw and eyes stay straight and need none
+        kept = 9 * ((JOINTS if len(folded) == JOINTS else BODY_JOINTS) - 1)
+        correctives = _numbers(arrays, "posedirs", (count, 3, 9 * (len(folded) - 1)))[:, :, :kept].copy()
     body = Body(
         template=template,
         shape_directions=directions,
         skinning_weights=weights @ folded,
         joint_template=places @ joints,
         joint_directions=np.einsum("ij,jas->ias", places, joint_directions),
-        faces=_faces(file, template),
+        faces=_faces(arrays, template),
         parents=np.array(PARENTS),
-        pose_directions=_correctives(file, count, len(folded)),
+        pose_directions=correctives,
     )
-    _check_place(file, template, body.joint_template)
+    _check_place(template, body.joint_template)
     return body
 
 
-def _skeleton(file: _File, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _skeleton(arrays: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return weights (B, J), rows summing to one, and two matrices that make 24 joints of J.
 
     The first, (24, J), averages positions of joints; the second, (J, 24), adds up weights.
     """
-    table = file.arrays["kintree_table"]
+    table = arrays["kintree_table"]
     parents = table[0] if table.ndim == 2 else table
     wanted = "kintree_table (2, J) or parents (J,) of J = 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints"
     if parents.ndim != 1 or len(parents) not in (24, 52, 55) or table.dtype.kind not in "iuf":
-        raise file.error(f"the tree of joints is {table.dtype} {table.shape}; expected {wanted}")
+        raise BodyError(f"the tree of joints is {table.dtype} {table.shape}; expected {wanted}")
     joints = len(parents)
-    weights = file.numbers("weights", (count, joints))
+    weights = _numbers(arrays, "weights", (count, joints))
     sums = weights.sum(axis=1, keepdims=True)
     if weights.min() < -1e-6 or np.abs(sums - 1.0).max() > 1e-3:
-        raise file.error("weights must be non-negative with rows that sum to one")
-    if "rest_pose" in file.arrays:  # axis-angles, or quaternions with w first or last
-        turns = np.abs(file.numbers("rest_pose", (joints, None)))
+        raise BodyError("weights must be non-negative with rows that sum to one")
+    if "rest_pose" in arrays:  # axis-angles, or quaternions with w first or last
+        turns = np.abs(_numbers(arrays, "rest_pose", (joints, None)))
         still = ([0, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1])
         if not any(len(one) == turns.shape[1] and np.allclose(turns, one, atol=1e-4) for one in still):
-            raise file.error(
+            raise BodyError(
                 "rest_pose gives bones axes of their own; give a body without, and its motion too"
             )
     kept = JOINTS if joints == JOINTS else BODY_JOINTS
     wrong = [j for j in range(1, kept) if parents[j] != PARENTS[j]]
     if wrong:
         difference = f"joint {wrong[0]} hangs on {parents[wrong[0]]}, expected {PARENTS[wrong[0]]}"
-        raise file.error(f"kintree_table is not SMPL's: the parent of each joint; {difference}")
+        raise BodyError(f"kintree_table is not SMPL's: the parent of each joint; {difference}")
     if joints == JOINTS:
         return weights / sums, np.eye(JOINTS), np.eye(JOINTS)
     places, folded = np.zeros((JOINTS, joints)), np.zeros((joints, JOINTS))
@@ -167,7 +170,7 @@ def _skeleton(file: _File, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
     for joint in range(kept, joints):
         parent = int(parents[joint])
         if not (parent in FOLDED or kept <= parent < joint):
-            raise file.error(f"kintree_table: joint {joint} hangs on {parent}; expected head, hand, finger")
+            raise BodyError(f"kintree_table: joint {joint} hangs on {parent}; expected head, hand, finger")
         if parent in FOLDED:
             folded[joint, FOLDED[parent]] = 1.0
             places[FOLDED[parent], joint] = parent != FOLDED[parent]  # knuckles; the head stays where it is
@@ -175,72 +178,61 @@ def _skeleton(file: _File, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
             folded[joint] = folded[parent]
     knuckles = places.sum(axis=1, keepdims=True)
     if knuckles.min() == 0:
-        raise file.error("kintree_table: a wrist without a finger")
+        raise BodyError("kintree_table: a wrist without a finger")
     return weights / sums, places / knuckles, folded
 
 
 def _joints(
-    file: _File, template: np.ndarray, directions: np.ndarray, joints: int
+    arrays: Arrays, template: np.ndarray, directions: np.ndarray, joints: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the joints (J, 3) and what a unit of each shape coefficient adds to them (J, 3, S)."""
-    if "J_regressor" in file.arrays:
-        regressor = file.numbers("J_regressor", (joints, len(template)))
+    if "J_regressor" in arrays:
+        regressor = _numbers(arrays, "J_regressor", (joints, len(template)))
         return regressor @ template, np.einsum("jv,vcs->jcs", regressor, directions)
-    if "J_template" not in file.arrays or ("J_shapedirs" not in file.arrays and directions.shape[2]):
-        raise file.error("no joints; expected J_regressor, or joints, with shapedirs also J_shapedirs")
+    if "J_template" not in arrays or ("J_shapedirs" not in arrays and directions.shape[2]):
+        raise BodyError("no joints; expected J_regressor, or joints, with shapedirs also J_shapedirs")
     joint_directions = np.zeros((joints, 3, 0))
     if directions.shape[2]:
-        joint_directions = file.numbers("J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
+        joint_directions = _numbers(arrays, "J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
     if joint_directions.shape[2] != directions.shape[2]:
         shapes = f"{joint_directions.shape[2]} shapes, shapedirs {directions.shape[2]}"
-        raise file.error(f"J_shapedirs has {shapes}")
-    return file.numbers("J_template", (joints, 3)), joint_directions
+        raise BodyError(f"J_shapedirs has {shapes}")
+    return _numbers(arrays, "J_template", (joints, 3)), joint_directions
 
 
-def _correctives(file: _File, count: int, joints: int) -> np.ndarray | None:
-    """Return the pose correctives of the joints that are kept.
-
-    Folded fingers, jaw and eyes stay straight and need none.
-    """
-    if "posedirs" not in file.arrays:
-        return None
-    kept = JOINTS if joints == JOINTS else BODY_JOINTS
-    return file.numbers("posedirs", (count, 3, 9 * (joints - 1)))[:, :, : 9 * (kept - 1)].copy()
-
-
-def _check_place(file: _File, template: np.ndarray, joints: np.ndarray) -> None:
+def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
     """Raise BodyError unless this is a person in metres, y up, facing +z, at x = 0."""
     low, high = template.min(axis=0), template.max(axis=0)
     size = high - low
     if not 0.5 < size[1] < 3.0 or max(size) > 3.0:
-        raise file.error(
+        raise BodyError(
             f"v_template is {size[1]:.3g} high along y, {size[0]:.3g} wide and {size[2]:.3g} deep; "
             "expected a standing body in metres, y up"
         )
     outside = np.flatnonzero((joints < low - 0.02).any(axis=1) | (joints > high + 0.02).any(axis=1))
     if len(outside):
         place = ", ".join(f"{x:.3g}" for x in joints[outside[0]])
-        raise file.error(
+        raise BodyError(
             f"joint {JOINT_NAMES[outside[0]]} at ({place}) is outside of the body; "
             "give joints in metres and in SMPL's order"
         )
     at = {name: joints[JOINT[name]] for name in JOINT}
     if at["left_shoulder"][0] < at["right_shoulder"][0] + 0.05 or at["neck"][1] < at["pelvis"][1] + 0.05:
-        raise file.error("the left shoulder is not at larger x, or the neck not above; turn it to face +z")
+        raise BodyError("the left shoulder is not at larger x, or the neck not above; turn it to face +z")
     if abs(at["pelvis"][0]) > 0.05:
-        raise file.error(f"the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
+        raise BodyError(f"the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
 
 
-def _in_t_pose(file: _File, body: Body) -> Body:
+def _in_t_pose(body: Body) -> Body:
     """Return the body with horizontal arms. Raises BodyError."""
     lowered = arm_angles(body.joint_template)
     if np.abs(lowered).max() <= T_POSE:
         return body
     degrees = " and ".join(f"{angle:.0f}" for angle in np.degrees(lowered))
     if np.abs(lowered).max() > A_POSE:
-        raise file.error(f"the arms hang by {degrees} degrees; give the body in T pose or A pose (to 60)")
+        raise BodyError(f"the arms hang by {degrees} degrees; give the body in T pose or A pose (to 60)")
     if body.pose_directions is not None:
-        raise file.error(f"the arms hang by {degrees} degrees; posedirs need a T pose, leave them out")
+        raise BodyError(f"the arms hang by {degrees} degrees; posedirs need a T pose, leave them out")
     points = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
     joints = np.concatenate([body.joint_template[..., None], body.joint_directions], axis=2)
     points, joints = turn_rest_pose(points, joints, body.skinning_weights, arm_rotations(lowered))
@@ -254,17 +246,17 @@ def _in_t_pose(file: _File, body: Body) -> Body:
     )
 
 
-def _faces(file: _File, template: np.ndarray) -> np.ndarray:
+def _faces(arrays: Arrays, template: np.ndarray) -> np.ndarray:
     """Return the triangles (F, 3) of a closed surface, wound outward.
 
     Small holes, as the eyes of SMPL-X, are closed by fans of triangles. Raises BodyError.
     """
-    faces = file.arrays["f"]
+    faces = arrays["f"]
     if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu" or faces.size == 0:
-        raise file.error(f"f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)")
+        raise BodyError(f"f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)")
     faces = faces.astype(np.int64)
     if faces.min() < 0 or faces.max() >= len(template):
-        raise file.error(f"f names vertex {faces.max()}; the body has {len(template)}")
+        raise BodyError(f"f names vertex {faces.max()}; the body has {len(template)}")
     if faces.shape[1] == 4:
         faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     try:
@@ -276,5 +268,5 @@ def _faces(file: _File, template: np.ndarray) -> np.ndarray:
             faces = np.concatenate([faces, fan])
         check_closed(template[None], faces)
     except ValueError as error:
-        raise file.error(f"f is no closed surface: {str(error).removeprefix('obstacle ')}") from error
+        raise BodyError(f"f is no closed surface: {str(error).removeprefix('obstacle ')}") from error
     return faces

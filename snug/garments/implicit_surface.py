@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from reference_sim.geometry.topology import unique_edges
+from reference_sim.geometry.topology import edge_uses
 from snug.body.parametric_body import Body
 from snug.garments.landmarks import (
     ARM_BONES,
@@ -198,7 +198,7 @@ def legs_part(body: Body, room: float) -> float:
 def _edges(body: Body, bones: Sequence[str]) -> Index:
     """Return the edges (E,2) of the body between vertices that follow `bones`. Raises ValueError."""
     faces = np.asarray(body.faces, dtype=np.int64)
-    edges = unique_edges(faces)
+    edges, _ = edge_uses(faces)
     edges_of_bones = edges[skin_following(body, bones)[edges].all(axis=1)]
     if not len(edges_of_bones):
         raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")

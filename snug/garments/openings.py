@@ -1,11 +1,14 @@
-"""Names of a garment's openings by their place on the body: neck, sleeves, hem, waist, legs."""
+"""Pieces of a garment's surface and what bounds them: seams left open, openings named by their place."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
-from reference_sim.geometry.topology import boundary_loops
+from reference_sim.geometry.topology import boundary_loops, edge_uses
 from snug.body.parametric_body import Body
 from snug.garments.landmarks import joint_position
 
@@ -13,6 +16,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
+OPEN_SEAM = 0.05  # of the mean boundary edge: between boundary vertices that no edge joins, a seam left open
 MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
 
 
@@ -73,3 +77,38 @@ def _name_in_the_middle(body: Body, loops: list[tuple[Index, Array]], legs: bool
     if len(loops) == 1:
         return {name if legs else "hem": top}
     return {name: top, "hem": bottom}
+
+
+def piece_of_faces(faces: Index) -> Index:
+    """Return the number (F,) of the piece that each face (F,3) is of, from 0; pieces share no vertex.
+
+    >>> piece_of_faces(np.array([[0, 1, 2], [5, 6, 7], [2, 1, 3]])).tolist()
+    [0, 1, 0]
+    """
+    (edges, _), count = edge_uses(faces), int(faces.max()) + 1
+    graph = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
+    of_vertex = connected_components(graph, directed=False)[1]
+    return np.unique(of_vertex[faces[:, 0]], return_inverse=True)[1]
+
+
+def open_seam(positions: Array, faces: Index) -> tuple[Index, float]:
+    """Return the boundary vertices (n,) at which a seam was left open, and its largest gap [m].
+
+    They lie within `OPEN_SEAM` mean boundary edges of a boundary vertex that no edge joins them with. Without
+    such a seam both are empty.
+
+    Args:
+        positions: (V,3) [m].
+        faces: (F,3).
+    """
+    edges, uses = edge_uses(faces)
+    rim = edges[uses == 1]
+    if not len(rim):
+        return np.empty(0, dtype=np.int64), 0.0
+    length = np.linalg.norm(positions[rim[:, 0]] - positions[rim[:, 1]], axis=1).mean()
+    vertices = np.unique(rim)
+    pairs = cKDTree(positions[vertices]).query_pairs(OPEN_SEAM * length, output_type="ndarray")
+    pairs = np.sort(vertices[pairs], axis=1)
+    apart = pairs[~np.isin(pairs @ [len(positions), 1], edges @ [len(positions), 1])]
+    gaps = np.linalg.norm(positions[apart[:, 0]] - positions[apart[:, 1]], axis=1)
+    return np.unique(apart), float(gaps.max(initial=0.0))

@@ -20,15 +20,15 @@ from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
 from snug.garments.fit import DressForm, find_placement, pose_in_file
 from snug.garments.garment import Garment, GarmentError, smooth_weights
-from snug.garments.openings import name_openings
+from snug.garments.openings import name_openings, open_seam, piece_of_faces
 from snug.garments.options import OPTION, GarmentFile
-from snug.garments.pieces import inside_out, open_seam, piece_of_faces
 from snug.garments.weights import find_weights, read_authored_weights
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 SHARP = 5.0  # [degrees] below which an angle slows the simulation down
+OUTWARD = 0.5  # share of the area that looks away from the skin, below which a piece is inside out
 SLIVERS = "slivers slow the simulation down: remesh"
 LOOSE = "a piece that is not sewn on falls off: merge the vertices along its seams"
 OK, NOTE, UNUSABLE = "ok", "note", "unusable"  # levels of a finding
@@ -112,7 +112,10 @@ def examine_file(file: GarmentFile, form: DressForm) -> Examination:
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
     surface, kept = join_seams(replace(raw, positions=positions))
     examination = Examination(surface=surface)
-    _describe_mesh(examination, raw, surface, kept)
+    quads = f", {raw.quads} quads cut in two" if raw.quads else ""
+    examination.add("mesh", f"{len(surface.positions)} vertices, {len(surface.faces)} triangles{quads}")
+    if doubled := len(raw.positions) - len(kept):
+        examination.add("doubled vertices", f"{doubled} joined with another at the same place", level=NOTE)
     fits = _check_place(examination, file, form, raw)
     chart = _find_rest_shape(examination, file, surface)
     if fits:
@@ -125,13 +128,6 @@ def examine_file(file: GarmentFile, form: DressForm) -> Examination:
         authored = None if authored is None else authored[kept]
         examination.garment = _make_garment(examination, file, form, surface, chart, material, authored)
     return examination
-
-
-def _describe_mesh(examination: Examination, raw: Surface, surface: Surface, kept: Index) -> None:
-    quads = f", {raw.quads} quads cut in two" if raw.quads else ""
-    examination.add("mesh", f"{len(surface.positions)} vertices, {len(surface.faces)} triangles{quads}")
-    if doubled := len(raw.positions) - len(kept):
-        examination.add("doubled vertices", f"{doubled} joined with another at the same place", level=NOTE)
 
 
 def _check_place(examination: Examination, file: GarmentFile, form: DressForm, raw: Surface) -> bool:
@@ -191,7 +187,7 @@ def _wind_outward(
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     outward = np.einsum("fi,fi->f", normals, form.skin.planes(corners.mean(axis=1), 0).normals) > 0
     areas, pieces = np.linalg.norm(normals, axis=1), piece_of_faces(faces)
-    turned = inside_out(areas, outward, pieces)
+    turned = (np.bincount(pieces, areas * outward) <= OUTWARD * np.bincount(pieces, areas))[pieces]
     if not turned.any():
         examination.add("winding", f"outward, {areas[outward].sum() / areas.sum():.0%} of the area")
         return surface, chart

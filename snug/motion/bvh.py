@@ -44,48 +44,16 @@ class Joint:
     first: int = 0
 
 
-@dataclass(frozen=True)
-class BvhClip:
-    """A parsed file.
-
-    Attributes:
-        joints: parents first.
-        frames: (T, C) numbers.
-        fps: frames per second [1/s], None where the file states none.
-    """
-
-    joints: list[Joint]
-    frames: np.ndarray
-    fps: float | None
-
-    def turns(self, joint: Joint) -> np.ndarray:
-        """Return the rotation of a joint relative to its parent, (T, 3, 3)."""
-        rotation = Rotation.identity(len(self.frames))
-        for column, channel in enumerate(joint.channels, joint.first):
-            if channel.endswith("rotation"):
-                angles = self.frames[:, column, None]
-                rotation = rotation * Rotation.from_euler(channel[0].lower(), angles, degrees=True)
-        return rotation.as_matrix()
-
-    def shift(self, joint: Joint) -> np.ndarray:
-        """Return a joint's place in its parent's axes, (T, 3): its positions, or its offset without any."""
-        shift = np.tile(joint.offset, (len(self.frames), 1))
-        for column, channel in enumerate(joint.channels, joint.first):
-            if channel.endswith("position"):
-                shift[:, "XYZ".index(channel[0])] = self.frames[:, column]
-        return shift
-
-
 def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
     """Read a .bvh of one body, whatever its unit of length: the path is scaled by the length of the legs.
 
     Raises MotionError.
     """
-    clip = read_clip(path)
-    parents = [joint.parent for joint in clip.joints]
-    matches = match_joints(path, [joint.name for joint in clip.joints], parents, options.joint_map)
+    joints, frames, fps = read_clip(path)
+    parents = [joint.parent for joint in joints]
+    matches = match_joints(path, [joint.name for joint in joints], parents, options.joint_map)
     places = np.zeros((len(parents), 3))
-    for index, joint in enumerate(clip.joints):
+    for index, joint in enumerate(joints):
         places[index] = joint.offset + (places[joint.parent] if joint.parent >= 0 else 0.0)
     axes, leg = _standing(path, {name: places[index] for name, index in matches.items()})
     places = places @ axes
@@ -99,19 +67,38 @@ def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
             raise MotionError(f"{path}: {FEET[ankle]} points backwards; are left and right exchanged?")
     turned: dict[int, np.ndarray] = {}
     for index in sorted({above for joint in matches.values() for above in way_up(parents, joint)}):
-        local = clip.turns(clip.joints[index])
+        local = turns_of(joints[index], frames)
         turned[index] = turned[parents[index]] @ local if parents[index] >= 0 else local
     root, *chain = reversed(way_up(parents, matches["pelvis"]))
-    pelvis = clip.shift(clip.joints[root])
+    pelvis = shift_of(joints[root], frames)
     for index in chain:
-        pelvis = pelvis + np.einsum("tij,tj->ti", turned[parents[index]], clip.shift(clip.joints[index]))
+        pelvis = pelvis + np.einsum("tij,tj->ti", turned[parents[index]], shift_of(joints[index], frames))
     return RawMotion(
         path=path,
         poses=retarget(path, {name: turned[k] @ axes for name, k in matches.items()}, directions, {}),
         translations=LEG_LENGTH / leg * pelvis,
-        fps=frame_rate(path, clip.fps, options),
+        fps=frame_rate(path, fps, options),
         source=f"{path.name} ({len(matches)} of 24 joints)",
     )
+
+
+def turns_of(joint: Joint, frames: np.ndarray) -> np.ndarray:
+    """Return the rotation of a joint relative to its parent, (T, 3, 3), in frames (T, C)."""
+    rotation = Rotation.identity(len(frames))
+    for column, channel in enumerate(joint.channels, joint.first):
+        if channel.endswith("rotation"):
+            turn = Rotation.from_euler(channel[0].lower(), frames[:, column, None], degrees=True)
+            rotation = rotation * turn
+    return rotation.as_matrix()
+
+
+def shift_of(joint: Joint, frames: np.ndarray) -> np.ndarray:
+    """Return a joint's place in its parent's axes, (T, 3): its positions, or its offset without any."""
+    shift = np.tile(joint.offset, (len(frames), 1))
+    for column, channel in enumerate(joint.channels, joint.first):
+        if channel.endswith("position"):
+            shift[:, "XYZ".index(channel[0])] = frames[:, column]
+    return shift
 
 
 def _standing(path: Path, at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
@@ -136,8 +123,15 @@ def _standing(path: Path, at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, flo
     return np.stack((left, up, np.cross(left, up)), axis=1), leg
 
 
-def read_clip(path: Path) -> BvhClip:
-    """Parse a file. Raises MotionError, naming the file, and the line of what is damaged or too large."""
+def read_clip(path: Path) -> tuple[list[Joint], np.ndarray, float | None]:
+    """Parse a file.
+
+    Returns:
+        Joints, parents first; numbers (T, C) of each frame; frames per second [1/s] where the file states it.
+
+    Raises:
+        MotionError: names the file, and the line of what is damaged or too large.
+    """
     lines = read_lines(path)
     _next_line(lines, path, "HIERARCHY")
     joints = _hierarchy(lines, path)
@@ -151,7 +145,7 @@ def read_clip(path: Path) -> BvhClip:
     check_frame_count(path, len(rows))
     if len(rows) * len(joints) > MAX_ROTATIONS:
         raise MotionError(f"{path}: {len(rows)} frames of {len(joints)} joints are too many; cut the clip")
-    return BvhClip(joints, np.stack(rows), 1.0 / seconds if seconds else None)
+    return joints, np.stack(rows), 1.0 / seconds if seconds else None
 
 
 def _next_line(lines: Iterator[Line], path: Path, *tokens: str) -> Line:

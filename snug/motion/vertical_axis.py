@@ -16,9 +16,7 @@ TO_Y_UP = {
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
 }
 _SIGNED_AXES = ("x", "y", "z", "-x", "-y", "-z")
-MAX_LYING_COSINE = (
-    0.3  # cosine between the vertical and the way from ankles to head, below which a body lies or crawls
-)
+MAX_LYING_COSINE = 0.3  # between the vertical and the way from ankles to head: below it a body lies or crawls
 MAX_RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
 
 
@@ -45,38 +43,25 @@ def turn_y_up(raw: RawMotion, up: str) -> RawMotion:
     shares = np.bincount(signed.argmax(axis=1), minlength=6) / len(directions)
     likely = _SIGNED_AXES[int(shares.argmax())]
     share = f"{100 * shares.max():.0f} % of the frames"
-    if up:
-        if (directions[:, _SIGNED_AXES.index(up)] > MAX_LYING_COSINE).mean() <= 0.5:
-            raise MotionError(
-                f"{raw.path}: with {up} up the body lies on its back or side: it stands along {likely} "
-                f"in {share}; {_remedy(likely)}"
-            )
-        return _turn(raw, up, f"{up} up as given")
-    if shares.max() <= 0.5 or likely not in TO_Y_UP:
-        raise MotionError(
-            f"{raw.path}: the body stands neither along y nor along z: along {likely} in {share}; "
-            f"{_remedy(likely)}"
-        )
-    lowest = joints[..., _SIGNED_AXES.index(likely)].min(axis=1)
-    if (rise := float(np.ptp(lowest))) > MAX_RISE:
+    if up and (directions[:, _SIGNED_AXES.index(up)] > MAX_LYING_COSINE).mean() <= 0.5:
+        problem = f"with {up} up the body lies on its back or side: it stands"
+    elif not up and (shares.max() <= 0.5 or likely not in TO_Y_UP):
+        problem = "the body stands neither along y nor along z:"
+    else:
+        problem = ""
+    if problem:
+        remedy = "turn the root's rotation and path so that y or z is up, or give a clip that stands"
+        if likely in TO_Y_UP:
+            remedy = f"give --motion-up {likely}, or a clip that stands"
+        raise MotionError(f"{raw.path}: {problem} along {likely} in {share}; {remedy}")
+    rise = float(np.ptp(joints[..., _SIGNED_AXES.index(up or likely)].min(axis=1)))
+    if not up and rise > MAX_RISE:
         raise MotionError(
             f"{raw.path}: the body points along {likely} in {share}, and its lowest joint moves by "
             f"{rise:.3g} m along it; if {likely} is up and the path in metres give --motion-up {likely}"
         )
-    return _turn(raw, likely, f"{likely} up, as the body stands in {share}")
-
-
-def _remedy(likely: str) -> str:
-    if likely in TO_Y_UP:
-        return f"give --motion-up {likely}, or a clip that stands"
-    return "turn the root's rotation and path so that y or z is up, or give a clip that stands"
-
-
-def _turn(raw: RawMotion, up: str, note: str) -> RawMotion:
-    turn = TO_Y_UP[up]
+    turn = TO_Y_UP[up or likely]
+    note = f"{up} up as given" if up else f"{likely} up, as the body stands in {share}"
     poses = raw.poses.copy()
     poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
-    return replace(
-        raw, poses=poses, translations=raw.translations @ turn.T,
-        source=f"{raw.source}; {note}",
-    )  # fmt: skip
+    return replace(raw, poses=poses, translations=raw.translations @ turn.T, source=f"{raw.source}; {note}")

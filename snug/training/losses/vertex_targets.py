@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.geometry.topology import half_edges
+from reference_sim.geometry.topology import edge_uses
 from snug.body.skinning import skin, unskin
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
@@ -222,7 +222,7 @@ def smooth_offsets(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
     from scipy.sparse import coo_array, diags_array  # a network of another kind trains without scipy
 
     count = offsets.shape[1]
-    edges, uses = np.unique(np.sort(half_edges(faces), axis=1), axis=0, return_counts=True)
+    edges, uses = edge_uses(faces)
     on_rim = np.zeros(count, dtype=bool)
     on_rim[edges[uses == 1]] = True
     pairs = np.concatenate([edges, edges[:, ::-1]])

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, REST_JOINTS, joint_positions
-from snug.motion.bvh import read_clip
+from snug.motion.bvh import read_clip, shift_of, turns_of
 from snug.motion.files import read_motion
 from snug.motion.joint_names import NEEDED, _side, match_joints
 from snug.motion.library import make_motion
@@ -51,16 +51,15 @@ Frames: 1
 Frame Time: 0.0083333
 4 5 6 10 20 30 40 50
 """
-    clip = read_clip(written(tmp_path / "a.bvh", text))
-    assert [joint.name for joint in clip.joints] == ["a", "b", ""] and round(clip.fps) == 120
-    root, below, end = clip.joints
-    np.testing.assert_allclose(clip.shift(root), [[4, 5, 6]])
-    np.testing.assert_allclose(clip.shift(below), [[0, 1, 0]])
+    (root, below, end), frames, fps = read_clip(written(tmp_path / "a.bvh", text))
+    assert [joint.name for joint in (root, below, end)] == ["a", "b", ""] and round(fps) == 120
+    np.testing.assert_allclose(shift_of(root, frames), [[4, 5, 6]])
+    np.testing.assert_allclose(shift_of(below, frames), [[0, 1, 0]])
     np.testing.assert_allclose(end.offset, [0, 0, 1])
     expected = Rotation.from_euler("ZYX", [10, 20, 30], degrees=True).as_matrix()
-    np.testing.assert_allclose(clip.turns(root)[0], expected, atol=1e-12)
+    np.testing.assert_allclose(turns_of(root, frames)[0], expected, atol=1e-12)
     np.testing.assert_allclose(
-        clip.turns(below)[0], Rotation.from_euler("YZ", [40, 50], degrees=True).as_matrix(), atol=1e-12
+        turns_of(below, frames)[0], Rotation.from_euler("YZ", [40, 50], degrees=True).as_matrix(), atol=1e-12
     )
 
 
