@@ -18,9 +18,9 @@ from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import Metric
 from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files
-from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.make_plan import plan_scene
+from benchmarks.plan.options import REPLACED, add_study_options, study_of
 from benchmarks.plan.plan import STATES, Motions, Plan
-from benchmarks.plan.plan_scene import plan_scene
 from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
@@ -41,7 +41,7 @@ the same twice)."""
 EXAMPLES = """examples:
   python -m benchmarks.check mine.py            all that METHODS, SCENES and METRICS of the file declare
   python -m benchmarks.check mine.py my_scene.py
-  python -m benchmarks.check mine.py --scene tshirt/kick --preset smoke    methods in a scene of that size
+  python -m benchmarks.check mine.py --scene tshirt/kick --set sizes=smoke    methods in a scene of that size
   python -m benchmarks.check mine.py --scene shirt/kick --garment shirt.obj
 
 exit status: 0 when nothing is wrong; 1 when something is, a line for each; 2 when a file cannot be read."""
@@ -70,20 +70,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one_thread()
     parser = Parser(
         prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES,
-        replaced={"--seconds": "a method in a tiny scene is ended after two minutes, elsewhere as in a run"},
+        replaced=REPLACED
+        | {"--seconds": "a method in a tiny scene is ended after two minutes, elsewhere as in a run"},
     )  # fmt: skip
     parser.add_argument("what", nargs="+", metavar="FILE", help="a file")
     parser.add_argument("--scene", metavar="SCENE",
         help="check the methods in this scene of benchmarks.run --list, in place of the tiny ones: for "
         "networks that are bound to a garment or a mesh")  # fmt: skip
-    add_scene_options(parser)
+    add_study_options(parser)
     options, wrong = parser.parse_args(arguments), 0
     files = [read_file(path) for path in options.what]
     scene_plan = None
     if options.scene:
         if not any(declared.methods for declared in files):
             raise DeclarationError(f"--scene {options.scene}: {', '.join(options.what)} declares no METHODS")
-        scene_plan = plan_scene(options.scene, options)
+        scene_plan = plan_scene(study_of(options), options.scene)
     for declared in files:
         with tempfile.TemporaryDirectory() as folder:
             for line, fine in check_file(declared, Path(folder), scene_plan):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,10 +22,22 @@ class Named(Protocol):
 
 
 Entry = TypeVar("Entry", bound=Named)
+_ATTRIBUTE = re.compile(r"^ {4}(\w+(?:, \w+)*): ((?:.|\n {5,})*)", re.M)
 
 
 class DeclarationError(ValueError):
     """A declaration that cannot be meant; the message names it and what to do."""
+
+
+def attributes_of(kind: type) -> dict[str, str]:
+    """Return attribute -> text, as the docstring of a class describes them; nothing where it does not.
+
+    >>> attributes_of(DeclarationError)
+    {}
+    """
+    _, _, section = (inspect.getdoc(kind) or "").partition("Attributes:\n")
+    entries = _ATTRIBUTE.findall(re.split(r"\n\n\S", section)[0])
+    return {names: " ".join(content.split()).rstrip(".") for names, content in entries}
 
 
 def by_name(what: str, entries: Iterable[Entry]) -> dict[str, Entry]:

@@ -9,16 +9,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.plan.options import add_scene_options
+from benchmarks.plan.make_plan import plan_scene
+from benchmarks.plan.options import OF_SCENES, REPLACED, add_study_options, study_of
 from benchmarks.plan.plan import PlanError
-from benchmarks.plan.plan_scene import plan_scene
 from benchmarks.process.timing import one_thread
 from reference_sim.command_line import Parser, command
 
 PROGRAM = "benchmarks.export"
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick
-  python -m benchmarks.export hanging_sheet --preset smoke -o sheet --reference
+  python -m benchmarks.export hanging_sheet --set sizes=smoke -o sheet --reference
   python -m benchmarks.export tshirt/01_01 --motions clips/ --test-motions 01_01 --body mine.npz -o out
   python -m benchmarks.export tshirt/training-motions -o motions.h5    training motions, simulated, in a file
   python -m benchmarks.score mine.npz --scene tshirt/kick        what came of it, judged
@@ -34,6 +34,7 @@ exit status: 0 written; 2 the scene is not known or cannot be made, or the folde
 def make_export_parser() -> argparse.ArgumentParser:
     """Return the parser of the command."""
     parser = Parser(
+        replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
         description="Write a scene as plain files: rest mesh, weights, material, motion, posed body, start.",
         epilog=EXAMPLES,
@@ -42,7 +43,7 @@ def make_export_parser() -> argparse.ArgumentParser:
     add("scene", metavar="SCENE", help="as in benchmarks.run --list, or GARMENT/training-motions")
     add("-o", "--out", required=True, metavar="DIR", help="a new or empty folder; of training motions a file")
     add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
-    add_scene_options(parser)
+    add_study_options(parser)
     return parser
 
 
@@ -62,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{len(written)} training motions of {garment} in {folder}")
         return 0
     demand_new(folder)
-    plan = plan_scene(options.scene, options)
+    plan = plan_scene(study_of(options), options.scene)
     try:
         scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
         from benchmarks.external.exported_scene import write_scene  # loads the simulator
@@ -81,15 +82,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def scene_arguments(options: argparse.Namespace) -> list[str]:
-    """Return the options of a scene that were given, as arguments of another command; the preset always."""
-    parser, arguments = make_export_parser(), ["--preset", options.preset]
-    for name, value in vars(options).items():
-        if name in ("scene", "out", "reference", "preset") or value == parser.get_default(name):
-            continue
-        values = value if isinstance(value, list) else [value]
-        for each in values:
-            # With "=", a value that begins with a hyphen is not taken for another option.
-            arguments.append(f"--{name.replace('_', '-')}" + ("" if each is True else f"={each}"))
+    """Return the options of a scene that were given, as arguments of another command."""
+    arguments = []
+    for name in ("settings", *OF_SCENES):
+        given = getattr(options, name) or []
+        # With "=", a value that begins with a hyphen is not taken for another option.
+        word = "--set" if name == "settings" else f"--{name.replace('_', '-')}"
+        arguments += [f"{word}={value}" for value in (given if isinstance(given, list) else [given])]
     return arguments
 
 

@@ -27,14 +27,12 @@ class Preset:
     that trains; clip_frames: of its liveliest part;
     warm_up_frames: at the beginning of a dressed scene, simulated and not evaluated, before those of a clip;
     loop_frames: of the walk in a loop.
-    steps: optimiser steps per kind of network, or per training. further: whether the
-    ablations and further baselines of a suite take part without being named. settle_frames: frames from the
-    T-pose into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along
-    each side. gap_samples: frames of a trajectory, at least, at which suite speed solves the step
-    again to know the gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell,
-    whose short run is done again until then. repeats: times that a cell of suite speed is run, those whose
-    first run took at most repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended
-    [s]. smallest: whether of cases and hard motions only those run that are marked for it.
+    steps: optimiser steps per kind of network, or per training. settle_frames: frames from the T-pose into
+    the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along each side.
+    gap_samples: frames of a trajectory, at least, at which part speed solves the step again to know the gap
+    to its minimum. least_seconds [s]: of run time to be measured of each timed cell, whose short run is done
+    again until then. repeats: times that a cell of part speed is run, those whose first run took at most
+    repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
     """
 
     name: str
@@ -51,15 +49,12 @@ class Preset:
     steps: dict[str, int]
     sheet_cells: int
     sheet_frames: int
-    iteration_budgets: tuple[int, ...]
     gap_samples: int
     least_seconds: float
     repeats: int
     repeat_seconds: float
     cell_seconds: float
     dependence: Dependence
-    further: bool = False
-    smallest: bool = False
 
     def steps_of(self, training: str, kind: str) -> int:
         """Return the optimiser steps of a training by its name, else its kind; 0 for an untrained network."""
@@ -76,8 +71,7 @@ def _steps(*, snug: int, ncs: int, **others: int) -> dict[str, int]:
 PRESETS = (
     Preset(
         name="smoke",
-        smallest=True,
-        description="everything once, tiny: about 2 minutes on 2 cores; its numbers mean nothing",
+        description="garments of 350 vertices, seconds of training; its numbers mean nothing",
         garment_vertices=350,
         train_motions=1,
         test_motions=1,
@@ -90,7 +84,6 @@ PRESETS = (
         steps=_steps(snug=60, ncs=30, dynamic=60, supervised=60, pbns=60, santesteban2019=10, tailornet=60),
         sheet_cells=6,
         sheet_frames=10,
-        iteration_budgets=(1, 4),
         gap_samples=10,
         least_seconds=0.1,
         repeats=2,
@@ -121,7 +114,6 @@ PRESETS = (
         ),
         sheet_cells=14,
         sheet_frames=45,
-        iteration_budgets=(1, 2, 4, 8),
         gap_samples=12,
         least_seconds=0.5,
         repeats=3,
@@ -152,10 +144,8 @@ PRESETS = (
             santesteban2019=10_000,
             tailornet=10_000,
         ),
-        further=True,
         sheet_cells=30,
         sheet_frames=90,
-        iteration_budgets=(1, 2, 4, 8),
         gap_samples=40,
         least_seconds=1.0,
         repeats=3,

@@ -1,20 +1,21 @@
 """python -m benchmarks.run: the main job, from a body and motions to a report.
 
-This file is the command alone: a request, its plan, stages in order, an exit status. Nothing heavy is
+This file is the command alone: a study, its plan, stages in order, an exit status. Nothing heavy is
 imported before the plan is made, so that --help and --list answer at once.
 """
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_option import RollOutFileError
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import PROGRAM, make_parser, request_of_run, split
+from benchmarks.plan.options import PROGRAM, make_parser, split, study_of
 from benchmarks.plan.plan import Plan
-from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
 from benchmarks.tasks.task import RunStopped
 from reference_sim.command_line import heeded_interrupts, print_text
@@ -26,12 +27,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one_thread()
     try:
         options = make_parser().parse_args(command_line)
+        study = study_of(options, options.study)
         if options.list:
             from benchmarks.plan.list_names import list_names
 
-            print_text(list_names(find_preset(options.preset), split(options.suite)))
+            print_text(list_names(study))
             return 0
-        plan = make_plan(request_of_run(options, command_line))
+        plan = make_plan(
+            study,
+            folder=Path(options.out) if options.out else None,
+            only=split(options.only),
+            fresh=options.fresh,
+            workers=options.workers,
+            scheduler=options.scheduler or "",
+            command=shlex.join(["python", "-m", PROGRAM, *command_line]),
+        )
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -46,7 +56,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     for name, text in plan.cut_motions.items():
-        print(f"motion {name}: {text} are measured; --frames measures more", file=sys.stderr)
+        print(f"motion {name}: {text} are measured; --set sizes.frames=N measures more", file=sys.stderr)
     from benchmarks.runner.lock import HeldError, held
 
     try:

@@ -12,24 +12,40 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from benchmarks.plan.options import add_scene_options
-from benchmarks.plan.plan import Plan
-from benchmarks.plan.plan_roll_out import plan_roll_out
+from benchmarks.cell import Cell
+from benchmarks.external.roll_out_option import (
+    FileConventions,
+    RollOutFileError,
+    RollOutOption,
+    parse_roll_out,
+    roll_out_of,
+)
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.options import REPLACED, add_study_options, study_of
+from benchmarks.plan.plan import Plan, PlanError
+from benchmarks.plan.read_study import read_study
+from benchmarks.plan.study import Study
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from reference_sim.command_line import INTERRUPTED, Parser
 
 PROGRAM = "benchmarks.score"
+MEASURED_BESIDE = ("simulation", "skinning")  # relative excess is the share of skinning's
+SOLVED_AGAIN = "speed"  # the part in which steps are solved again: gaps and one-step errors
+NO_REFERENCE = (
+    "left out by --no-reference: curvature error and histogram, distances, dynamics, relative energy gap"
+)
 MISSING = "missing"  # status of a roll-out that a run ended before
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
   python -m benchmarks.score mine.npz --scene tshirt/kick -o scored
-  python -m benchmarks.score mine.pc2 --scene tshirt/kick --units cm --up z --match-vertices
-  python -m benchmarks.score frames/ --scene hanging_sheet --fps 60 --declared-ms 2.2
+  python -m benchmarks.score mine.pc2,units=cm,up=z,match-vertices --scene tshirt/kick
+  python -m benchmarks.score theirs=frames/,fps=60,ms=2.2 --scene hanging_sheet
   python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
   python -m benchmarks.score mine.npz --scene tshirt/kick --json --no-report > numbers.json
   python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
@@ -37,7 +53,8 @@ EXAMPLES = """examples:
 ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
   cloth_faces, obstacle, obstacle_faces; .pc2 and .pc16 with their .obj; a folder or a quoted pattern of
   meshes, one a frame. In world coordinates, the scene's first frame first. Other units, axes, rates and
-  orders of vertices are refused with the option that mends them.
+  orders of vertices are refused with the words that mend them: units=cm, up=z, fps=60, match-vertices;
+  other-mesh compares surfaces alone, ms=2.2 says what a frame takes.
 
 exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cannot be read or does not belong
   to the scene: one line says why and nothing is written; 130 interrupted."""
@@ -46,27 +63,20 @@ exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cann
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of the command."""
     parser = Parser(
+        replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
         description="Energies, gap to the minimum of each step, curvature, depth, conservation, dynamics of "
         "a roll-out of another program: rows, a report, one line.",
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("roll_out", metavar="ROLLOUT", help="file, folder or pattern")
+    add("roll_out", metavar="[NAME=]ROLLOUT", help="file, folder or pattern; as benchmarks.run --rollout")
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--scene", metavar="NAME", help="as in benchmarks.run --list")
     where.add_argument("--rest-mesh", metavar="FILE",
         help="no scene of this project: the cloth at rest, in the roll-out's unit, axes and order; the file "
         "brings its own body (obstacle, obstacle_faces) and starts at rest in its first frame")  # fmt: skip
-    add_scene_options(parser)
-    add("--name", default="", metavar="NAME", help="of the method in tables (default: the file's)")
-    add("--units", default="m", metavar="m|cm|mm|in", help="of the roll-out (default m)")
-    add("--up", default="y", metavar="y|z", help="its up axis (default y)")
-    add("--fps", type=float, metavar="N", help="its frames per second; other than the scene's are re-timed")
-    add("--match-vertices", action="store_true", help="its vertices are the scene's in another order")
-    add("--other-mesh", action="store_true", help="its mesh is another one: surfaces are compared alone")
-    add("--declared-ms", type=float, metavar="X",
-        help="milliseconds a frame, as its author says: marked so, nothing is timed here")  # fmt: skip
+    add_study_options(parser)
     reference = parser.add_mutually_exclusive_group()
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
@@ -87,9 +97,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command_line = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     try:
-        command = shlex.join(["python", "-m", PROGRAM, *command_line])
         options = make_parser().parse_args(command_line)
-        plan = plan_roll_out(options, command)
+        plan = plan_score(
+            study_of(options), options.roll_out, options.scene or "",
+            rest_mesh=options.rest_mesh, reference=False if options.no_reference else options.reference,
+            report=not options.no_report, folder=Path(options.out) if options.out else None,
+            command=shlex.join(["python", "-m", PROGRAM, *command_line]),
+        )  # fmt: skip
     except (ValueError, OSError) as error:  # as in benchmarks.run
         print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -103,12 +117,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
+def score(
+    roll_out: str | Path, scene: str = "", *, study: Study | None = None, **more: Any
+) -> dict[str, Any]:
     """Evaluate a roll-out in a scene and return the numbers, without figures, page and PDF.
 
     Args:
         roll_out: a file, a folder or a pattern, as the command takes it.
-        *options: of the command, such as "--scene", "tshirt/kick".
+        scene: its name, as "tshirt/kick".
+        study: whose body, garment, motions and sizes the scene has; None: study default.
+        more: `rest_mesh`, `reference` and `folder` of `plan_score`.
 
     Returns:
         What `numbers` returns.
@@ -118,12 +136,11 @@ def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
             evaluation ended early.
         KeyboardInterrupt: it was interrupted.
 
-    >>> score("mine.npz", "--scene", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
+    >>> score("mine.npz", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
     0.031
     """
     one_thread()
-    bare = make_parser().parse_args([str(roll_out), *options, "--no-report"])
-    plan = plan_roll_out(bare, "benchmarks.score.score")
+    plan = plan_score(study or read_study(), str(roll_out), scene, report=False, **more)
     message = io.StringIO()
     with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(message):
         status = carry_out(plan, program=PROGRAM, report=False)
@@ -134,6 +151,74 @@ def score(roll_out: str | Path, *options: str) -> dict[str, Any]:
     if evaluated is None or evaluated["status"] == MISSING:
         raise ValueError(lines[-1] if lines else "the run ended early")
     return evaluated
+
+
+def plan_score(
+    study: Study, roll_out: str, scene: str = "", *, rest_mesh: str | Path | None = None,
+    reference: str | Path | Literal[False] | None = None, report: bool = True, folder: Path | None = None,
+    command: str = "benchmarks.score.score",
+) -> Plan:  # fmt: skip
+    """Return the plan of a roll-out, of the simulation and of skinning in one scene.
+
+    Args:
+        study: whose body, garment, motions and sizes the scene has.
+        roll_out: [NAME=]FILE, with ,units=cm and the like behind it.
+        scene: its name; empty with a rest mesh.
+        rest_mesh: of a roll-out that brings its own scene.
+        reference: a roll-out in place of the simulation; False for none.
+        report: whether times and gaps of what the roll-out is compared with are measured.
+        folder: of the run; None: a new one.
+        command: the command line, for run.json.
+
+    Raises:
+        ValueError: one line for the first thing that cannot be met.
+    """
+    option = roll_out_of(*parse_roll_out(roll_out, named=False))
+    if rest_mesh and option.stated.other_mesh:
+        raise RollOutFileError("other-mesh compares with a scene: give --scene, not --rest-mesh")
+    scenes = []
+    if rest_mesh:
+        from benchmarks.scenes.from_roll_out import declared  # loads the simulator
+
+        scenes = [declared(option, str(rest_mesh))]
+        scene = scenes[0].name
+        # The rate that the user has stated of the file is now that of the scene.
+        option = replace(option, stated=replace(option.stated, fps=None))
+    parts = {name: replace(part, cases=()) for name, part in study.parts.items()}  # some have a scene's name
+    plan = make_plan(
+        replace(study, parts=parts, scenes=(scene,), methods=MEASURED_BESIDE, rollouts={option.name: option}),
+        folder=folder, command=command, scenes=scenes,
+    )  # fmt: skip
+    if len(plan.scenes) != 1:
+        raise PlanError(f"{scene}: name one scene; see python -m benchmarks.run --list")
+    cells = [_reference(cell, reference) for cell in plan.cells]
+    if not report:  # nobody looks at times and gaps of what the roll-out is compared with
+        cells = [replace(cell, entry=replace(cell.entry, timed=False)) for cell in cells]
+    looked_at = {cell.method for cell in cells} if report else {option.name}
+    again = {
+        cell.name: tuple(dict.fromkeys((*cell.suites, SOLVED_AGAIN)))
+        if cell.method in looked_at
+        else cell.suites
+        for cell in cells
+    }
+    suites = (SOLVED_AGAIN,) if rest_mesh else tuple(dict.fromkeys((*plan.suites, SOLVED_AGAIN)))
+    cells = [replace(cell, suites=again[cell.name]) for cell in cells]
+    return replace(plan, cells=tuple(cells), suites=suites)
+
+
+def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
+    """Return the simulation's cell, or the one that takes its place; others as they are."""
+    if cell.entry.role != "reference" or given is None:
+        return cell
+    if given is False:
+        return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
+    from benchmarks.methods.outside.stored_roll_out import entry_of  # loads numpy
+
+    stored = RollOutOption("reference", str(given), FileConventions(), role="reference")
+    entry = entry_of(stored, cell.scene.name)
+    if entry is None:
+        raise RollOutFileError(f"--reference {stored.path_for(cell.scene.name)}: no such file")
+    return replace(cell, entry=replace(entry, label="Reference, from a file"))
 
 
 def numbers(plan: Plan) -> dict[str, Any]:

@@ -1,20 +1,16 @@
-"""--rollout NAME=FILE: a stored roll-out as a method of a run."""
+"""A stored roll-out as a method of a run: its table in a study, and --rollout NAME=FILE."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
 MODULE = "benchmarks.methods.outside.stored_roll_out"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
-HELP = (
-    "a roll-out of another program as a method; the path may have {scene}, the scene's name with hyphens for "
-    "slashes; after it units=cm, up=z, fps=60, match-vertices or other-mesh, ms=2.2 (a frame, as its author "
-    "says)"
-)
 
 
 class RollOutFileError(ValueError):
@@ -39,12 +35,12 @@ class FileConventions:
 
         for what, value, known in (("units", self.units, tuple(METRES)), ("up", self.up, UP_AXES)):
             if value not in known:
-                raise RollOutFileError(f"--{what} {value}: choose from {', '.join(known)}")
+                raise RollOutFileError(f"{what}={value}: choose from {', '.join(known)}")
         if self.fps is not None and not 0.0 < self.fps < 1e6:
-            raise RollOutFileError(f"--fps {self.fps}: give a positive number of frames per second")
+            raise RollOutFileError(f"fps={self.fps}: give a positive number of frames per second")
         if self.match_vertices and self.other_mesh:
             raise RollOutFileError(
-                "--match-vertices and --other-mesh: another mesh has no vertex to match, give one"
+                "match_vertices and other_mesh: another mesh has no vertex to match, give one"
             )
 
 
@@ -77,39 +73,56 @@ class RollOutOption:
         return self.path.replace(PLACE, scene.replace("/", "-"))
 
 
-def parse_roll_out(text: str) -> RollOutOption:
-    """Parse NAME=FILE[,key=value...]. Raises RollOutFileError.
+FIELDS: dict[str, type] = {
+    "path": str, "units": str, "up": str, "fps": float, "match_vertices": bool, "other_mesh": bool,
+    "ms": float,
+}  # fmt: skip
 
-    >>> parse_roll_out("mine=out.npz,units=cm,ms=2.2").declared_ms
-    2.2
+
+def roll_out_of(name: str, table: Mapping[str, Any]) -> RollOutOption:
+    """Return the roll-out of that name with the fields of a study's table. Raises RollOutFileError.
+
+    >>> roll_out_of("mine", {"path": "out.npz", "units": "cm"}).stated.units
+    'cm'
+    """
+    values = {key.replace("-", "_"): value for key, value in table.items()}
+    for key, value in values.items():
+        if key not in FIELDS:
+            raise RollOutFileError(f"unknown word '{key}'; there are {', '.join(FIELDS)}")
+        if FIELDS[key] is float and type(value) not in (int, float):
+            raise RollOutFileError(f"{key}={value} is no number")
+        if FIELDS[key] is not float and type(value) is not FIELDS[key]:
+            wanted = "say it, or leave it out" if FIELDS[key] is bool else "give a text"
+            raise RollOutFileError(f"{key}={value}: {wanted}")
+    path, declared = values.pop("path", ""), values.pop("ms", None)
+    return RollOutOption(name, path, FileConventions(**values), declared)
+
+
+def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any]]:
+    """Parse NAME=FILE[,key=value...] into the name and its table; without `named`, NAME= may be absent.
+
+    Raises:
+        RollOutFileError: there is no name or no file.
+
+    >>> parse_roll_out("mine=out.npz,units=cm,ms=2.2")
+    ('mine', {'path': 'out.npz', 'units': 'cm', 'ms': 2.2})
     """
     given, *pairs = text.split(",")
     name, equals, path = (part.strip() for part in given.partition("="))
-    if not (name and equals and path):
-        raise RollOutFileError(f"--rollout {text}: give NAME=FILE, with ,units=cm and the like behind it")
-    fields: dict[str, Any] = {}
-    for pair in pairs:
-        key, equals, value = (part.strip() for part in pair.partition("="))
-        if key not in (known := (*_WORDS, *_FLAGS)):
-            raise RollOutFileError(f"--rollout {text}: unknown word '{key}'; there are {', '.join(known)}")
-        if key in _FLAGS:
-            if equals:
-                raise RollOutFileError(f"--rollout {text}: {key} takes no value: say it, or leave it out")
-            fields[_FLAGS[key]] = True
-            continue
-        field, convert = _WORDS[key]
-        try:
-            fields[field] = convert(value)
-        except ValueError:
-            raise RollOutFileError(f"--rollout {text}: {key}={value} is no number") from None
-    declared = fields.pop("declared_ms", None)
-    return RollOutOption(name, path, FileConventions(**fields), declared)
+    if not (named or equals):
+        stem = Path(given.rstrip("/").replace(PLACE, "")).stem
+        name, path = re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out", given.strip()
+    if not (name and path):
+        raise RollOutFileError(f"{text}: give NAME=FILE, with ,units=cm and the like behind it")
+    return name, {"path": path, **dict(map(_word, pairs))}
 
 
-_WORDS: dict[str, tuple[str, Callable[[str], Any]]] = {
-    "units": ("units", str),
-    "up": ("up", str),
-    "fps": ("fps", float),
-    "ms": ("declared_ms", float),
-}
-_FLAGS = {"match-vertices": "match_vertices", "other-mesh": "other_mesh"}  # words without a value
+def _word(text: str) -> tuple[str, Any]:
+    """Return key and value of key=value; of a key alone, True."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        return key, True
+    try:
+        return key, float(value)
+    except ValueError:
+        return key, value

@@ -68,7 +68,7 @@ def fit_to_scene(
         raise RollOutFileError(
             f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for "
             "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex; or "
-            "give --other-mesh, to have surfaces compared alone"
+            "give other-mesh, to have surfaces compared alone"
         )
     if not np.isfinite(stored.positions[0]).all():
         raise RollOutFileError("its first frame, the scene's start, is not finite")
@@ -108,7 +108,7 @@ def _check_other_mesh(stored: StoredRollOut, scene: BuiltScene) -> None:
     if (count, triangles) == (scene.cloth.vertex_count, len(scene.cloth.faces)):
         raise RollOutFileError(
             f"has {count} vertices and {triangles} triangles as the scene's mesh: leave out "
-            "--other-mesh, or give --match-vertices where they are in another order"
+            "other-mesh, or give match-vertices where they are in another order"
         )
 
 
@@ -155,7 +155,7 @@ def _check_axes(stored: StoredRollOut, expected: np.ndarray, stated: FileConvent
         and (given[0] not in alike or apart[best] < FARTHEST * size)
     ):
         pairs = zip(("units", "up"), best, given)
-        remedy = [f"--{name} {value}" for name, value, stated_value in pairs if value != stated_value]
+        remedy = [f"{name}={value}" for name, value, stated_value in pairs if value != stated_value]
         raise RollOutFileError(
             f"its first frame fits the scene's cloth in {best[0]}, {best[1]} up, {apart[best]:.2g} m off, "
             f"and not in {stated.units}, {stated.up} up: give {' '.join(remedy)}"
@@ -209,7 +209,7 @@ def _check_place(positions: np.ndarray, expected: np.ndarray) -> None:
         frame = far[0]
         raise RollOutFileError(
             f"from frame {frame} on its centre lies {away[frame]:.2g} m from where the body carries it: "
-            "another motion, another frame rate (--fps), or coordinates that are not the world's"
+            "another motion, another frame rate (fps=N), or coordinates that are not the world's"
         )
 
 
@@ -234,7 +234,7 @@ def _order(
 ) -> tuple[np.ndarray | None, str]:
     """Return the file's vertex for each of the scene's (V,), and how it was matched; None: the same order."""
     ours, first = scene.cloth.faces, stored.positions[0]
-    remedy = "; give --match-vertices" if not stated.match_vertices else ""
+    remedy = "; give match-vertices" if not stated.match_vertices else ""
     if stored.faces is not None:
         if same_faces(stored.faces, ours):
             return None, ""
@@ -293,7 +293,7 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: FileConventions) 
     stated_rate, frames = stored.fps, len(stored.positions)
     if stated.fps is None and stated_rate is not None and abs(stated_rate - rate) > RATE_TOLERANCE * rate:
         raise RollOutFileError(
-            f"states {stated_rate:g} frames a second, the scene has {rate:g}: give --fps {stated_rate:g} to "
+            f"states {stated_rate:g} frames a second, the scene has {rate:g}: give fps={stated_rate:g} to "
             "re-time it"
         )
     file_rate = rate if stated.fps is None else stated.fps
@@ -327,4 +327,4 @@ def _rate_hint(frames: int, expected: int, rate: float) -> str:
     ratio = (frames - 1) / max(expected - 1, 1)
     near: Mapping[float, float] = {fps: abs(ratio - fps / rate) for fps in (15, 24, 25, 50, 60, 90, 100, 120)}
     guess = min(near, key=lambda fps: near[fps])
-    return f": if it has {guess} a second, give --fps {guess}" if near[guess] < 0.05 * guess / rate else ""
+    return f": if it has {guess} a second, give fps={guess}" if near[guess] < 0.05 * guess / rate else ""

@@ -1,15 +1,13 @@
-"""The plan of a run: from a request to cells, cases, motions and a user's inputs.
+"""The plan of a run: from a study to cells, cases, motions and a user's inputs.
 
-request: everything that a user asks for. make_plan: the plan of a request. plan: what a run will do.
-options: the options of benchmarks.run. suites, choose_cells: which scenes meet which methods.
-motion_split: which motions train, validate and test. user_files: methods, scenes and metrics of a user's
-files. plan_roll_out: the plan of benchmarks.score. plan_scene: that of one scene alone. list_names: the text
-of --list.
+study: what is asked. read_study: from its file and options. make_plan: the plan of a study. plan: what a run
+will do. options: those of benchmarks.run. choose_cells: which scenes meet which methods. motion_split: which
+motions train, validate and test. user_files: methods, scenes and metrics of a user's files. list_names: the
+text of --list.
 
->>> from benchmarks.plan import Request, make_plan
->>> plan = make_plan(Request(scenes=("flag",), methods=("simulation",), suites=("speed",)))
->>> [cell.label for cell in plan.cells]
-['flag x simulation']
+>>> from benchmarks.plan import make_plan, read_study
+>>> [cell.label for cell in make_plan(read_study("engines")).cells]
+[]
 """
 
 import lazy_loader

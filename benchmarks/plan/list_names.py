@@ -1,30 +1,26 @@
-"""The text of --list: every name that the command knows."""
+"""The text of --list: every name that the command knows, and what a study takes of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
-from benchmarks.plan.choose_cells import Selection, choose_suites, default_suites
+from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.suites import SUITES
-from benchmarks.presets import PRESETS, Preset
+from benchmarks.plan.read_study import read_study, study_names
+from benchmarks.plan.study import Study
+from benchmarks.presets import PRESETS
 from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES
 from benchmarks.scenes.variations import shapes, there_and_back
 from benchmarks.validation.registry import CASES
 
 
-def list_names(preset: Preset, suites: tuple[str, ...] = ()) -> str:
-    """Return suites, scenes, methods, motions and presets, one line each.
+def list_names(study: Study) -> str:
+    """Return studies, scenes, methods, motions, sizes and cases, one line each.
 
-    Every scene and method can be named at every preset. The scenes that take part without being named are
-    those of the given preset and suites.
-
-    Raises:
-        PlanError: a suite that does not exist.
+    Every scene and method can be named in every study. Those that take part without being named are those of
+    the given study.
     """
-    measured = [suite for suite in SUITES if suite.name in choose_suites(suites)]
     from snug.motion.library import CONTROL, DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
     from snug.motion.recorded.table import CLIPS
 
@@ -36,39 +32,38 @@ def list_names(preset: Preset, suites: tuple[str, ...] = ()) -> str:
         for motion, role in (swinging if scenes.dynamic else roles).items()
         for scene in (scenes.scene(motion),)
     ]
-    extent = Selection(
-        suites=suites, preset=preset, motions=split_motions((), (), preset), full=bool(suites)
-    ).extent
+    plain = (*SCENES, there_and_back(TEST[0]), *shapes(TEST[0]), *FURTHER_SCENES)
+    motions = split_motions(study)
+    found = [
+        *dict.fromkeys((*(s.name for s in plain), *(n + clip for n, _ in dressed for clip in ("", "@clip"))))
+    ]
+    taken = {name: matching(found, expanded(part.scenes, motions)) for name, part in study.parts.items()}
     parts = (
-        ("suites", ((s.name, s.description) for s in SUITES)),
+        ("studies", ((name, read_study(name).question) for name in study_names())),
+        ("parts of this study", ((name, part.question) for name, part in study.parts.items())),
+        ("scenes of each part where none is named", ((n, ", ".join(s)) for n, s in taken.items() if s)),
         (
-            f"scenes that preset {preset.name} measures in each suite where none is named",
-            ((s.name, ", ".join(s.scenes(extent))) for s in measured if s.scenes(extent)),
-        ),
-        (
-            "scenes; of a dressed body, in a test or validation motion, also its liveliest part, as "
+            f"scenes; of a dressed body, in a test or validation motion, also its liveliest part, as "
             f"{dressed[0][0]}@clip",
-            [
-                *((s.name, s.description) for s in SCENES),
-                *dressed,
-                *((s.name, s.description) for s in map(there_and_back, TEST[:1])),
-                *((s.name, s.description) for s in shapes(TEST[0])),
-                *((s.name, s.description) for s in FURTHER_SCENES),
-            ],
+            [*((s.name, s.description) for s in plain), *dressed],
         ),
         (
-            f"methods, and the suites in which they take part at preset {preset.name} without being named",
-            ((m.name, f"{m.description} {_where(m, preset)}") for m in METHODS),
+            "methods, and the parts in which they take part without being named",
+            ((m.name, f"{m.description} [{_parts_of(m.name, study) or 'when named'}]") for m in METHODS),
         ),
         (
             "training motions",
             ((name, f"{CLIPS[name].content}, {CLIPS[name].frames} frames") for name in TRAIN),
         ),
         ("motions without a role", ((name, "") for name in CONTROL)),
-        ("presets", ((p.name, p.description) for p in PRESETS)),
-        *((f"cases of suite {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
+        ("sizes", ((p.name, p.description) for p in PRESETS)),
+        *((f"cases of part {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
     )
     return "\n\n".join(_section(title, rows) for title, rows in parts)
+
+
+def _parts_of(method: str, study: Study) -> str:
+    return ", ".join(name for name, part in study.parts.items() if matching([method], part.methods))
 
 
 def _cases(suite: str) -> list[tuple[str, str]]:
@@ -77,11 +72,6 @@ def _cases(suite: str) -> list[tuple[str, str]]:
     for case in (case for case in CASES if case.suite == suite):
         by_scene.setdefault(f"{case.scene}/*" if case.scene else case.name, []).append(case.description)
     return [(name, f"{len(d)} points, {d[0]} the first" if d[1:] else d[0]) for name, d in by_scene.items()]
-
-
-def _where(method: MethodEntry, preset: Preset) -> str:
-    suites = default_suites(method.name, preset)
-    return f"[{', '.join(suites)}]" if suites else "[when named]"
 
 
 def _section(title: str, rows: Iterable[tuple[str, str]]) -> str:

@@ -1,135 +1,198 @@
-"""From a request to a plan: everything is checked, and every file of a user read, before anything is done."""
+"""From a study to a plan: everything is checked, and every file of a user read, before anything is done."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from benchmarks.assets.inputs import LIBRARY, read_inputs
+from benchmarks.assets.inputs import Inputs, read_inputs
+from benchmarks.cell import Cell
+from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import installed
+from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.plan import user_files
-from benchmarks.plan.choose_cells import Selection, choose_cells, choose_suites, names_no_motion
+from benchmarks.plan.choose_cells import Declared, choose_cells
 from benchmarks.plan.motion_split import split_motions
 from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Motions, Plan, PlanError
-from benchmarks.plan.request import Request
+from benchmarks.plan.study import Study, nearest
 from benchmarks.provenance import usable_cores
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
-from benchmarks.scenes.textile_tests import textile_tests
+from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
 from snug.garments.options import GarmentFile, demand_usable_name
 
 if TYPE_CHECKING:
-    from benchmarks.assets.inputs import UserBody
     from benchmarks.fabrics.fabric import Fabric
-    from benchmarks.scene import Scene
     from benchmarks.validation.case import Case
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 
 
-def make_plan(request: Request) -> Plan:
-    """Return the plan of a request: cells, cases, motions and a user's inputs as read.
+@dataclass(frozen=True)
+class Read:
+    """A study whose files were read: names in place of files, inputs, motions by role, what is declared."""
+
+    study: Study
+    inputs: Inputs
+    motions: Motions
+    declared: Declared
+
+
+def make_plan(
+    study: Study,
+    *,
+    folder: Path | None = None,
+    only: Sequence[str] = (),
+    fresh: bool = False,
+    workers: int | None = None,
+    scheduler: str = "",
+    command: str = "",
+    scenes: Sequence[Scene] = (),
+) -> Plan:
+    """Return the plan of a study: cells, cases, motions and a user's inputs as read.
+
+    Args:
+        study: what is asked.
+        folder: of the run; None: a new one.
+        only: states of what the folder holds in which a task is done again; none for the usual ones.
+        fresh: whether nothing of the folder is reused.
+        workers: processes side by side; None: as many as usual.
+        scheduler: address of a cluster; empty: this machine.
+        command: the command line, for run.json.
+        scenes: further scenes that no file declares.
 
     Raises:
         ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing has
             been created then.
 
-    >>> plan = make_plan(Request(scenes=("flag",), methods=("simulation",)))
-    >>> [scene.name for scene in plan.scenes]
+    >>> from benchmarks.plan.read_study import option, read_study
+    >>> study = read_study("default", [option("", "scenes", "flag"), option("", "methods", "simulation")])
+    >>> [scene.name for scene in make_plan(study).scenes]
     ['flag']
     """
-    suites = choose_suites(request.suites)
-    check_seeds(request.seeds)
-    check_device(request.device)
-    check_scheduler_fits(request)
-    folder = choose_folder(request.folder)
-    only = choose_states(request.only, fresh=request.fresh)
-    workers = choose_workers(request.workers)
-    scenes, user_scenes = user_files.resolve(user_files.SCENES, request.scenes)
-    methods, user_methods = user_files.resolve(user_files.METHODS, request.methods)
-    user_scenes = [*request.further_scenes, *user_scenes]
-    if request.garment:
-        check_garment_name(request.garment)
-    inputs = read_inputs(request.body, request.garment, request.motions, request.motion_options)
-    motions, named = Motions(), (request.motions, request.test_motions, request.validation_motions)
-    if any(named) or not names_no_motion(scenes, user_scenes):
-        motions = split_motions(
-            inputs.motions, request.test_motions, request.preset, library=LIBRARY in request.motions,
-            validation_names=request.validation_motions, split=request.split,
-        )  # fmt: skip
-    if request.garment:
-        motions = replace(motions, worn=(scenes_of_file(request.garment), *motions.worn[1:]))
-    if request.self_contact:
-        if not installed("ipctk"):
-            raise PlanError("--self-contact needs the package ipctk: pip install ipctk")
-        motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
-    cells, cases = choose_cells(
-        Selection(
-            suites=suites, full=bool(request.suites), preset=request.preset, motions=motions,
-            scenes=tuple(scenes), methods=tuple(methods), seeds=request.seeds,
-            user_scenes=tuple(user_scenes), user_methods=tuple(user_methods), roll_outs=request.roll_outs,
-            one_scene=request.one_scene, **tests_of_fabrics(request, suites),
-        )
-    )  # fmt: skip
-    check_body_shapes(inputs.body, [cell.scene for cell in cells])
+    check_machines(study, scheduler)
+    folder = choose_folder(folder)
+    states = choose_states(only, fresh=fresh)
+    processes = choose_workers(workers)
+    read = read_files(study, scenes)
+    study, motions = read.study, read.motions
+    cells, cases = choose_cells(study, motions, read.declared)
+    check_body_shapes(study, read.inputs, [cell.scene for cell in cells])
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
     return Plan(
-        preset=request.preset,
-        suites=tuple(suite for suite in suites if suite in asked),
+        preset=study.sizes,
+        suites=tuple(part for part in study.parts if part in asked),
         cells=cells,
         cases=cases,
-        metrics=choose_metrics(request.metrics),
+        metrics=choose_metrics(study),
         motions=motions,
-        inputs=inputs,
-        seeds=request.seeds,
-        device=request.device,
+        inputs=read.inputs,
+        seeds=study.seeds,
+        device=study.device,
         folder=folder,
-        only=only,
-        fresh=request.fresh,
-        workers=workers,
-        scheduler=request.scheduler,
-        trained=check_trained(request, folder),
-        command=request.command,
+        only=states,
+        fresh=fresh,
+        workers=processes,
+        scheduler=scheduler,
+        trained=check_trained(study, folder, scheduler),
+        command=command,
+        study=study.written,
     )
 
 
-def tests_of_fabrics(request: Request, suites: Sequence[str]) -> dict[str, Any]:
-    """Return the fields of a Selection that a user's files of fabrics fill. Raises ValueError."""
-    options = {"--fabrics": request.fabrics, "--gauge": request.gauge}
-    named = [f"{option} {path}" for option, path in options.items() if path is not None]
-    if named and "fabric" not in suites:
-        raise PlanError(f"{named[0]}: only suite fabric tests fabrics: add --suite fabric")
+def plan_scene(study: Study, name: str) -> Plan:
+    """Return the plan of one scene by the simulation alone, in no folder: for export and check.
+
+    Raises:
+        ValueError: one line for the first thing that cannot be met.
+    """
+    read = read_files(study)
+    declared = read.declared.scenes
+    if name not in declared:
+        raise PlanError(f"no scene '{name}'; {nearest(name, list(declared))}")
+    cell = Cell(declared[name].at(study.sizes), find_method("simulation"), 0, ("speed",))
+    check_body_shapes(study, read.inputs, [cell.scene])
+    return Plan(
+        preset=study.sizes, suites=("speed",), cells=(cell,), cases=(), motions=read.motions,
+        inputs=read.inputs, seeds=study.seeds, device="cpu", folder=Path(), command="", study=study.written,
+    )  # fmt: skip
+
+
+def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
+    """Read all files of a user that a study names. Raises ValueError.
+
+    scenes: further ones that no file declares.
+    """
+    study, user_scenes, user_methods = user_files.declarations_of(study)
+    if study.garment:
+        check_garment_name(study.garment)
+    inputs = read_inputs(study.body, study.garment, study.motions, study.motion_files)
+    motions = split_motions(study, inputs.motions)
+    if study.garment:
+        motions = replace(motions, worn=(scenes_of_file(study.garment), *motions.worn[1:]))
+    if study.self_contact:
+        if not installed("ipctk"):
+            raise PlanError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
+        motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
+    fabric_scenes, fabric_cases = tests_of_fabrics(study)
+    cases = (*CASES, *fabric_cases)
+    taken = {case.name for case in cases}
+    for scene in user_scenes:
+        if scene.name in taken:
+            raise DeclarationError(
+                f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name: give it "
+                "another"
+            )
+    of = motions
+    measured = dict.fromkeys((*of.measured, *of.test, *of.validation))
+    dynamic = dict.fromkeys((*of.dynamic_measured, *of.dynamic_test, *of.dynamic_validation))
+    known = (*all_scenes(measured, dynamic, of.worn).values(), *fabric_scenes, *scenes, *user_scenes)
+    methods = by_name("method", (*METHODS, *user_methods))
+    return Read(study, inputs, motions, Declared(by_name("scene", known), methods, cases))
+
+
+def tests_of_fabrics(study: Study) -> tuple[Sequence[Scene], Sequence[Case]]:
+    """Return scenes and cases of a user's fabrics. Raises ValueError."""
     sample: list[Fabric] = []
     cases: list[Case] = []
-    if request.fabrics is not None:
+    for field in ("fabrics", "gauge"):
+        if getattr(study, field) and "fabric" not in study.parts:
+            raise PlanError(f"{study.place(field)}: only study fabric tests fabrics: benchmarks.run fabric")
+    if study.fabrics is not None:
         from benchmarks.fabrics.measured import read_fabrics, spread_sample
         from benchmarks.validation.fabric.cases import percentiles
 
-        fabrics = read_fabrics(request.fabrics)
+        fabrics = read_fabrics(study.fabrics)
         sample += [replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)]
         cases += percentiles(fabrics)
-    if request.gauge is not None:
+    if study.gauge is not None:
         from benchmarks.fabrics.gauge import read_gauge
 
-        sample += [replace(fabric, name=f"gauge/{fabric.name}") for fabric in read_gauge(request.gauge)]
-    return {"fabric_scenes": textile_tests(sample), "fabric_cases": tuple(cases)}
+        sample += [replace(fabric, name=f"gauge/{fabric.name}") for fabric in read_gauge(study.gauge)]
+    if not sample:
+        return (), cases
+    from benchmarks.scenes.textile_tests import textile_tests
+
+    return textile_tests(sample), cases
 
 
-def choose_metrics(files: Sequence[str]) -> tuple[str, ...]:
+def choose_metrics(study: Study) -> tuple[str, ...]:
     """Return the modules of metrics that are not the project's. Raises ValueError."""
-    if not files:
+    if not study.metrics:
         return ()
     from benchmarks.metrics import declared  # loads numpy
 
-    names, metrics = user_files.resolve(user_files.METRICS, files)
+    names, metrics = user_files.resolve(user_files.METRICS, study.metrics)
     for name in names:
         if name not in {metric.name for metric in metrics}:
-            raise PlanError(f"--metrics {name}: is no file; those of the project are measured without it")
+            what = f"{study.place('metrics')}: {name}: is no file"
+            raise PlanError(f"{what}; those of the project are measured without it")
     homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
     declared(homes)  # each name stands once
     return homes
@@ -143,20 +206,18 @@ def check_garment_name(file: GarmentFile) -> None:
     }
     if file.name in taken:
         raise PlanError(
-            f"--garment {file.path}: the project has scenes of that name: give the file another name"
+            f"garment {file.path}: the project has scenes of that name: give the file another name"
         )
 
 
-def check_body_shapes(user_body: UserBody | None, scenes: Sequence[Scene]) -> None:
+def check_body_shapes(study: Study, inputs: Inputs, scenes: Sequence[Scene]) -> None:
     """Raise PlanError for a user's body with fewer shapes than a scene of the project sets."""
-    if user_body is None:
-        return
-    count = user_body.body.shape_count
-    for scene in scenes:
+    count = inputs.body.body.shape_count if inputs.body else 0
+    for scene in scenes if inputs.body else ():
         needed = 0 if scene.declared_in else len(scene.options.get("betas", ()))
         if needed > count:
             raise PlanError(
-                f"--body {user_body.path}: has {count} body shapes (array 'shapedirs'), scene {scene.name} "
+                f"body {study.body}: has {count} body shapes (array 'shapedirs'), scene {scene.name} "
                 f"needs {needed}: give a body with as many, or name other scenes by --scenes"
             )
 
@@ -164,14 +225,6 @@ def check_body_shapes(user_body: UserBody | None, scenes: Sequence[Scene]) -> No
 def scenes_of_file(file: GarmentFile) -> GarmentScenes:
     """Return the scenes of a user's garment, which take the place of the T-shirt's."""
     return GarmentScenes(file.name, f"a garment of {file.path.name}")
-
-
-def check_seeds(seeds: Sequence[int]) -> None:
-    """Raise PlanError unless there are seeds, none below 0 or beyond 63 bits."""
-    if not seeds or min(seeds) < 0 or max(seeds) >= 1 << 63:
-        given = ",".join(map(str, seeds))
-        wanted = "at least one whole number, none below 0 or beyond 63 bits"
-        raise PlanError(f"--seeds '{given[:40]}': give {wanted}")
 
 
 def choose_workers(count: int | None) -> int:
@@ -192,46 +245,41 @@ def choose_states(states: Sequence[str], *, fresh: bool) -> frozenset[str]:
     return frozenset(states or DEFAULT_ONLY)
 
 
-def check_device(device: str) -> None:
-    """Raise PlanError for an unknown device, and DeviceError for one that this machine does not have."""
-    if device not in ("cpu", "cuda"):
-        raise PlanError(f"--device '{device}': choose cpu or cuda")
-    if device == "cuda":
+def check_machines(study: Study, scheduler: str) -> None:
+    """Raise ValueError for a device that this machine lacks, or for what a cluster cannot do."""
+    if study.device == "cuda":
         from snug.training.device import find_device  # loads torch
 
-        find_device(device)
+        find_device(study.device)
+    if not scheduler:
+        return
+    if study.device != "cpu":
+        raise PlanError(f"{study.place('device')}: on a cluster networks train on cpu; leave out --scheduler")
+    if study.rollouts:
+        raise PlanError(
+            f"{study.place('rollouts')}: its files lie on this machine alone; leave out --scheduler"
+        )
+    from benchmarks.process.cluster_address import check_scheduler  # loads dask
+
+    check_scheduler(scheduler)
 
 
-def check_trained(request: Request, folder: Path) -> Path | None:
+def check_trained(study: Study, folder: Path, scheduler: str) -> Path | None:
     """Return the folder of pretrained networks, None without one.
 
     Raises:
         PlanError: it is no folder, or the run's own, where networks of another training are removed.
     """
-    if request.trained is None:
+    if study.trained is None:
         return None
-    if not request.trained.is_dir():
-        raise PlanError(f"--trained {request.trained}: no such folder; without DIR the package's are taken")
-    if request.trained.resolve() == folder.resolve():
-        raise PlanError(f"--trained {request.trained}: the folder of this run itself: give another by --out")
-    if request.scheduler:
-        raise PlanError("--trained: its files lie on this machine alone; leave out --scheduler")
-    return request.trained
-
-
-def check_scheduler_fits(request: Request) -> None:
-    """Raise PlanError for what a cluster cannot do, and ClusterError where no scheduler answers."""
-    if not request.scheduler:
-        return
-    if request.device != "cpu":
-        raise PlanError(
-            f"--device {request.device}: on a cluster networks train on cpu; leave out --scheduler"
-        )
-    if request.roll_outs:
-        raise PlanError("--rollout: its files lie on this machine alone; leave out --scheduler")
-    from benchmarks.process.cluster_address import check_scheduler  # loads dask
-
-    check_scheduler(request.scheduler)
+    what = f"{study.place('trained')} {study.trained}"
+    if not study.trained.is_dir():
+        raise PlanError(f"{what}: no such folder; without DIR the package's are taken")
+    if study.trained.resolve() == folder.resolve():
+        raise PlanError(f"{what}: the folder of this run itself: give another by --out")
+    if scheduler:
+        raise PlanError(f"{what}: its files lie on this machine alone; leave out --scheduler")
+    return study.trained
 
 
 def choose_folder(folder: Path | None) -> Path:

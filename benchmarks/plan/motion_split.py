@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 from benchmarks.plan.plan import Motions, PlanError
-from benchmarks.presets import Preset
+from benchmarks.plan.study import Study, nearest
 
 
-def split_motions(
-    files: Collection[str],
-    test_names: Sequence[str],
-    preset: Preset,
-    *,
-    library: bool = False,
-    validation_names: Sequence[str] = (),
-    split: str = "test",
-) -> Motions:
+def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     """Return which motions train, validate and test.
 
     Args:
+        study: names of those that test and validate; without any, those of the library do, and of files alone
+            the first in the order of names tests. The library takes part where it is named among the motions,
+            or where no file is. Its sizes say how many motions of the library each role has.
         files: names of the motions of a user's files.
-        test_names: motions that test; without any, those of the library do, and of files alone the first in
-            the order of names.
-        preset: how many motions of the library each role has.
-        library: whether the embedded library is named; without files it takes part unnamed.
-        validation_names: motions that validate; without any, those of the library do.
-        split: the role whose motions are measured, "test" or "validation".
 
     Validation and test motions of the library never train, and its test motions never validate: where a part
     of a recorded clip is measured, no other part of that clip trains. Where nothing is left to train on, the
@@ -39,19 +27,21 @@ def split_motions(
     from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION
     from snug.motion.recorded.table import clip_of
 
-    with_library = library or not files
+    test_names, validation_names = study.test_motions, study.validation_motions
+    with_library = "library" in study.motions or not files
     learned = dict.fromkeys((*sorted(files), *(TRAIN if with_library else ())))
     names = list(dict.fromkeys((*learned, *(LIBRARY if with_library else ()))))
-    for option, chosen in (("--test-motions", test_names), ("--validation-motions", validation_names)):
+    for field, chosen in (("test_motions", test_names), ("validation_motions", validation_names)):
         for name in chosen:
             if name not in names:
-                raise PlanError(f"{option}: unknown motion '{name}'; {nearest(name, names)}")
+                raise PlanError(f"{study.place(field)}: unknown motion '{name}'; {nearest(name, names)}")
     tested = {clip_of(name) for name in (*test_names, *(TEST if with_library else ()))}
     for name in validation_names:
         if clip_of(name) in tested:
-            raise PlanError(f"--validation-motions: '{name}' is a test motion; choose others")
-    # Whoever names motions means all of them, whatever the size of the preset.
-    named = test_names if split == "test" else validation_names
+            place = study.place("validation_motions")
+            raise PlanError(f"{place}: '{name}' is a test motion; choose others")
+    # Whoever names motions means all of them, whatever the sizes.
+    named = test_names if study.split == "test" else validation_names
     test = tuple(name for name in names if name in test_names)
     if not test:
         test = TEST if with_library else tuple(n for n in learned if n not in validation_names)[:1]
@@ -63,21 +53,17 @@ def split_motions(
     train = tuple(name for name in learned if clip_of(name) not in held_out)
     train = train or tuple(name for name in TRAIN if name not in held_out)
     motions = Motions(
-        train=train[: preset.train_motions],
+        train=train[: study.sizes.train_motions],
         test=test,
         files=tuple(files),
         dynamic_test=DYNAMIC_TEST,
         validation=validation,
         dynamic_validation=DYNAMIC_VALIDATION,
-        split=split,
-        few=None if named else preset.test_motions,
+        split=study.split,
+        few=None if named else study.sizes.test_motions,
     )
     if not motions.measured:
-        raise PlanError(f"--split {split}: no motion has this role; name some by --{split}-motions")
+        raise PlanError(
+            f"{study.place('split')}: no motion has this role; name some by {study.split}_motions"
+        )
     return motions
-
-
-def nearest(word: str, names: Sequence[str]) -> str:
-    """Return the names that a wrong word may have meant, as the end of a message."""
-    near = difflib.get_close_matches(word, names, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else "see --list"

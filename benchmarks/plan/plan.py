@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets.inputs import Inputs
 from benchmarks.cell import Cell, TaskId
@@ -27,7 +27,7 @@ DEFAULT_ONLY = ("stale", "missing")
 
 
 class PlanError(ValueError):
-    """A request that cannot be met; the message names the word and what there is instead."""
+    """A study that cannot be run; the message names the word and what there is instead."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,8 @@ class Plan:
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
     metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. scheduler: address
     of a cluster that does what is not timed; empty: this machine does. trained: folder whose networks take
-    the place of trainings; None: networks are trained. Raises PlanError, see check_names.
+    the place of trainings; None: networks are trained. study: what was asked, as written. Raises PlanError,
+    see check_names.
     """
 
     preset: Preset
@@ -140,6 +141,7 @@ class Plan:
     workers: int = 1
     scheduler: str = ""
     trained: Path | None = None
+    study: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_names(self.cells)

@@ -20,6 +20,7 @@ from benchmarks.fingerprint.dependencies import code_of, find_module, place_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.plan.study import Part, Study
 from benchmarks.scene import Scene
 from benchmarks.training import Training
 
@@ -70,10 +71,31 @@ def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[list[str], list
         file = file_of(word)
         entries[file] = entries_of(kind, file)
         names += [entry.name for entry in entries[file]]
-    every = [entry for some in entries.values() for entry in some]
-    if kind is METHODS:
-        check_networks(every)
-    return names, every
+    return names, [entry for some in entries.values() for entry in some]
+
+
+def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]]:
+    """Return the study with the names that its files declare in their places, and what they declare.
+
+    Raises:
+        DeclarationError: a file that cannot be read, or declares none.
+    """
+    entries: dict[Kind, dict[tuple[str, str], Any]] = {SCENES: {}, METHODS: {}}
+
+    def named(of: Study | Part) -> Any:
+        changes: dict[str, Any] = {}
+        for kind, found in entries.items():
+            for field in (kind.word, f"optional_{kind.word}"):
+                if any(word.endswith(".py") for word in getattr(of, field, ())):
+                    names, declared = resolve(kind, getattr(of, field))
+                    changes[field] = tuple(names)
+                    found |= {(entry.declared_in, entry.name): entry for entry in declared}
+        return dataclasses.replace(of, **changes)
+
+    parts = {name: named(part) for name, part in study.parts.items()}
+    study = dataclasses.replace(named(study), parts=parts)
+    check_networks(methods := list(entries[METHODS].values()))
+    return study, list(entries[SCENES].values()), methods
 
 
 def check_networks(entries: Sequence[MethodEntry]) -> None:

@@ -1,1 +1,1 @@
-"""The published runs, made again at one commit: `python -m benchmarks.publish`."""
+"""Published studies, run again at one commit: `python -m benchmarks.publish`."""

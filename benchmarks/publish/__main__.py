@@ -1,4 +1,4 @@
-"""python -m benchmarks.publish: make the published runs again, all at one commit."""
+"""python -m benchmarks.publish: run published studies again, all at one commit, and keep what is shown."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.merge import merge
+from benchmarks.plan.read_study import read_study, study_names
 from benchmarks.process.timing import one_thread
 from benchmarks.provenance import commit
-from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.execute_plan import accepted
@@ -25,8 +24,8 @@ TARGET = Path("reports/published")
 AGAIN = ("--only", "failed,stale,missing")  # so a task that lacked memory once is done again
 KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
 EXAMPLES = """examples:
-  python -m benchmarks.publish --list                what is published, and by which commands
-  python -m benchmarks.publish fabric                one run
+  python -m benchmarks.publish --list                which studies are published, and their commands
+  python -m benchmarks.publish fabric                one of them
   python -m benchmarks.publish --workers 8           all of them, with more processes side by side
   python -m benchmarks.publish --scheduler tcp://HOST:8786 --workers 40      untimed tasks on a cluster
 
@@ -48,94 +47,87 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one_thread()
     parser = Parser(
         prog=f"python -m {PROGRAM}",
-        description="Make the published runs again, at the commit that is checked out.",
+        description="Run published studies again, at the commit that is checked out.",
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("runs", nargs="*", metavar="RUN", help="names of runs (default: all)")
-    add("--list", action="store_true", help="print each run, its question and its commands; run nothing")
+    add("studies", nargs="*", metavar="STUDY", help="names of studies (default: all that have [show])")
+    add("--list", action="store_true", help="print each study, its question and its command; run nothing")
     add("--workers", metavar="N", help="of benchmarks.run")
     add("--scheduler", metavar="ADDRESS", help="of benchmarks.run")
     add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})")
     add("--into", metavar="DIR", default=TARGET, type=Path, help=f"where they are kept (default {TARGET})")
     options = parser.parse_args(arguments)
-    if unknown := [name for name in options.runs if name not in RUNS]:
-        raise PublishError(f"no published run {unknown[0]!r}: use some of {', '.join(RUNS)}")
-    names = options.runs or list(RUNS)
+    names = options.studies or published_studies()
+    for name in names:
+        if read_study(name).show is None:
+            raise PublishError(
+                f"study {name}: has no [show]: the studies {', '.join(published_studies())} do"
+            )
+    more = [word for name in ("workers", "scheduler") if (value := getattr(options, name))
+            for word in (f"--{name}", value)]  # fmt: skip
     if options.list:
         for name in names:
-            print(f"{name}: {RUNS[name].question}")
-            for line in commands(name, RUNS[name], options.out).values():
-                print(f"  {shlex.join(['python', *line[1:]])}")
+            print(f"{name}: {read_study(name).question}")
+            print(f"  {shlex.join(['python', *command_of(name, options.out)[1:]])}")
         return 0
     head = commit()
     if head.endswith("+changes"):
         raise PublishError(f"{head}: commit the changes first, so that a commit says what was run")
-    more = [word for name in ("workers", "scheduler") if (value := getattr(options, name))
-            for word in (f"--{name}", value)]  # fmt: skip
     return int(not all([_published(name, options.out, options.into, head, more) for name in names]))
+
+
+def published_studies() -> list[str]:
+    """Return the names of the studies that have a table [show]."""
+    return [name for name in study_names() if read_study(name).show is not None]
 
 
 def _published(name: str, out: Path, into: Path, head: str, more: Sequence[str]) -> bool:
     """Return whether a run is published; where it is not, the next is done all the same."""
     try:
-        publish(name, RUNS[name], out, into, head, more)
-    except ValueError as error:  # of the run's command, of merging, of files of results
+        publish(name, out, into, head, more)
+    except ValueError as error:  # of the run's command, of files of results
         print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
         return False
     return True
 
 
-def commands(name: str, run: PublishedRun, out: Path, more: Sequence[str] = ()) -> dict[Path, list[str]]:
-    """Return folder -> command line of each part of a run."""
-    folders = {part: out / (f"{name}-{part}" if part else name) for part in run.parts}
-    program = [sys.executable, "-m", "benchmarks.run"]
-    return {
-        folder: [*program, *shlex.split(run.parts[part]), *AGAIN, *more, "-o", str(folder)]
-        for part, folder in folders.items()
-    }
+def command_of(name: str, out: Path, more: Sequence[str] = ()) -> list[str]:
+    """Return the command line that runs a study in a folder below `out`."""
+    folder = out / Path(name).stem
+    return [sys.executable, "-m", "benchmarks.run", name, *AGAIN, *more, "-o", str(folder)]
 
 
-def publish(name: str, run: PublishedRun, out: Path, into: Path, head: str, more: Sequence[str] = ()) -> None:
-    """Do one run, or go on with it, and keep what is published of it.
+def publish(name: str, out: Path, into: Path, head: str, more: Sequence[str] = ()) -> None:
+    """Run a study, or go on with it, and keep what is published of it.
 
     Args:
-        name: of the run.
-        run: its parts.
-        out: folder of the parts' folders.
+        name: of the study, or its path.
+        out: folder of the run's folder.
         into: folder of published runs.
         head: commit that all rows have to name.
-        more: further options of every part.
+        more: further options of the run.
 
     Raises:
-        PublishError: a part failed, has rows of another commit, or lacks a picture that the documents show.
-        MergeError: its parts are of two machines.
+        PublishError: the run failed, has rows of another commit, or lacks a picture that the documents show.
     """
-    parts = commands(name, run, out, more)
-    whole = next(iter(parts))
-    for folder, line in parts.items():
-        if folder != whole and not folder.exists():
-            with new_folder(folder) as part:  # networks and their data are not made twice
-                shutil.copytree(whole, part, dirs_exist_ok=True)
-        print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
-        status = subprocess.run(line, check=False).returncode
-        if status and not (status == 1 and all_usable(RunFolder(folder))):
-            raise PublishError(f"{folder}: exit status {status}")
-        if others := sorted({row.commit for row in RunFolder(folder).read_rows()} - {head, ""}):
-            reason = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
-            raise PublishError(f"{folder}: {reason}")
-    if len(parts) > 1:
-        whole = out / name
-        shutil.rmtree(whole, ignore_errors=True)  # what it was merged from stays
-        merge(list(parts), whole, command=shlex.join(["python", "-m", PROGRAM, name]))
-        subprocess.run([sys.executable, "-m", "reports.build", str(whole)], check=False)
-    for film, wanted in run.films.items():
+    show, line = read_study(name).show, command_of(name, out, more)
+    assert show is not None
+    whole = Path(line[-1])
+    print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
+    status = subprocess.run(line, check=False).returncode
+    if status and not (status == 1 and all_usable(RunFolder(whole))):
+        raise PublishError(f"{whole}: exit status {status}")
+    if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):
+        reason = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
+        raise PublishError(f"{whole}: {reason}")
+    for film, wanted in show.films.items():
         path = whole / "figures" / film
         path.unlink(missing_ok=True)
         line = [sys.executable, "-m", "reports.film", str(whole), *shlex.split(wanted), "-o", str(path)]
         subprocess.run(line, check=False)
-    keep(whole, into / name, run.shown)
-    print(f"{name}: published in {into / name}", flush=True)
+    keep(whole, into / whole.name, show.files)
+    print(f"{name}: published in {into / whole.name}", flush=True)
 
 
 def all_usable(folder: RunFolder) -> bool:

@@ -19,7 +19,7 @@ DIGESTS = {
     "motions": "dc71f7b3a0e629a9",
     "metrics": "350e362f70ba6a8b",
     "reference": "7c745c22c1ea3e12",
-    "sampling": "c899256a7a704edf",
+    "sampling": "dabcaccd0f5a90df",
     "statistics": "bbdacc941ceaa26a",
 }
 DIGEST = digest(DIGESTS)

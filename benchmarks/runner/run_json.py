@@ -51,6 +51,7 @@ class RunLog:
         runs_before = [{name: before.get(name) for name in KEPT}] if before else []
         self.config: dict[str, Any] = {
             "command": plan.command,
+            "study": dict(plan.study),
             "preset": plan.preset.name,
             "protocol": {"number": NUMBER, "digest": DIGEST},
             "suites": list(plan.suites),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import scene_fields
+from benchmarks.plan.options import study_of
 from benchmarks.plan.plan import DEFAULT_ONLY, Network, Plan, PlanError
-from benchmarks.plan.request import Request
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
@@ -26,10 +26,8 @@ LEARNER = "supervised"  # the network that learns from the training motions, sim
 
 def plan_training_motions(garment: str, options: argparse.Namespace) -> Plan:
     """Return the plan of a run that simulates the training motions. Raises ValueError, one line."""
-    asked = Request(
-        scenes=(f"{garment}/*",), methods=(LEARNER,), suites=("garments",), **scene_fields(options)
-    )
-    return make_plan(asked)
+    study = study_of(options, "full:garments")
+    return make_plan(replace(study, scenes=(f"{garment}/*",), methods=(LEARNER,)))
 
 
 def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:

@@ -53,8 +53,8 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
         if length > UPRIGHT * height:
             (other,) = {*UP_AXES} - {stated.up}
             print(
-                f"{option.path}: with --up {stated.up} the obstacle is {height:.3g} {stated.units} high and "
-                f"{length:.3g} {stated.units} long: if it is a body that stands, give --up {other}",
+                f"{option.path}: with up={stated.up} the obstacle is {height:.3g} {stated.units} high and "
+                f"{length:.3g} {stated.units} long: if it is a body that stands, give up={other}",
                 file=sys.stderr,
             )
     return Scene(
@@ -114,8 +114,8 @@ def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> No
     """Raise RollOutFileError for a cloth (V,3) [m] that is a garment in a smaller unit."""
     across = float(np.linalg.norm(np.ptp(rest_positions, axis=0)))
     low, high = GARMENT
-    fit = [f"--units {unit}" for unit, m in METRES.items() if low <= across / METRES[units] * m <= high]
+    fit = [f"units={unit}" for unit, m in METRES.items() if low <= across / METRES[units] * m <= high]
     if across > LARGEST and fit:
         raise RollOutFileError(
-            f"{rest_mesh}: the cloth is {across:.3g} m across in --units {units}: say {' or '.join(fit)}"
+            f"{rest_mesh}: the cloth is {across:.3g} m across in units={units}: say {' or '.join(fit)}"
         )

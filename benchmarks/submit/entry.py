@@ -16,7 +16,7 @@ from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import Plan
-from benchmarks.plan.request import Request
+from benchmarks.plan.read_study import read_study
 from benchmarks.presets import find_preset
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import NUMBER
@@ -114,16 +114,15 @@ class Entry:
             self.name, str(self.path / metadata.roll_outs), FileConventions(), metadata.milliseconds
         )
         programs = (str(self.path / metadata.program),) if metadata.program else ()
-        plan = make_plan(
-            Request(
-                preset=PRESET,
-                scenes=self.scenes,
-                methods=(*MEASURED_BESIDE, *programs),
-                seeds=metadata.seeds if metadata.program else (0,),
-                roll_outs=() if metadata.program else (option,),
-                folder=folder,
-            )
+        study = replace(
+            read_study("default:garments"),
+            scenes=self.scenes,
+            methods=(*MEASURED_BESIDE, *programs),
+            seeds=metadata.seeds if metadata.program else (0,),
+            rollouts={} if metadata.program else {option.name: option},
+            sizes=PRESET,
         )
+        plan = make_plan(study, folder=folder)
         cells = []
         for cell in plan.cells:
             mine = cell.method not in MEASURED_BESIDE
@@ -134,7 +133,7 @@ class Entry:
                 )
             declared = metadata.milliseconds if mine else None
             cells.append(replace(cell, entry=replace(cell.entry, timed=False, declared_ms=declared)))
-        return replace(plan, cells=tuple(cells), cases=())
+        return replace(plan, cells=tuple(cells))
 
 
 def read_entry(path: Path) -> tuple[Entry | None, list[str]]:

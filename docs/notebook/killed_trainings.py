@@ -64,7 +64,7 @@ class Training:
         self.began, self.seed = method.with_suffix(".began"), seed
         self.model = model_path(RunFolder(folder).models_of("tshirt"), "snug-killed", seed)
         self.checkpoint = self.model.with_name(f".{self.model.stem}.checkpoint.safetensors")
-        words = ["--preset", "smoke", "--scenes", "tshirt/kick", "--methods", str(method), "--workers", "1"]
+        words = ["smoke", "--scenes", "tshirt/kick", "--methods", str(method), "--workers", "1"]
         self.command = [sys.executable, "-m", "benchmarks.run", *words]
         self.command += ["--seeds", str(seed), "-o", str(folder)]
 

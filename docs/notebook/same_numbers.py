@@ -34,10 +34,14 @@ FURTHER = (
     "handles-80-dynamic,ncs,ncs-static,pbns-springs,*-floor,*+clean-up,direct-optimisation"
 )
 UNSEEN = "tshirt/01_01_a,tshirt/dance_turn,tshirt/push_recovery"
+SMOKE = ("smoke", "--preset smoke")
 RUNS = {
-    "smoke": ("--preset smoke",),
-    "networks": (f"--preset smoke --scenes tshirt/01_01_a --methods {FURTHER}",),
-    "packaged": (f"--trained --frames 20 --scenes {UNSEEN} --methods skinning,snug,pbns,supervised",),
+    "smoke": SMOKE,
+    "networks": tuple(f"{smoke} --scenes tshirt/01_01_a --methods {FURTHER}" for smoke in SMOKE),
+    "packaged": tuple(
+        f"--trained {frames} --scenes {UNSEEN} --methods skinning,snug,pbns,supervised"
+        for frames in ("--set sizes.frames=20", "--frames 20")
+    ),
 }
 PLACES = {
     "trainings": ("benchmarks.methods.catalogue.trainings:TRAININGS",),

@@ -1,23 +1,22 @@
-"""Tables of a document whose texts the code has: options, attributes, recipes, presets, suites."""
+"""Tables of a document whose texts the code has: options, attributes, recipes, sizes, studies."""
 
 from __future__ import annotations
 
-import inspect
 import re
 from argparse import SUPPRESS, ArgumentParser
 from collections.abc import Sequence
 from importlib import import_module
 
+from benchmarks.declarations import attributes_of
 from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
-from benchmarks.plan.suites import SUITES
+from benchmarks.plan.read_study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
 from reports.text.metric_families import family_rows
 from snug.recipes.named import RECIPES
 
 Rows = list[tuple[str, ...]]
 ALL = 10_000  # frames or more: whole motions
-_ENTRY = re.compile(r"^ {4}(\w+(?:, \w+)*): ((?:.|\n {5,})*)", re.M)
 
 
 def option_rows(parser: ArgumentParser) -> Rows:
@@ -72,17 +71,12 @@ def attribute_rows(path: str) -> Rows:
     """
     module, _, name = path.rpartition(".")
     try:
-        text = inspect.getdoc(getattr(import_module(module), name)) or ""
+        entries = attributes_of(getattr(import_module(module), name))
     except (ImportError, AttributeError, ValueError):
         raise ValueError(f"no class '{path}'") from None
-    _, _, section = text.partition("Attributes:\n")
-    entries = _ENTRY.findall(re.split(r"\n\n\S", section)[0])
     if not entries:
         raise ValueError(f"class '{path}' has no attributes in its docstring")
-    rows = [
-        (f"`{names.replace(', ', '`, `')}`", " ".join(content.split()).rstrip("."))
-        for names, content in entries
-    ]
+    rows = [(f"`{names.replace(', ', '`, `')}`", content) for names, content in entries.items()]
     return [("Field", "Content"), *rows]
 
 
@@ -138,9 +132,9 @@ def metric_rows() -> Rows:
     return [("Metric", "Unit", "Definition"), *family_rows(declared().values())]
 
 
-def preset_rows() -> Rows:
-    """Return a heading and a row of each preset: sizes, and steps of SNUG's training."""
-    heads = ("Preset", "Vertices", "Test motions", "Frames of each", "Steps of SNUG", "Description")
+def size_rows() -> Rows:
+    """Return a heading and a row of each set of sizes, with the steps of SNUG's training."""
+    heads = ("Sizes", "Vertices", "Test motions", "Frames of each", "Steps of SNUG", "Description")
     rows = []
     for preset in PRESETS:
         motions = "all" if preset.test_motions is None else str(preset.test_motions)
@@ -150,14 +144,23 @@ def preset_rows() -> Rows:
     return [heads, *rows]
 
 
-def suite_rows() -> Rows:
-    """Return a heading and a row of each suite."""
-    return [("Suite", "Question"), *((f"`{suite.name}`", suite.description) for suite in SUITES)]
+def study_rows() -> Rows:
+    """Return a heading and a row of each study of the package: its question and parts."""
+    studies = {path.stem: read_study(path.stem) for path in sorted(PACKAGED.glob("*.toml"))}
+    rows = [(f"`{name}`", study.question, ", ".join(study.parts)) for name, study in studies.items()]
+    return [("Study", "Question", "Parts"), *rows]
+
+
+def part_rows() -> Rows:
+    """Return a heading and a row of each part of the studies that are no published run."""
+    parts = read_study("full").parts
+    return [("Part", "Question"), *((f"`{name}`", part.question) for name, part in parts.items())]
 
 
 PARTS = {
     "metrics": metric_rows,
-    "presets": preset_rows,
-    "suites": suite_rows,
+    "sizes": size_rows,
+    "studies": study_rows,
+    "parts": part_rows,
     "options of benchmarks.run": lambda: option_rows(make_parser()),
 }

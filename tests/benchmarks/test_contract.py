@@ -281,18 +281,18 @@ def test_a_method_that_is_bound_to_a_mesh_is_checked_in_the_scene_that_has_it(
 ):
     path = tmp_path / "bound.py"
     path.write_text(BOUND_FILE)
-    assert check.main([str(path), "--scene", "hanging_sheet", "--preset", "smoke"]) == 0
+    assert check.main([str(path), "--scene", "hanging_sheet", "--set", "sizes=smoke"]) == 0
     assert capsys.readouterr().out == "bound in hanging_sheet: fine\nnothing is wrong\n"
     simulated = []
     monkeypatch.setattr(SettleStart, "run", lambda *_: simulated.append(1))
     assert check.main([str(path)]) == 1
     assert "bound to 49 vertices, not 25" in capsys.readouterr().out and not simulated
     (tmp_path / "highest.py").write_text(METRIC_FILE)
-    for arguments in (["hanging"], ["hanging_sheet", "--preset", "tiny"]):
+    for arguments in (["hanging"], ["hanging_sheet", "--set", "sizes=tiny"]):
         assert check.main([str(path), "--scene", *arguments]) == 2
     assert check.main([str(tmp_path / "highest.py"), "--scene", "hanging_sheet"]) == 2
     error = capsys.readouterr().err
-    assert error.count("\n") == 3 and "unknown scene 'hanging'" in error and "declares no METHODS" in error
+    assert error.count("\n") == 3 and "no scene 'hanging'" in error and "declares no METHODS" in error
 
 
 def test_the_command_asks_metrics_for_their_judgement_and_takes_curves_of_vertices(

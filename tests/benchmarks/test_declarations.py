@@ -75,5 +75,5 @@ def test_a_role_and_a_size_that_nobody_knows_are_named():
 def test_the_command_says_it_in_one_line_and_leaves_nothing(more, tmp_path, monkeypatch, refused):
     wrong = dataclasses.replace(scenes.SCENES[0], name="kite", module="benchmarks.scenes.kite")
     monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, wrong))
-    flags = ["--preset", "smoke", "--scenes", "kite", "--methods", "simulation", "-o", str(tmp_path / "run")]
+    flags = ["smoke", "--scenes", "kite", "--methods", "simulation", "-o", str(tmp_path / "run")]
     refused("no module benchmarks.scenes.kite", run.main, [*flags, *more])

@@ -10,7 +10,6 @@ import pytest
 from benchmarks.fingerprint.digest import digest
 from benchmarks.metric import Metric
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.request import Request
 from benchmarks.presets import find_preset
 from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
 from benchmarks.results import protocol as recorded
@@ -20,6 +19,7 @@ from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.material import Material
 from snug.motion.library import make_motion
 from tests.benchmarks import protocol_definitions as protocol
+from tests.benchmarks.plan.planned import study_with
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_titles_and_prose_are_no_part_of_it(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("request_fields", "expected"),
+    ("fields", "expected"),
     [
         ({"scenes": ("flag",)}, NUMBER),
         ({"scenes": ("tshirt/dance_turn", "tshirt/07_02")}, NUMBER),
@@ -96,7 +96,7 @@ def test_titles_and_prose_are_no_part_of_it(monkeypatch):
         (
             {
                 "scenes": ("tshirt/dance_turn",),
-                "preset": dataclasses.replace(find_preset("quick"), frames=20),
+                "sizes": {"frames": 20},
             },
             OWN,
         ),
@@ -104,13 +104,13 @@ def test_titles_and_prose_are_no_part_of_it(monkeypatch):
         ({"scenes": ("tshirt/dance_turn",), "validation_motions": ("05_04",), "methods": ("snug",)}, OWN),
     ],
 )
-def test_a_row_is_of_the_protocol_where_scene_and_settings_are(tmp_path, request_fields, expected):
-    plan = make_plan(Request(**{"methods": ("simulation",), "folder": tmp_path / "run", **request_fields}))
+def test_a_row_is_of_the_protocol_where_scene_and_settings_are(tmp_path, fields, expected):
+    plan = make_plan(study_with(**{"methods": "simulation", **fields}), folder=tmp_path / "run")
     assert {protocol_of(cell, plan) for cell in plan.cells} == {expected}
 
 
 def test_a_scene_of_another_size_and_a_users_case_are_own(tmp_path):
-    plan = make_plan(Request(scenes=("flag",), methods=("simulation",), folder=tmp_path / "run"))
+    plan = make_plan(study_with(scenes="flag", methods="simulation"), folder=tmp_path / "run")
     cell = plan.cells[0]
     other = dataclasses.replace(cell.scene, options={**cell.scene.options, "sheet_cells": 99})
     assert protocol_of(dataclasses.replace(cell, scene=other), plan) == OWN

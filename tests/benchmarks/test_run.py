@@ -12,16 +12,12 @@ import pytest
 from benchmarks import run
 from benchmarks.methods.catalogue import all_methods as methods
 from benchmarks.methods.catalogue.all_methods import METHODS
-from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan.make_plan import choose_folder, make_plan
-from benchmarks.plan.plan import Motions, PlanError
-from benchmarks.plan.request import Request
-from benchmarks.plan.suites import SUITES, Extent
-from benchmarks.presets import PRESETS, find_preset
+from benchmarks.plan.plan import PlanError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from reference_sim.files.array_file import array_names
-from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
+from tests.benchmarks.plan.planned import planned
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -44,26 +40,19 @@ def test_the_list_names_everything(capsys):
         assert name in listing
 
 
-@pytest.mark.parametrize("split", ["test", "validation"])
-@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
-def test_the_list_names_every_scene_that_a_suite_has(preset, split, capsys):
-    motions = Motions(
-        test=TEST, dynamic_test=DYNAMIC_TEST, validation=VALIDATION, dynamic_validation=DYNAMIC_VALIDATION,
-        split=split,
-    )  # fmt: skip
-    extents = [Extent(preset, motions, full=wide, further=wide) for wide in (False, True)]
-    asked = {name for suite in SUITES for extent in extents for name in suite.scenes(extent)}
+@pytest.mark.parametrize("study", ["smoke", "paper", "fabric", "garments"])
+def test_the_list_names_every_scene_that_a_study_has(study, capsys):
+    asked = {scene.name for scene in planned(study, "--methods", "simulation,snug").scenes}
     assert run.main(["--list"]) == 0
     listed = {line.split()[0] for line in capsys.readouterr().out.splitlines() if line.strip()}
-    assert "tshirt/there_and_back" in asked
     assert not {name.removesuffix("@clip") for name in asked} - listed
 
 
-def test_the_list_has_the_scenes_that_the_preset_and_suites_measure(capsys):
-    assert run.main(["--list", "--preset", "smoke", "--suite", "speed"]) == 0
-    measured = capsys.readouterr().out.partition("preset smoke measures")[2].partition("\n\n")[0]
-    plan = make_plan(Request(preset=find_preset("smoke"), suites=("speed",)))
-    assert measured.splitlines()[1].split("speed", 1)[1].strip().split(", ") == [s.name for s in plan.scenes]
+def test_the_list_has_the_scenes_that_the_study_measures(capsys):
+    assert run.main(["--list", "smoke:speed"]) == 0
+    measured = capsys.readouterr().out.partition("where none is named")[2].partition("\n\n")[0]
+    names = measured.splitlines()[1].split("speed", 1)[1].strip().split(", ")
+    assert names == [scene.name for scene in planned("smoke:speed").scenes]
     assert len(measured.splitlines()) == 2
 
 
@@ -73,21 +62,17 @@ def test_the_list_has_the_scenes_that_the_preset_and_suites_measure(capsys):
 @pytest.mark.parametrize(
     ("options", "hint"),
     [
-        (["--preset", "huge"], "smoke, quick, paper"),
-        (["--suite", "garment"], "garments"),
         (["--scenes", "hanging_sheets"], "did you mean hanging_sheet"),
-        (["--scenes", "tshirt/walk"], "--test-motions"),
+        (["--scenes", "tshirt/walk"], "see test_motions"),
         (["--methods", "sung"], "did you mean snug"),
         (["--motions", "nowhere"], "nowhere"),
         (["--motions", "empty.amc"], "empty.amc"),
         (["--motions", "broken.npz"], "broken.npz"),
         (["--motions", "folder"], "folder"),
-        (["--motions", "back.npz", "--motion-up", "z"], "on its back or side: it stands along y"),
-        (["--repair"], "say of which files by --motions"),
+        (["--motions", "back.npz", "--set", "motion_files.up=z"], "on its back or side: it stands along y"),
         (["--test-motions", "wlak"], "did you mean walk"),
-        (["--seeds", "one"], "--seeds"),
         (["--seeds", "-1"], "--seeds"),
-        (["--device", "tpu"], "cpu or cuda"),
+        (["--set", "device=tpu"], "cpu, cuda"),
         (["--out", "broken.npz"], "is a file"),
         (["--out", "full"], "holds no run"),
         (["--out", "torn"], "torn/run.json: not readable"),
@@ -95,10 +80,8 @@ def test_the_list_has_the_scenes_that_the_preset_and_suites_measure(capsys):
         (["--only", "failed", "--fresh"], "leave out"),
         (["--workers", "0"], "1 or more"),
         (["--frobnicate"], "--frobnicate"),
-        (["--scenes", "free_fall", "--methods", "snug", "--suite", "garments"], "at preset quick no such"),
-        (["--scenes", "free_fall", "--suite", "extremes"], "suite extremes; --suite speed has them"),
-        (["--scenes", "flag", "--methods", "snug-dynamic"], "methods of these scenes are simulation"),
-        (["--list", "--suite", "garment"], "garments"),
+        (["--scenes", "flag", "--methods", "snug-dynamic"], "no such scene meets such a method in parts"),
+        (["--list", "full:garment"], "it has garments"),
     ],
 )
 def test_a_wrong_word_is_one_line_and_leaves_nothing(options, hint, tmp_path, monkeypatch, refused):
@@ -132,12 +115,12 @@ def misbehaving(monkeypatch):
     wrong = {"module": "tests.benchmarks.runner.misbehaving", "options": {"how": "raise"}}
     entries = tuple(dataclasses.replace(m, **wrong) if m.name == "newton-1" else m for m in METHODS)
     monkeypatch.setattr(methods, "METHODS", entries)
-    monkeypatch.setattr(choosing, "METHODS", entries)
+    monkeypatch.setitem(make_plan.__globals__, "METHODS", entries)
 
 
 def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, capsys):
     out = tmp_path / "run"
-    options = ["--preset", "smoke", "--scenes", "free_fall", "--suite", "speed", "-o", str(out)]
+    options = ["smoke:speed", "--scenes", "free_fall", "-o", str(out)]
     assert run.main([*options, "--methods", "simulation,newton-1,newton-4,skinning"]) == 1
     rows = RunFolder(out).read_rows()
     by_method = {row.method: row for row in rows if row.metric == "cost/frame"}

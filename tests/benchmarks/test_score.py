@@ -17,13 +17,12 @@ from benchmarks.fingerprint.digest import digest
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan.plan import PlanError
-from benchmarks.plan.plan_roll_out import NO_REFERENCE
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
-from tests.benchmarks.plan.planned import planned
+from tests.benchmarks.plan.planned import planned, study_with
 from tests.benchmarks.runner.tasks_by_hand import (
     run_in_this_process,
     small_scene,
@@ -53,7 +52,7 @@ def no_processes():
 def made(tmp_path_factory):
     """A run of the simulation and of Newton cut after one iteration."""
     out = tmp_path_factory.mktemp("made") / "run"
-    options = ["--preset", "smoke", "--scenes", "hanging_sheet", "-o", str(out)]
+    options = ["smoke", "--scenes", "hanging_sheet", "-o", str(out)]
     with pytest.MonkeyPatch.context() as patch:
         without_report(patch)
         assert run.main([*options, "--methods", "simulation,newton-1"]) == 0
@@ -66,8 +65,8 @@ def numbers(folder: RunFolder, method: str) -> dict[str, float | None]:
 
 def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path, capsys):
     files = [str(made.trajectory_path("hanging_sheet", name)) for name in ("newton-1", "simulation")]
-    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "-o", str(tmp_path / "out")]
-    assert score.main([files[0], *options, "--reference", files[1], "--declared-ms", "2.5"]) == 0
+    options = ["--scene", "hanging_sheet", "--set", "sizes=smoke", "-o", str(tmp_path / "out")]
+    assert score.main([f"mine={files[0]},ms=2.5", *options, "--reference", files[1]]) == 0
     line = capsys.readouterr().out
     assert (
         line.count("\n") == 1
@@ -91,9 +90,9 @@ def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path,
 
 def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, capsys):
     files = [str(made.trajectory_path("hanging_sheet", name)) for name in ("newton-1", "simulation")]
-    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "--reference", files[1]]
+    options = ["--scene", "hanging_sheet", "--set", "sizes=smoke", "--reference", files[1]]
     printed = ["--json", "--no-report", "-o", str(tmp_path / "out")]
-    assert score.main([files[0], *options, *printed]) == 0
+    assert score.main([f"mine={files[0]}", *options, *printed]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["name"], summary["scene"], summary["status"]) == ("mine", "hanging_sheet", "ok")
     strain = numbers(made, "newton-1")["energy/strain"]
@@ -102,10 +101,11 @@ def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, cap
     assert summary["metrics"]["gap/energy"]["value"] == numbers(made, "newton-1")["gap/energy"]
     beside = numbers(RunFolder(tmp_path / "out"), "reference")
     assert "energy/total" in beside and "cost/frame" not in beside
-    returned = score.score(files[0], *options, "-o", str(tmp_path / "again"))
+    scene, more = ("hanging_sheet",), {"study": study_with(sizes="smoke"), "reference": files[1]}
+    returned = score.score(f"mine={files[0]}", *scene, **more, folder=tmp_path / "again")
     assert returned["metrics"]["energy/strain"]["value"] == strain
     with pytest.raises(ValueError, match="no such file"):
-        score.score(tmp_path / "absent.npz", *options, "-o", str(tmp_path / "none"))
+        score.score(tmp_path / "absent.npz", *scene, **more, folder=tmp_path / "none")
     assert not (tmp_path / "none").exists()
 
 
@@ -125,9 +125,10 @@ def test_an_evaluation_that_broke_off_is_no_result(made, tmp_path, monkeypatch, 
         return status
 
     monkeypatch.setattr(score, "carry_out", broken)
-    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--name", "mine", "-o", str(tmp_path / "out")]
+    file = f"mine={made.trajectory_path('hanging_sheet', 'newton-1')}"
+    study = study_with(sizes="smoke")
     with pytest.raises(error, match=says):
-        score.score(made.trajectory_path("hanging_sheet", "newton-1"), *options)
+        score.score(file, "hanging_sheet", study=study, folder=tmp_path / "out")
 
 
 def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_path, monkeypatch, capsys):
@@ -139,16 +140,16 @@ def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_pat
     options = [
         "--scene",
         "hanging_sheet",
-        "--preset",
-        "smoke",
+        "--set",
+        "sizes=smoke",
         "--reference",
         simulated,
         "-o",
         str(tmp_path / "out"),
     ]
     assert score.main([str(tmp_path / "fine.npz"), *options]) == 2
-    assert "give --other-mesh" in capsys.readouterr().err
-    assert score.main([str(tmp_path / "fine.npz"), *options, "--other-mesh"]) == 0
+    assert "give other-mesh" in capsys.readouterr().err
+    assert score.main([f"{tmp_path}/fine.npz,other-mesh", *options]) == 0
     assert "Chamfer distance" in capsys.readouterr().out
     metrics = numbers(RunFolder(tmp_path / "out"), "fine")
     assert set(metrics) == {"surface/chamfer", "surface/normals"}
@@ -159,11 +160,19 @@ def test_a_roll_out_on_another_mesh_is_scored_by_its_surface_alone(made, tmp_pat
 def test_without_a_reference_the_reason_is_said(made, tmp_path, monkeypatch):
     without_report(monkeypatch)
     file = str(made.trajectory_path("hanging_sheet", "newton-1"))
-    options = ["--scene", "hanging_sheet", "--preset", "smoke", "--no-reference", "-o", str(tmp_path / "out")]
-    assert score.main([file, *options, "--name", "mine"]) == 0
+    options = [
+        "--scene",
+        "hanging_sheet",
+        "--set",
+        "sizes=smoke",
+        "--no-reference",
+        "-o",
+        str(tmp_path / "out"),
+    ]
+    assert score.main([f"mine={file}", *options]) == 0
     rows = RunFolder(tmp_path / "out").read_rows()
     assert [(row.status, row.reason) for row in rows if row.role == "reference"] == [
-        ("skipped", NO_REFERENCE)
+        ("skipped", score.NO_REFERENCE)
     ]
     metrics = {row.metric for row in rows if row.role == "external"}
     assert {"energy/total", "gap/energy", "curvature/mean"} <= metrics
@@ -178,7 +187,7 @@ def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_chang
 
     frames = Trajectory.load(made.trajectory_path("hanging_sheet", "newton-1")).positions
     np.savez(tmp_path / "hanging_sheet.npz", positions=frames)
-    flags = ["--preset", "smoke", "--scenes", "hanging_sheet,flag", "--suite", "speed", "-o", str(made.path)]
+    flags = ["smoke:speed", "--scenes", "hanging_sheet,flag", "-o", str(made.path)]
     flags += ["--methods", "simulation,newton-1", "--rollout", f"mine={tmp_path}/{{scene}}.npz,ms=1"]
     key, stored = of_mine()
     assert stored.scene.name == "hanging_sheet" and stored.suites == ("speed",) and not stored.timed
@@ -202,7 +211,7 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, monkeypatch,
     (tmp_path / "pred.pkl").write_bytes(pickle.dumps(held))
     write_obj(tmp_path / "rest.obj", scene.cloth.rest_positions, scene.cloth.faces, None)
     arguments = [str(tmp_path / "pred.pkl"), "--rest-mesh", str(tmp_path / "rest.obj"), "--no-reference"]
-    assert score.main([*arguments, "--preset", "smoke", "-o", str(tmp_path / "out")]) == 0
+    assert score.main([*arguments, "--set", "sizes=smoke", "-o", str(tmp_path / "out")]) == 0
     metrics = {
         row.metric: row.value for row in RunFolder(tmp_path / "out").read_rows() if row.role == "external"
     }
@@ -220,23 +229,26 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, monkeypatch,
     large = {**held, "pred": 100.0 * held["pred"], "obstacle": 100.0 * obstacle}
     (tmp_path / "pred.pkl").write_bytes(pickle.dumps(large))
     write_obj(tmp_path / "rest.obj", 100.0 * scene.cloth.rest_positions, scene.cloth.faces, None)
-    assert score.main([*arguments, "--preset", "smoke", "-o", str(tmp_path / "no")]) == 2
+    assert score.main([*arguments, "--set", "sizes=smoke", "-o", str(tmp_path / "no")]) == 2
     error = capsys.readouterr().err.splitlines()[-1]
-    assert "m across in --units m: say --units cm" in error and not (tmp_path / "no").exists()
+    assert "m across in units=m: say units=cm" in error and not (tmp_path / "no").exists()
 
 
 REFUSED = {
     "no file": (["nowhere.npz", "--scene", "flag"], "nowhere.npz: no such file"),
     "no scene": (["mine.npz", "--scene", "flagg"], "did you mean flag"),
-    "two scenes": (["mine.npz", "--scene", "hanging_sheet,flag"], "name one scene"),
+    "two scenes": (["mine.npz", "--scene", "tshirt/*"], "are asked for"),
     "kind": (["mine.abc", "--scene", "flag"], "unknown kind of roll-out"),
-    "units": (["mine.npz", "--scene", "flag", "--units", "inch"], "choose from m, cm, mm"),
-    "time": (["mine.npz", "--scene", "flag", "--declared-ms", "0"], "positive"),
+    "units": (["mine.npz,units=inch", "--scene", "flag"], "choose from m, cm, mm"),
+    "time": (["mine.npz,ms=0", "--scene", "flag"], "positive"),
     "both": (["mine.npz", "--scene", "flag", "--reference", "a", "--no-reference"], "not allowed"),
     "shape": (["mine.npz", "--scene", "flag"], "has 5 vertices, the cloth of flag 49"),
-    "taken": (["mine.npz", "--scene", "flag", "--name", "snug"], "--name"),
-    "taken by the file": (["snug.npz", "--scene", "flag"], "snug.npz: a method is called snug: give another"),
-    "name": (["mine.npz", "--scene", "flag", "--name", "a, b"], "the name 'a, b' has other than letters"),
+    "taken": (["snug=mine.npz", "--scene", "flag"], "NAME=FILE"),
+    "taken by the file": (
+        ["snug.npz", "--scene", "flag"],
+        "snug=snug.npz: a method is called snug",
+    ),
+    "name": (["a b=mine.npz", "--scene", "flag"], "the name 'a b' has other than letters"),
     "long": (["mine.npz", "--scene", "flag", "--reference", "a" * 300 + ".npz"], "a" * 300),
     "pattern": (["mine.npz", "--scene", "flag", "--reference", "r_{scene}.npz"], "r_flag.npz: no such file"),
 }
@@ -247,4 +259,4 @@ def test_a_refusal_is_one_line_and_leaves_nothing(name, tmp_path, monkeypatch, r
     arguments, hint = REFUSED[name]
     np.savez(tmp_path / "mine.npz", positions=np.ones((10, 5, 3)))
     monkeypatch.chdir(tmp_path)
-    refused(hint, score.main, [*arguments, "--preset", "smoke", "-o", "out"])
+    refused(hint, score.main, [*arguments, "--set", "sizes=smoke", "-o", "out"])

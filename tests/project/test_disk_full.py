@@ -148,10 +148,7 @@ def in_process(folder, assets, workers) -> InProcess:
 def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(execution, "make_report", lambda log: "")
     arguments = [
-        "--preset",
-        "smoke",
-        "--suite",
-        "speed",
+        "smoke:speed",
         "--scenes",
         "free_fall",
         "--methods",

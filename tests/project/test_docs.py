@@ -19,8 +19,8 @@ FILE = re.compile(r"File `([^`]+)`:$")
 # As written they are run by -m slow; in one run by TOGETHER.
 JOINED = ("A method", "A scene", "A metric")
 TOGETHER = (
-    "python -m benchmarks.run --preset smoke --scenes hanging_sheet,./curtain.py"
-    " --methods simulation,newton-1,./held.py,./explicit.py --metrics ./height.py -o "
+    "python -m benchmarks.run smoke --scenes hanging_sheet,./curtain.py"
+    " --methods simulation,newton-1,./held.py,./explicit.py --set metrics=./height.py -o "
 )
 LONG = (
     "How to add something",
@@ -34,7 +34,7 @@ GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 MOST_TERMS, MOST_COLUMNS = 20, 7
 # Terms with a meaning of their own here: a page may use them because the glossary explains them.
 PRIVATE = (
-    "scene", "method", "roll-out", "suite", "preset", "recipe", "reference", "ensemble", "skinning alone",
+    "scene", "method", "roll-out", "study", "sizes", "recipe", "reference", "ensemble", "skinning alone",
     "relative excess", "energy gap", "hem amplitude", "stopped early", "post-processing", "augmented", "clip",
     "independent source", "quasi-static solution", "handle", "floor",
 )  # fmt: skip

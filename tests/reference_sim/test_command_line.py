@@ -104,7 +104,7 @@ NOWHERE = "/proc/nowhere/out"  # nobody makes a folder there, not even who may d
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("benchmarks.run", ["--preset", "smoke", "--scenes", "free_fall", "--methods", "simulation"]),
+        ("benchmarks.run", ["smoke", "--scenes", "free_fall", "--methods", "simulation"]),
         ("benchmarks.export", ["hanging_sheet"]),
     ],
 )

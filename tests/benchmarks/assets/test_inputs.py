@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.inputs import InputError, read_inputs
-from benchmarks.plan.plan_roll_out import plan_roll_out
+from benchmarks.plan.read_study import read_study
 from benchmarks.runner.execute_plan import check_roll_outs
-from benchmarks.score import make_parser as score_parser
+from benchmarks.score import plan_score
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
 from tests.benchmarks.plan.planned import planned
@@ -75,7 +75,7 @@ def test_each_file_of_a_run_is_opened_once_before_its_tasks(tmp_path, openings):
     mine.mkdir()
     body, garment = write_body(mine / "body.npz"), write_garment(mine / "top.obj")
     motions = write_motions(mine / "clips", "sway")
-    scenes = ["--scenes", "top/sway", "--methods", "skinning", "--suite", "garments", "--preset", "smoke"]
+    scenes = ["--scenes", "top/sway", "--methods", "skinning", "smoke:garments"]
     options = [*scenes, "--body", body, "--garment", garment, "--motions", motions, "--test-motions", "sway"]
     np.savez(mine / "out.npz", positions=np.zeros((12, 3, 3)), faces=[[0, 1, 2]])
     openings.clear()
@@ -99,8 +99,13 @@ def test_a_roll_out_that_brings_its_own_scene_is_opened_once(tmp_path, openings)
     np.savez(mine / "out.npz", positions=positions, faces=[[0, 1, 2], [0, 2, 3]])
     (mine / "rest.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n")
     openings.clear()
-    arguments = [f"{mine}/out.npz", "--rest-mesh", f"{mine}/rest.obj", "--no-reference"]
-    plan = plan_roll_out(score_parser().parse_args([*arguments, "-o", str(tmp_path / "run")]), "")
+    plan = plan_score(
+        read_study(),
+        f"{mine}/out.npz",
+        rest_mesh=f"{mine}/rest.obj",
+        reference=False,
+        folder=tmp_path / "run",
+    )
     check_roll_outs(plan)
     assert openings == {"out.npz": 1, "rest.obj": 1}
 

@@ -12,7 +12,6 @@ from benchmarks.engines.engine import ITERATIONS, SUBSTEPS, EngineCloth
 from benchmarks.engines.registry import ENGINES, REFERENCE, find_engine
 from benchmarks.engines.roll_outs import EngineDiverged, roll_out
 from benchmarks.engines.specimens import specimen
-from benchmarks.plan.choose_cells import choose_suites
 from benchmarks.validation.engines import audit
 from benchmarks.validation.engines.cases import CASES
 from reference_sim.energies import StretchStVK
@@ -179,8 +178,7 @@ def test_an_absent_engine_is_skipped_with_its_command(monkeypatch):
     assert row.reason == "MuJoCo, Euler is not installed: pip install 'neural-garment-benchmark[engines]'"
 
 
-def test_the_suite_takes_part_only_where_it_is_named():
-    assert "engines" not in choose_suites(()) and "engines" in choose_suites(["all"])
+def test_cases_of_an_engine_share_a_process_and_each_is_a_row_of_its_own():
     assert {case.process for case in CASES} == {f"engine-{engine.name}" for engine in ENGINES}
     assert len({case.name for case in CASES}) == len(CASES) == len({(c.scene, c.metric) for c in CASES})
 

@@ -196,26 +196,26 @@ def test_a_uv_of_corners_is_written_into_the_mesh(tmp_path):
 
 
 def test_scenes_without_a_body_are_exported_too(tmp_path, capsys):
-    assert export.main(["flag", "--preset", "smoke", "-o", str(tmp_path / "flag"), "--reference"]) == 0
+    assert export.main(["flag", "--set", "sizes=smoke", "-o", str(tmp_path / "flag"), "--reference"]) == 0
     cloth = arrays(tmp_path / "flag" / "cloth.npz")
     assert cloth["pin_positions"].shape == (10, 7, 3) and len(cloth["pins"]) == 7
     assert not (tmp_path / "flag" / "obstacle.npz").exists()
     reference = Trajectory.load(tmp_path / "flag" / "reference.vtkhdf")
     assert np.array_equal(arrays(tmp_path / "flag" / "reference.npz")["positions"], reference.positions)
-    assert export.main(["flag", "--preset", "smoke", "-o", str(tmp_path / "flag")]) == 2
-    assert export.main(["flags", "--preset", "smoke", "-o", str(tmp_path / "other")]) == 2
+    assert export.main(["flag", "--set", "sizes=smoke", "-o", str(tmp_path / "flag")]) == 2
+    assert export.main(["flags", "--set", "sizes=smoke", "-o", str(tmp_path / "other")]) == 2
     assert [path.name for path in tmp_path.iterdir()] == ["flag"]
     assert capsys.readouterr().err.count("\n") == 2
 
 
 def test_the_command_that_scores_it_takes_back_every_option():
-    options = ["--garment=b.obj", "--garment-shift=-0.1,0,0", "--garment-up", "z", "--self-contact"]
-    options += ["--motions", "clips", "--motions=-c", "--test-motions", "a", "--frames", "40"]
+    options = ["--garment=b.obj", "--set=garment.shift=-0.1,0,0", "--set", "self_contact=true"]
+    options += ["--motions", "clips", "--motions=-c", "--test-motions", "a", "--set", "sizes.frames=40"]
     given = export.make_export_parser().parse_args(["b/a", "-o", "out", *options])
     words = ["mine.npz", "--scene", given.scene, *export.scene_arguments(given)]
     taken = vars(score.make_parser().parse_args(words))
     kept = {name: value for name, value in vars(given).items() if name not in ("out", "reference")}
-    assert given.garment_shift == "-0.1,0,0" and kept.items() <= taken.items()
+    assert given.settings[0] == "garment.shift=-0.1,0,0" and kept.items() <= taken.items()
 
 
 @pytest.mark.parametrize("step", [1.0 / 30.0, 0.006])
@@ -228,7 +228,7 @@ def test_the_rate_that_the_readme_names_is_that_of_the_scene(step, tmp_path):
 
 
 def test_of_a_scene_for_networks_alone_nothing_is_said_to_be_scored(tmp_path, capsys):
-    options = ["--preset", "smoke", "-o", str(tmp_path / "long")]
+    options = ["--set", "sizes=smoke", "-o", str(tmp_path / "long")]
     assert export.main(["out_of_distribution/long", *options]) == 0
     text = (tmp_path / "long" / "README.txt").read_text()
     assert "benchmarks.score" not in text and "for networks of benchmarks.run alone" in text

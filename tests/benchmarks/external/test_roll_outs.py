@@ -156,15 +156,15 @@ ORDER = RANDOM.permutation(49)
 PLACE = np.argsort(ORDER)
 Z_UP = 100.0 * X[..., [0, 2, 1]] * [1.0, -1.0, 1.0]  # (x, -z, y) in centimetres
 WRONG = {
-    "centimetres, z up": (Z_UP, FACES, {}, "give --units cm --up z"),
-    "z up": (Z_UP, FACES, {"units": "cm"}, "give --up z"),
-    "metres called cm": (X, FACES, {"units": "cm"}, "give --units m"),
-    "reordered": (X[:, ORDER], PLACE[FACES], {}, "give --match-vertices"),
-    "reordered, without faces": (X[:, ORDER], None, {}, "give --match-vertices"),
+    "centimetres, z up": (Z_UP, FACES, {}, "give units=cm up=z"),
+    "z up": (Z_UP, FACES, {"units": "cm"}, "give up=z"),
+    "metres called cm": (X, FACES, {"units": "cm"}, "give units=m"),
+    "reordered": (X[:, ORDER], PLACE[FACES], {}, "give match-vertices"),
+    "reordered, without faces": (X[:, ORDER], None, {}, "give match-vertices"),
     "another mesh": (X, np.roll(FACES, 1) % 49, {"match_vertices": True}, "no vertex can be matched"),
     "a vertex less": (X[:, 1:], None, {}, "has 48 vertices, the cloth of hanging_sheet 49"),
     "a frame less": (X[1:], None, {}, "has 7 frames, .* the scene has 8"),
-    "twice the frames": (np.repeat(X, 2, axis=0)[1:], None, {}, "give --fps 60"),
+    "twice the frames": (np.repeat(X, 2, axis=0)[1:], None, {}, "give fps=60"),
     "feet": (X / 0.3048, FACES, {}, "write metres"),
     "elsewhere": (X + np.array([0.0, 1.0, 0.0]), FACES, {}, "world coordinates"),
     "mirrored": (X * [-1.0, 1.0, 1.0], FACES, {}, "m if it is mirrored in x: write the world's x, y, z"),
@@ -241,8 +241,8 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
 @pytest.mark.parametrize(
     ("given", "remedy"),
     [({"positions": CENTRES}, "has no triangles: add those of its own mesh"),
-     ({"positions": X[:, ORDER], "faces": PLACE[FACES]}, "give --match-vertices"),
-     ({"positions": 100.0 * CENTRES, "faces": THIRDS}, "give --units cm"),
+     ({"positions": X[:, ORDER], "faces": PLACE[FACES]}, "give match-vertices"),
+     ({"positions": 100.0 * CENTRES, "faces": THIRDS}, "give units=cm"),
      ({"positions": CENTRES + 1.0, "faces": THIRDS}, "world coordinates"),
      ({"positions": CENTRES[1:], "faces": THIRDS}, "has 7 frames")],
 )  # fmt: skip
@@ -278,7 +278,7 @@ def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
     fine = np.concatenate([halves, X[-1:]])
     path = str(tmp_path / "mine.npz")
     np.savez(path, positions=fine, fps=60.0)
-    with pytest.raises(RollOutFileError, match=r"states 60 .* give --fps 60"):
+    with pytest.raises(RollOutFileError, match=r"states 60 .* give fps=60"):
         rows(path)
     assert rows(path, fps=60.0) == direct(X)  # every second frame, as it is
     np.savez(path, positions=X[::2])

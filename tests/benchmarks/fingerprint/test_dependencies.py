@@ -189,7 +189,7 @@ def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
     """A line more in one of them makes nothing stale."""
     lists = {f"benchmarks/{name}" for name in (
         "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py",
-        "presets.py", "plan/choose_cells.py", "plan/suites.py", "plan/plan.py",
+        "presets.py", "plan/choose_cells.py", "plan/study.py", "plan/plan.py",
         "runner/schedule.py", "validation/registry.py",
     )}  # fmt: skip
     lists.add("snug/recipes/named.py")

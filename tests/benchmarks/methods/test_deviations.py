@@ -6,13 +6,13 @@ import pytest
 
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.choose_cells import Selection, choose_cells
 from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.options import EXAMPLES
-from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.plan import PlanError
+from benchmarks.plan.read_study import read_study
 from benchmarks.presets import find_preset
 from snug.motion.library import TEST, VALIDATION
 from snug.recipes.deviations import DEVIATIONS
+from tests.benchmarks.plan.planned import planned, study_with
 
 NAMES = {
     *(f"snug-without-{deviation.name}" for deviation in DEVIATIONS),
@@ -20,11 +20,9 @@ NAMES = {
 }
 
 
-def chosen(*methods, **changes):
-    criteria = {"suites": ("garments", "extremes"), "preset": find_preset("paper")} | changes
-    motions = Motions(("walk",), ("kick",), {}, ("twist_stop",))
-    cells = choose_cells(Selection(motions=motions, methods=methods, **criteria))[0]
-    return {cell.method for cell in cells}
+def chosen(*methods, study="paper:garments,extremes"):
+    words = ("--methods", ",".join(methods)) if methods else ()
+    return {cell.method for cell in planned(study, "--test-motions", "kick", *words).cells}
 
 
 def test_a_deviation_is_a_method_for_whoever_names_it():
@@ -33,22 +31,18 @@ def test_a_deviation_is_a_method_for_whoever_names_it():
         entry = find_method(name)
         assert entry.trained == name and entry.role == "ablation" and entry.seeded
         assert entry.reporting.base == ("snug-paper" if "paper" in name else "snug")
-    assert not NAMES & chosen() and not NAMES & chosen(full=True)
+    assert not NAMES & chosen() and not NAMES & chosen(study="full")
     assert chosen("snug-without-*") == {name for name in NAMES if "without" in name}
     assert chosen("snug-paper-with-*") == NAMES - chosen("snug-without-*")
-    with pytest.raises(PlanError):
-        chosen(
-            "snug-without-*", suites=("extremes", "speed", "validation")
-        )  # what they are asked is garments
 
 
 def test_a_recipe_is_never_chosen_by_the_test_motions():
-    arguments = [word for line in EXAMPLES.splitlines() if "snug-without" in line for word in line.split()]
-    assert arguments and "--split validation" in EXAMPLES and "--test-motions" not in arguments
-    motions = split_motions([], [], find_preset("quick"), split="validation")
+    ablations = read_study("ablations")
+    assert ablations.split == "validation" and not ablations.test_motions
+    motions = split_motions(ablations)
     assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
     with pytest.raises(PlanError, match="'dance_turn' is a test motion"):
-        split_motions([], [], find_preset("quick"), validation_names=["dance_turn"], split="validation")
+        split_motions(study_with(validation_motions="dance_turn", split="validation"))
 
 
 @pytest.mark.parametrize("preset", ["smoke", "quick", "paper"])

@@ -7,7 +7,8 @@ import torch
 
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.methods.catalogue.trainings import LEARN_FROM_SIMULATIONS, TRAININGS
-from benchmarks.plan.suites import SUITES
+from benchmarks.plan.choose_cells import matching
+from benchmarks.plan.read_study import read_study
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from snug.networks.architectures import ARCHITECTURES
@@ -21,7 +22,7 @@ from tests.snug.training.dressing import swaying, tube_dress
 
 
 def plan(*options):
-    return planned("--suite", "garments", *options)
+    return planned("full:garments", *options)
 
 
 def methods(*options):
@@ -35,7 +36,8 @@ def test_kinds_that_learn_vertices_are_those_that_get_simulations():
 def test_they_run_when_named_and_not_otherwise(tmp_path):
     further = {entry.name for entry in FURTHER_METHODS}
     out = ("-o", str(tmp_path))
-    assert further <= set(SUITES[0].more_methods) and not further & methods(*out)
+    assert further == set(matching(further, read_study().parts["garments"].optional_methods))
+    assert not further & methods(*out)
     assert further < methods(*out, "--methods", "*")
     named = methods(*out, "--methods", "snug-no-*")
     assert named == {
@@ -46,7 +48,7 @@ def test_they_run_when_named_and_not_otherwise(tmp_path):
         "snug-no-inertia",
         "snug-no-noise",
     }
-    assert further < methods(*out, "--preset", "paper")
+    assert further < {cell.method for cell in planned("paper:garments", *out).cells}
 
 
 @pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])

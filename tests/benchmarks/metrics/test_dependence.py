@@ -10,14 +10,13 @@ import pytest
 from benchmarks.assets.assets import Assets
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.plan.choose_cells import Selection, choose_cells
-from benchmarks.plan.plan import Motions
-from benchmarks.presets import PRESETS, Dependence, find_preset
+from benchmarks.presets import Dependence, find_preset
 from benchmarks.scenes import dependence as module
 from benchmarks.scenes import find_scene
 from benchmarks.scenes.variations import DRAPES
 from benchmarks.tasks.metric_task import measured
 from snug.body.parametric_body import Body
+from tests.benchmarks.plan.planned import planned
 
 SIZES = Dependence((200,), 200, (1, 2), 4, 4)
 SCENES = ("dependence/mesh/200", "dependence/dt/60")
@@ -81,26 +80,24 @@ def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
         built("dependence/dt/60", dataclasses.replace(assets, body=mine))
 
 
-@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.name)
-def test_a_preset_asks_for_its_own_meshes_and_steps(preset):
-    request = Selection(suites=("validation",), preset=preset, motions=Motions())
-    cells = choose_cells(dataclasses.replace(request, full=True))[0]
-    sizes = preset.dependence
-    assert {cell.scene.name for cell in cells} == {
+@pytest.mark.parametrize("study", ["smoke", "full", "paper"])
+def test_a_study_asks_for_the_meshes_and_steps_of_its_sizes(study):
+    plan = planned(f"{study}:validation")
+    sizes, further = plan.preset.dependence, study == "paper"
+    assert {cell.scene.name for cell in plan.cells} == {
         *(f"dependence/mesh/{count}" for count in sizes.meshes),
         *(f"dependence/dt/{30 * count}" for count in sizes.substeps[1:]),
-        *(scene.name for scene in DRAPES if preset.further),
+        *(scene.name for scene in DRAPES if further),
     }
-    printed = {"simulation-printed-bending"} if preset.further else set()
-    assert {cell.method for cell in cells} == {"simulation", "skinning", "newton-1"} | printed
+    printed = {"simulation-printed-bending"} if further else set()
+    assert {cell.method for cell in plan.cells} == {"simulation", "skinning", "newton-1"} | printed
     assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
-    assert choose_cells(request)[0] == (() if preset.name == "quick" else cells)  # where no suite is named
+    assert not planned("default:validation").cells
 
 
 def test_drapes_of_each_size_and_family_run_where_they_are_named():
-    criteria = {"suites": ("validation",), "preset": find_preset("quick"), "motions": Motions()}
     methods = ("simulation", "simulation-printed-bending")
-    cells = choose_cells(Selection(**criteria, scenes=("dependence/drape/*",), methods=methods))[0]
+    cells = planned("--scenes", "dependence/drape/*", "--methods", ",".join(methods)).cells
     assert {(cell.scene.name, cell.method) for cell in cells} == {
         (scene.name, method) for scene in DRAPES for method in methods
     }

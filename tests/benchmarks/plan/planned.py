@@ -1,11 +1,21 @@
-"""Plan of a command line."""
+"""Plan of a command line; a study with other fields."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
+from benchmarks.plan.options import make_parser, study_of
 from benchmarks.plan.plan import Plan
+from benchmarks.plan.read_study import option, read_study
+from benchmarks.plan.study import Study
 
 
-def planned(*options: str) -> Plan:
-    return make_plan(request_of_run(make_parser().parse_args(options), options))
+def planned(*words: str) -> Plan:
+    options = make_parser().parse_args(words)
+    return make_plan(study_of(options, options.study), folder=Path(options.out) if options.out else None)
+
+
+def study_with(name: str = "default", **fields: Any) -> Study:
+    return read_study(name, [option(f"--{field}", field, value) for field, value in fields.items()])

@@ -27,14 +27,14 @@ def shapeless(tmp_path_factory) -> str:
     [("shapes", "shapes/1", 10), ("extremes", "out_of_distribution/height_+5", 1)],
 )
 def test_scenes_of_other_body_shapes_need_a_body_that_has_shapes(suite, scene, count, shapeless, tmp_path):
-    options = ("--preset", "quick", "--suite", suite, "--body", shapeless, "-o", str(tmp_path / "run"))
+    options = (f"full:{suite}", "--body", shapeless, "-o", str(tmp_path / "run"))
     with pytest.raises(PlanError, match=r"mine\.npz: has 0 body shapes .*'shapedirs'") as refused:
         planned(*options)
     assert f"scene {scene} needs {count}" in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_a_body_without_shapes_takes_part_elsewhere(shapeless, tmp_path):
-    options = ("--preset", "smoke", "--body", shapeless, "-o", str(tmp_path / "run"))
+    options = ("smoke", "--body", shapeless, "-o", str(tmp_path / "run"))
     assert planned(*options).inputs.body is not None
-    walks = planned(*options, "--suite", "extremes", "--scenes", "out_of_distribution/walk*")
+    walks = planned("smoke:extremes", *options[1:], "--scenes", "out_of_distribution/walk*")
     assert [scene.name for scene in walks.scenes] == ["out_of_distribution/walk_x4"]

@@ -12,7 +12,7 @@ from snug.motion.motion import MotionError
 from tests.benchmarks.assets.test_inputs import write_motions
 from tests.benchmarks.plan.planned import planned
 
-WORDS = ("--preset", "smoke", "--suite", "garments", "--methods", "skinning")
+WORDS = ("smoke:garments", "--methods", "skinning")
 
 
 @pytest.mark.parametrize("name", ["walk  slow", "walk ", " walk", "walk,slow"])

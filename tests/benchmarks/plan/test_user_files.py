@@ -17,8 +17,8 @@ from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.methods.outside.program import program
-from benchmarks.plan import choose_cells as choosing
 from benchmarks.plan import user_files
+from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import Motions, Plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
@@ -26,6 +26,7 @@ from benchmarks.runner.task_inputs import declared
 from benchmarks.scenes import of_garment
 from benchmarks.tasks.metric_task import measured
 from benchmarks.training import Training
+from benchmarks.validation.registry import CASES
 from reference_sim import Trajectory
 from snug.recipes.recipe import DEFAULT, RecipeError
 from tests.benchmarks.fingerprint.test_dependencies import forget
@@ -68,7 +69,7 @@ def files(tmp_path_factory) -> Path:
     return folder
 
 
-WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "lift.py", "--metrics", "height.py"]
+WORDS = ["smoke:speed", "--scenes", "lift.py", "--set", "metrics=height.py"]
 WORDS += ["--methods", "simulation,./mine.py,other/other_method.py,theirs.py", "-o", "out"]
 
 
@@ -187,9 +188,13 @@ def test_a_file_that_cannot_be_meant_is_one_line(text, message, tmp_path, monkey
     ("option", "word", "message"),
     [
         ("--methods", "gone.py", "gone.py: no such file"),
-        ("--metrics", "energy", "energy: is no file"),
-        ("--metrics", "twice.py", "metric 'energy/total' is declared twice, by the project itself and by "),
-        ("--metrics", "bare.py", "metric 'mine/x' has no unit"),
+        ("--set", "metrics=energy", "energy: is no file"),
+        (
+            "--set",
+            "metrics=twice.py",
+            "metric 'energy/total' is declared twice, by the project itself and by ",
+        ),
+        ("--set", "metrics=bare.py", "metric 'mine/x' has no unit"),
         ("--scenes", "taken.py", "a case of the project has this name"),
         ("--scenes", "worn.py", "no garment is called 'toga'; there are tshirt, "),
         ("--methods", "random.py", "Python knows random as"),
@@ -205,9 +210,9 @@ def test_a_word_that_cannot_be_meant_is_one_line(option, word, message, tmp_path
     (tmp_path / "worn.py").write_text(worn)
     (tmp_path / "random.py").write_text("METHODS = ()\n")
     with monkeypatch.context() as patch:
-        case = dataclasses.replace(choosing.CASES[0], name="membrane/uniaxial")
-        patch.setattr("benchmarks.plan.choose_cells.CASES", (case,))
-        refused(message, run.main, ["--scenes", "free_fall", option, word, "-o", "out"])
+        case = dataclasses.replace(CASES[0], name="membrane/uniaxial")
+        patch.setitem(make_plan.__globals__, "CASES", (case,))
+        refused(message, run.main, ["default:speed", "--scenes", "free_fall", option, word, "-o", "out"])
 
 
 @pytest.mark.parametrize(

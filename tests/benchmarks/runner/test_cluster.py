@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from benchmarks import run
-from benchmarks.plan.make_plan import check_scheduler_fits
+from benchmarks.plan.make_plan import check_machines
 from benchmarks.plan.plan import PlanError
-from benchmarks.plan.request import Request
 from benchmarks.process import cluster_address as scheduler
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as runner_side
 from benchmarks.runner import execute_plan as execution
 from benchmarks.tasks.task import RunStopped
 from snug.networks.tensor_file import read_tensors
+from tests.benchmarks.plan.planned import study_with
 from tests.benchmarks.runner.cluster_by_hand import (
     cluster,
     files,
@@ -84,7 +84,7 @@ def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
 def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
     """Bit for bit, but for times: a network that learned from ground truth, and metrics of all frames."""
     monkeypatch.setattr(execution, "make_report", lambda log: "")
-    options = ["--preset", "smoke", "--suite", "garments", "--split", "validation"]
+    options = ["smoke:garments", "--set", "split=validation"]
     options += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
     here, cluster_folder = RunFolder(tmp_path / "here"), RunFolder(tmp_path / "there")
     assert run.main([*options, "-o", str(here.path)]) == 0
@@ -198,8 +198,8 @@ def test_a_worker_is_no_scheduler(two):
         scheduler.check_scheduler(worker)
 
 
-@pytest.mark.parametrize(("option", "value"), [("device", "cuda"), ("rollout", ["mine=out.npz"])])
-def test_what_a_cluster_cannot_do_is_refused(option, value):
-    name = {"rollout": "roll_outs"}.get(option, option)
-    with pytest.raises(PlanError, match=f"--{option}.*leave out --scheduler"):
-        check_scheduler_fits(Request(scheduler="tcp://127.0.0.1:1", **{name: value}))
+@pytest.mark.parametrize(("field", "value"), [("device", "cuda"), ("rollouts", {"mine": {"path": "a.npz"}})])
+def test_what_a_cluster_cannot_do_is_refused(field, value, monkeypatch):
+    monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
+    with pytest.raises(PlanError, match=f"--{field}.*leave out --scheduler"):
+        check_machines(study_with(**{field: value}), "tcp://127.0.0.1:1")

@@ -84,7 +84,7 @@ def test_what_is_damaged_is_done_again_alone(whole, tmp_path, name, damage, redo
 
 
 WORN = "trajectories/tshirt-sudden_stop"
-WORDS = ["--preset", "smoke", "--suite", "garments", "--scenes", "tshirt/sudden_stop"]
+WORDS = ["smoke:garments", "--scenes", "tshirt/sudden_stop"]
 WORDS += ["--methods", "simulation,skinning,supervised,snug"]
 
 

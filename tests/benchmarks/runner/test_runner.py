@@ -29,7 +29,7 @@ from tests.benchmarks.runner.misbehaving import interrupt_at
 from tests.benchmarks.tasks.test_cell_tasks import TINY, found_of, plan_of
 
 ROOT = Path(__file__).resolve().parents[3]
-WORDS = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall"]
+WORDS = ["smoke:speed", "--scenes", "free_fall"]
 HOLDING = """
 import sys, time
 from pathlib import Path
@@ -186,7 +186,7 @@ def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
 
 
 def test_the_longest_training_begins_first(tmp_path):
-    options = ["--suite", "garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path)]
+    options = ["full:garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path)]
     plan = planned(*options)
     trainings = [task for task in tasks_of(plan) if isinstance(task, TrainNetwork)]
     assert [batch[0].training for batch in _batches(trainings)] == ["ncs", "snug", "pbns", "handles-20"]

@@ -29,7 +29,7 @@ def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path,
     monkeypatch.setattr(ground_truth, "simulated", draped)
     monkeypatch.setattr(training_motions, "Executor", lambda run, assets, workers: InProcess(run, assets))
     out = tmp_path / "motions.h5"
-    arguments = ["tshirt/training-motions", "--preset", "smoke", "-o", str(out)]
+    arguments = ["tshirt/training-motions", "--set", "sizes=smoke", "-o", str(out)]
     assert export.main(arguments) == 2
     assert "failed: RuntimeError: no room" in capsys.readouterr().err and not out.exists()
     assert export.main(arguments) == 0  # what was finished is not simulated again

@@ -48,6 +48,6 @@ def test_a_body_that_is_longer_than_high_is_remarked_with_the_other_axis(tmp_pat
     declare(tmp_path, body=arms_out)
     assert capsys.readouterr().err == ""
     declare(tmp_path, body=STANDING @ Z_UP)
-    assert "pred.npz: " in (line := capsys.readouterr().err) and "--up z" in line and line.count("\n") == 1
+    assert "pred.npz: " in (line := capsys.readouterr().err) and "give up=z" in line and line.count("\n") == 1
     declare(tmp_path, up="z")
-    assert "--up y" in capsys.readouterr().err
+    assert "up=y" in capsys.readouterr().err

@@ -15,15 +15,13 @@ from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import extrapolation
-from benchmarks.plan.choose_cells import Selection, choose_cells
-from benchmarks.plan.plan import Motions, Plan
-from benchmarks.plan.suites import CHEAP
+from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import find_scene, out_of_distribution
-from benchmarks.scenes.variations import FEW, FEWEST, ORDINARY, OUT_OF_DISTRIBUTION
+from benchmarks.scenes.variations import ORDINARY, OUT_OF_DISTRIBUTION
 from benchmarks.tasks.metric_task import measured
 from benchmarks.tasks.task import Context, Outcome
 from reference_sim import Trajectory
@@ -35,6 +33,7 @@ from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.training.train_network import untrained_model
+from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 SMOKE = find_preset("smoke")
@@ -247,36 +246,37 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(positions, tmp_path, m
 # --- who takes part, and what is shared --------------------------------------------------------------------
 
 
-def cells(**criteria):
-    motions = Motions(("walk",), ("kick",), {})
-    preset = find_preset(criteria.pop("preset", "quick"))
-    return choose_cells(Selection(suites=("extremes",), preset=preset, motions=motions, **criteria))[0]
+def cells(*words):
+    return planned(*words).cells
 
 
-def test_suite_extremes_trains_what_it_needs():
-    assert {cell.scene.name for cell in cells()} == set(FEW)
-    selection = cells(full=True)
+def test_part_extremes_trains_what_it_needs():
+    assert len({cell.scene.name for cell in cells("default:extremes")}) == 6
+    selection = cells("full:extremes")
     assert {cell.scene.name for cell in selection} == {scene.name for scene in OUT_OF_DISTRIBUTION}
-    methods = {"simulation", "skinning", "snug", "supervised", "pbns", *CHEAP}
+    methods = {"simulation", "skinning", "snug", "supervised", "pbns", "snug+fast-lbfgs-1", "fast-lbfgs-10"}
     assert {cell.method for cell in selection} == methods
     alone = {cell.method for cell in selection if cell.scene.name == "out_of_distribution/long"}
     assert alone == {"snug", "supervised", "pbns"}
-    assert {cell.scene.name for cell in cells(preset="smoke")} == set(FEWEST)
-    assert {c.scene.name for c in cells(preset="smoke", scenes=("*splits",))} == {
-        "out_of_distribution/splits"
-    }
+    assert len({cell.scene.name for cell in cells("smoke:extremes")}) == 3
+    named = {cell.scene.name for cell in cells("smoke:extremes", "--scenes", "*splits")}
+    assert named == {"out_of_distribution/splits"}
 
 
 def test_a_network_does_hard_motions_under_its_own_name_alone():
-    names = {cell.method for cell in cells(methods=("snug*", "pbns*", "tailornet", "untrained"))}
-    names -= set(CHEAP)  # a solver from its frame
+    words = (
+        "default:extremes",
+        "--methods",
+        "snug*,pbns*,tailornet,!snug-without-*,!snug-paper-with-*,!*-data-*",
+    )
+    names = {cell.method for cell in cells(*words)} - {"snug+fast-lbfgs-1"}  # a solver from its frame
     batched = {entry.name for entry in METHODS if entry.batched}
     assert names <= batched and {"snug", "pbns", "tailornet"} <= names
     assert not any("+" in name for name in names)
 
 
 def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_path, monkeypatch):
-    selection = cells(scenes=("*splits", "*girth_+5"), methods=("simulation",))
+    selection = cells("full:extremes", "--scenes", "*splits,*girth_+5", "--methods", "simulation")
     plan = plan_of(tmp_path, selection)
     starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
     ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
@@ -296,7 +296,7 @@ def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_pat
 
 
 def test_cells_that_nobody_times_run_beside_others(tmp_path):
-    selection = cells(scenes=("*walk_x4",))
+    selection = cells("full:extremes", "--scenes", "*walk_x4")
     plan = plan_of(tmp_path, selection)
     tasks = [task for task in tasks_of(plan) if task.kind in ("cell", "batch", "repeat", "quasi-static")]
     assert {task.kind for task in tasks} == {"cell"} and len(tasks) == len(selection)

@@ -15,7 +15,6 @@ from benchmarks.assets.liveliest_part import joint_speeds, liveliest_part
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metrics.surface import body_shape
-from benchmarks.plan.choose_cells import choose_suites
 from benchmarks.plan.plan import network_of
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.runner.cache import dependencies
@@ -114,10 +113,10 @@ def test_shapes_are_asked_for_by_name_or_by_the_largest_preset():
         return [cell.scene.name for cell in planned("--methods", "simulation", *options).cells]
 
     every = [scene.name for scene in shapes("kick")]
-    assert scenes("--suite", "shapes") == every and scenes("--scenes", "shapes/*") == every
-    assert not {*scenes(), *scenes("--suite", "garments")} & set(every)
-    assert set(every) <= set(scenes("--preset", "paper"))
-    cells = planned("--suite", "shapes", "--methods", "snug*").cells
+    assert scenes("full:shapes") == every == scenes("--scenes", "shapes/*")
+    assert not {*scenes(), *scenes("full:garments")} & set(every)
+    assert set(every) <= set(scenes("paper"))
+    cells = planned("full:shapes", "--methods", "snug*").cells
     assert {c.suites for c in cells} == {("shapes",)} and "snug-shapes" in {c.method for c in cells}
 
 
@@ -164,7 +163,6 @@ def test_a_scene_of_no_sensible_duration_is_refused(field, value, says):
 def test_presets_grow():
     sizes = [preset.garment_vertices for preset in PRESETS]
     assert sizes == sorted(sizes) and [preset.name for preset in PRESETS] == ["smoke", "quick", "paper"]
-    assert (*choose_suites([]), "fabric", "engines") == choose_suites(["all"])
 
 
 def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
@@ -202,7 +200,7 @@ def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not()
 
 def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_networks():
     assert planned().garments == ("tshirt",)
-    speed = planned("--suite", "speed")
+    speed = planned("full:speed")
     skirts = [cell for cell in speed.cells if cell.scene.garment == "skirt"]
     assert len({cell.method for cell in skirts}) >= 10
     assert not any(find_method(cell.method).trained for cell in skirts if cell.entry.skip(cell.scene) is None)
@@ -213,13 +211,13 @@ def test_suite_speed_has_clips_of_the_split():
         ("test", {"01_01_a", "push_recovery", "dance_turn"}),
         ("validation", {"sudden_stop", "05_02_a", "turning_stop"}),
     ):
-        plan = planned("--suite", "speed", "--split", split)
+        plan = planned("full:speed", "--set", f"split={split}")
         assert {scene.motion for scene in plan.scenes if scene.garment == "tshirt"} == names
         assert {plan.motions.role_of(scene.motion) for scene in plan.scenes if scene.dressed} == {split}
 
 
 def test_validation_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
-    plan = planned("--suite", "speed", "--split", "validation")
+    plan = planned("full:speed", "--set", "split=validation")
     cells = [cell for cell in plan.cells if cell.scene.name == "tshirt/turning_stop@clip"]
     assert {"simulation", "snug", "lbfgs-5"} <= {cell.method for cell in cells}
     assert "turning_stop" in plan.motions_of("tshirt") and "turning_stop" not in plan.motions.train
@@ -241,7 +239,7 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     arrays |= {"J_template": body.joint_template, "J_shapedirs": body.joint_directions}
     tall = {key: 1.1 * array if key != "f" else array for key, array in arrays.items()}
     np.savez(path, weights=body.skinning_weights, kintree_table=table, **tall)
-    plain, tall_plan = (planned("--suite", "garments", *more) for more in ((), ("--body", str(path))))
+    plain, tall_plan = (planned("full:garments", *more) for more in ((), ("--body", str(path))))
     cell = next(cell for cell in tall_plan.cells if cell.method == "snug")
     keys = [
         (key_of(Schedule(plan).network(network_of(cell))), key_of(Schedule(plan).cell(cell)))

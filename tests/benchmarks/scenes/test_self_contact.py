@@ -12,7 +12,6 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import conservation
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import make_parser, request_of_run
 from benchmarks.plan.plan import PlanError
 from benchmarks.protocol.row_protocol import protocol_of
 from benchmarks.results.protocol import OWN
@@ -22,6 +21,7 @@ from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 from reference_sim.minimise.newton import Newton
 from reference_sim.time_loop import simulate
+from tests.benchmarks.plan.planned import planned, study_with
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid
 
@@ -126,21 +126,21 @@ def test_a_start_that_crosses_itself_is_settled_anew_or_refused():
 
 
 def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
-    command = ["--scenes", "tshirt/kick,flag", "--methods", "simulation,snug", "--split", "validation"]
-    request = request_of_run(make_parser().parse_args([*command, "--self-contact"]), command)
-    plan = make_plan(request)
+    study = study_with(
+        scenes=["tshirt/kick", "flag"], methods=["simulation", "snug"], split="validation", self_contact=True
+    )
+    plan = make_plan(study)
     assert {scene.name: scene.self_contact for scene in plan.scenes} == {"tshirt/kick": True, "flag": False}
     assert of_garment("tshirt", plan.motions.worn).scene("walk").self_contact  # of what networks learn from
     of_kick, *_ = (cell for cell in plan.cells if cell.scene.dressed and cell.method == "simulation")
     assert protocol_of(of_kick, plan) == OWN  # another reference than that of the protocol
-    without = make_plan(dataclasses.replace(request, self_contact=False))
+    without = make_plan(dataclasses.replace(study, self_contact=False))
     assert not any(scene.self_contact for scene in without.scenes)
     monkeypatch.setitem(make_plan.__globals__, "installed", lambda package: False)
-    with pytest.raises(PlanError, match="--self-contact needs the package ipctk: pip install ipctk"):
-        make_plan(request)
+    with pytest.raises(PlanError, match="--self_contact: needs the package ipctk: pip install ipctk"):
+        make_plan(study)
 
 
 def test_garments_have_it_as_a_row_beside_the_simulation_where_it_is_named():
-    command = ["--scenes", "tunic/*", "--methods", f"simulation,{METHOD}"]
-    plan = make_plan(request_of_run(make_parser().parse_args(command), command))
+    plan = planned("--scenes", "tunic/*", "--methods", f"simulation,{METHOD}")
     assert {cell.method for cell in plan.cells} == {"simulation", METHOD}

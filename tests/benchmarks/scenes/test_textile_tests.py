@@ -10,7 +10,6 @@ import pytest
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.surface import textile_tests as metrics
-from benchmarks.plan.choose_cells import choose_suites
 from benchmarks.plan.plan import PlanError
 from benchmarks.presets import find_preset
 from benchmarks.scenes.textile_tests import TEXTILE_TESTS
@@ -25,12 +24,8 @@ TINY = replace(find_preset("smoke"), sheet_cells=6, sheet_frames=12)
 TABLE = "name,density[g/m2],bending warp[uN.m],bending weft[uN.m]\nvoile,62,2.1,1.4\n"
 
 
-def test_the_suite_runs_only_where_it_is_named():
-    assert "fabric" not in choose_suites(()) and "fabric" in choose_suites(["all"])
-
-
 def test_every_solver_stopped_early_meets_every_fabric():
-    plan = planned("--suite", "fabric")
+    plan = planned("fabric")
     stopped = {entry.name for entry in METHODS if entry.role == "solver"}
     assert len(stopped) > 10
     for scene in TEXTILE_TESTS:
@@ -41,23 +36,23 @@ def test_every_solver_stopped_early_meets_every_fabric():
 def test_a_users_fabrics_are_tested_and_snug_is_placed_among_them(tmp_path):
     path = tmp_path / "mine.csv"
     path.write_text(TABLE)
-    plan = planned("--suite", "fabric", "--preset", "smoke", "--fabrics", str(path))
+    plan = planned("fabric", "--set", f"fabrics={path}")
     assert {"fabric/drape/measured/voile", "fabric/cantilever/measured/voile"} < {s.name for s in plan.scenes}
     assert {"percentile_snug", "percentile_snug_printed"} < {case.name for case in plan.cases}
-    with pytest.raises(PlanError, match="add --suite fabric"):
-        planned("--fabrics", str(path))
+    with pytest.raises(PlanError, match="only study fabric tests fabrics"):
+        planned("--set", f"fabrics={path}")
 
 
 def test_a_copy_of_gauge_brings_its_fabrics(tmp_path):
     folder = str(make_folder(tmp_path))
-    plan = planned("--suite", "fabric", "--preset", "smoke", "--gauge", folder)
+    plan = planned("fabric", "--set", f"gauge={folder}")
     assert {"fabric/drape/gauge/satin", "fabric/cantilever/gauge/oxford"} < {s.name for s in plan.scenes}
     methods = {cell.method for cell in plan.cells if cell.scene.name == "fabric/cantilever/gauge/satin"}
     assert {"simulation", *(entry.name for entry in METHODS if entry.role == "solver")} < methods
-    alone = planned("--suite", "fabric", "--gauge", folder, "--scenes", "fabric/*/gauge/satin")
+    alone = planned("fabric", "--set", f"gauge={folder}", "--scenes", "fabric/*/gauge/satin")
     assert len(alone.scenes) == 2 and not alone.cases
-    with pytest.raises(PlanError, match=r"--gauge .*: only suite fabric"):
-        planned("--gauge", folder)
+    with pytest.raises(PlanError, match=r"gauge=.*: only study fabric"):
+        planned("--set", f"gauge={folder}")
 
 
 @pytest.fixture(scope="module")

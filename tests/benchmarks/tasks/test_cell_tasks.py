@@ -297,7 +297,7 @@ def test_a_process_ends_when_its_parent_was_killed(tmp_path):
 
 def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
     out = tmp_path / "run"
-    options = ["--preset", "smoke", "--suite", "speed", "--scenes", "free_fall", "-o", str(out)]
+    options = ["smoke:speed", "--scenes", "free_fall", "-o", str(out)]
     options += ["--methods", "simulation,newton-1,newton-4"]
     process = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.run", *options],

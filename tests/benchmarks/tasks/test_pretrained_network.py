@@ -12,9 +12,9 @@ import torch
 from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.plan.make_plan import check_trained
-from benchmarks.plan.options import make_parser, request_of_run
+from benchmarks.plan.options import make_parser, study_of
 from benchmarks.plan.plan import Motions, Network, Plan, PlanError
-from benchmarks.plan.request import Request
+from benchmarks.plan.study import Study
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.console import remarks
@@ -164,16 +164,16 @@ def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
 
 def test_the_option_takes_the_package_or_a_folder(tmp_path):
     def folder(*options: str) -> Path | None:
-        return request_of_run(make_parser().parse_args(list(options)), options).trained
+        return study_of(make_parser().parse_args(list(options))).trained
 
     assert folder() is None and folder("--trained") == trained.FOLDER
     assert folder("--trained", str(tmp_path)) == tmp_path
     with pytest.raises(PlanError, match="no such folder"):
-        check_trained(Request(trained=tmp_path / "none"), tmp_path / "run")
+        check_trained(Study(trained=tmp_path / "none"), tmp_path / "run", "")
     with pytest.raises(PlanError, match="leave out --scheduler"):
-        check_trained(Request(trained=tmp_path, scheduler="tcp://there"), tmp_path / "run")
+        check_trained(Study(trained=tmp_path), tmp_path / "run", "tcp://there")
     with pytest.raises(PlanError, match="the folder of this run itself: give another by --out"):
-        check_trained(Request(trained=tmp_path), tmp_path / "deeper" / "..")
+        check_trained(Study(trained=tmp_path), tmp_path / "deeper" / "..", "")
 
 
 def test_networks_of_a_run_become_those_of_the_package(made, tmp_path, monkeypatch):

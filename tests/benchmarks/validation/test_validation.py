@@ -8,15 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.plan.choose_cells import Selection, choose_cells
-from benchmarks.plan.plan import Motions
-from benchmarks.presets import find_preset
 from benchmarks.validation.case import Case, cases_of, known_answer
 from benchmarks.validation.convergence import fitted_order
 from benchmarks.validation.motion.time_step_orders import VISCOSITY, Viscosity, halving_order
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import Step
+from tests.benchmarks.plan.planned import planned
 
 
 def marked(case):
@@ -44,16 +42,12 @@ def test_there_are_enough_of_every_kind():
     assert modules == exact
 
 
-def test_the_smallest_preset_runs_the_quick_ones_unless_one_is_named():
-    def chosen(preset, scenes=()):
-        suites = ("validation",)
-        return choose_cells(
-            Selection(suites=suites, full=True, preset=find_preset(preset), motions=Motions(), scenes=scenes)
-        )[1]
-
-    assert chosen("quick") == KNOWN_ANSWERS
-    assert chosen("smoke") == tuple(case for case in KNOWN_ANSWERS if case.smoke)
-    assert [case.name for case in chosen("smoke", ("slit_annulus_inner",))] == ["slit_annulus_inner"]
+def test_study_smoke_runs_the_quick_ones_unless_one_is_named():
+    assert planned("full:validation").cases == KNOWN_ANSWERS
+    smoke = tuple(case for case in KNOWN_ANSWERS if case.smoke and not case.long)
+    assert planned("smoke:validation").cases == smoke
+    (case,) = planned("smoke:validation", "--scenes", "slit_annulus_inner").cases
+    assert case.name == "slit_annulus_inner"
 
 
 @pytest.mark.parametrize(

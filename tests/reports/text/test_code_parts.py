@@ -48,13 +48,14 @@ def test_a_class_that_is_not_there_or_describes_no_attributes_is_refused(path):
         attribute_rows(path)
 
 
-def test_presets_and_options_have_a_row_each():
-    assert [row[0] for row in PARTS["presets"]()[1:]] == [f"`{preset.name}`" for preset in PRESETS]
-    assert dict((row[0], row[1:]) for row in PARTS["presets"]())["`quick`"][:3] == (
+def test_sizes_studies_and_options_have_a_row_each():
+    assert [row[0] for row in PARTS["sizes"]()[1:]] == [f"`{preset.name}`" for preset in PRESETS]
+    assert dict((row[0], row[1:]) for row in PARTS["sizes"]())["`quick`"][:3] == (
         "1000",
         "8",
         "at most 150",
     )
+    assert ("`fabric`", "fabric") in [(row[0], row[2]) for row in PARTS["studies"]()]
     assert "`--trained [DIR]`" in dict(PARTS["options of benchmarks.run"]())
     assert all(len(set(map(len, part()))) == 1 for part in PARTS.values())
 

@@ -2,40 +2,34 @@
 
 from __future__ import annotations
 
-import shlex
 import subprocess
-from fnmatch import fnmatch
 from types import SimpleNamespace
 
 import pytest
 
-from benchmarks.plan.plan import runs
 from benchmarks.provenance import commit
 from benchmarks.publish import __main__ as command
 from benchmarks.publish.__main__ import PublishError, all_usable, keep, publish
-from benchmarks.publish.published_runs import RUNS, PublishedRun
 from benchmarks.results.json_file import ResultsError
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks import FIGURES
-from tests.benchmarks.plan.planned import planned
 
-FALL = "--preset smoke --suite speed --scenes free_fall --methods "
-
-
-@pytest.mark.parametrize("name", RUNS)
-def test_every_published_command_can_be_planned(name, tmp_path):
-    for folder, line in command.commands(name, RUNS[name], tmp_path).items():
-        plan = planned(*line[3:])
-        assert plan.folder == folder and (plan.scenes or plan.cases)
-        assert {cell.scene.name for cell in plan.cells if runs(cell)} == {scene.name for scene in plan.scenes}
+FALL = """question = "?"
+sizes = "smoke"
+[parts.speed]
+scenes = ["free_fall"]
+methods = ["simulation", "newton-1"]
+[show]
+pictures = ["error_against_time_free_fall"]
+films."fall.gif" = "--scene free_fall --methods simulation,newton-1 --width 100"
+"""
 
 
-def test_every_published_picture_is_one_that_reports_draw():
-    patterns = [pattern for figure in FIGURES for pattern in figure.patterns]
-    for run in RUNS.values():
-        for name in run.pictures:
-            assert any(fnmatch(f"{name}.png", pattern) for pattern in patterns), name
+@pytest.fixture
+def fall(tmp_path) -> str:
+    """A study of a user's own that is published."""
+    (tmp_path / "fall.toml").write_text(FALL)
+    return str(tmp_path / "fall.toml")
 
 
 def test_what_is_published_is_replaced_whole_or_left(tmp_path):
@@ -61,15 +55,15 @@ def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     assert [path.name for path in target.parent.iterdir()] == ["run"]
 
 
-def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch):
-    run, status = PublishedRun("?", {"": FALL + "newton-1"}), 1
+def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch, fall):
+    status = 1
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=status))
     with pytest.raises(PublishError, match="fall: exit status 1"):
-        publish("fall", run, tmp_path, tmp_path / "kept", "abc")
+        publish(fall, tmp_path, tmp_path / "kept", "abc")
     status = 0
     monkeypatch.setattr(RunFolder, "read_rows", lambda _: [SimpleNamespace(commit=c) for c in ("abc", "def")])
     with pytest.raises(PublishError, match="fall: rows of commit def"):
-        publish("fall", run, tmp_path, tmp_path / "kept", "abc")
+        publish(fall, tmp_path, tmp_path / "kept", "abc")
     assert not (tmp_path / "kept").exists()
 
 
@@ -106,10 +100,12 @@ def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
 def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, capsys):
     monkeypatch.setattr(command, "commit", lambda: "abc+changes")
     assert command.main(["quick"]) == 2 and "commit the changes first" in capsys.readouterr().err
-    assert command.main(["quik"]) == 2 and "no published run 'quik'" in capsys.readouterr().err
+    assert command.main(["quik"]) == 2 and "no study 'quik'" in capsys.readouterr().err
+    assert command.main(["smoke"]) == 2 and "study smoke: has no [show]" in capsys.readouterr().err
     assert command.main(["--list"]) == 0
     shown = capsys.readouterr().out
-    assert all(f"{name}: {run.question}" in shown for name, run in RUNS.items())
+    assert "quick: All methods" in shown and "python -m benchmarks.run quick --only" in shown
+    assert "smoke: " not in shown
 
 
 @pytest.mark.parametrize("error", [PublishError, ResultsError])
@@ -128,14 +124,10 @@ def test_a_run_that_lacks_a_picture_is_left_and_the_next_is_done(error, monkeypa
 
 
 @pytest.mark.slow
-def test_parts_are_merged_reported_and_kept(tmp_path):
-    parts = {"one": FALL + "simulation,newton-1", "two": FALL + "newton-2"}
-    films = {"fall.gif": "--scene free_fall --methods simulation,newton-1 --width 100"}
-    run = PublishedRun("?", parts, ("error_against_time_free_fall",), films)
-    publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
+def test_a_study_is_run_drawn_and_kept(tmp_path, fall):
+    for _ in range(2):
+        command.publish(fall, tmp_path / "runs", tmp_path / "kept", commit())
     rows = RunFolder(tmp_path / "kept" / "fall").read_rows()
-    assert {row.method for row in rows} == {"simulation", "newton-1", "newton-2"}
+    assert {row.method for row in rows} == {"simulation", "newton-1"}
     assert (tmp_path / "kept" / "fall" / "fall.gif").stat().st_size > 1000
-    line = RunFolder(tmp_path / "kept" / "fall").read_config()["command"]
-    assert shlex.split(line) == ["python", "-m", "benchmarks.publish", "fall"]
-    publish("fall", run, tmp_path / "runs", tmp_path / "kept", commit())
+    assert RunFolder(tmp_path / "kept" / "fall").read_config()["study"]["question"] == "?"

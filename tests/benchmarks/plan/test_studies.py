@@ -1,0 +1,210 @@
+"""A study is read from its file and from options; a wrong field is refused with its place."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+
+from benchmarks import run
+from benchmarks.plan.options import OF_SCENES, REPLACED, SHORT
+from benchmarks.plan.read_study import line_of, parse_setting, read_study, study_names
+from benchmarks.plan.study import Study, StudyError
+from benchmarks.presets import find_preset
+from benchmarks.publish.__main__ import published_studies
+from reports.blocks import FIGURES
+from snug.trained import FOLDER
+from tests.benchmarks.plan.planned import planned, study_with
+
+MINE = """question = "Does it fall?"
+like = "smoke"
+body = "mine.npz"
+motions = ["clips", "library"]
+metrics = "height.py"
+sizes = { base = "quick", frames = 60, steps.snug = 7, dependence.frames = 3 }
+
+[garment]
+path = "shirt.obj"
+shift = [0, 0.1, 0]
+
+[parts.speed]
+scenes = ["flag"]
+methods = ["simulation", "mine.py"]
+
+[rollouts]
+theirs = "out/{scene}.npz"
+others = { path = "o.pc2", units = "cm", ms = 2.5 }
+"""
+
+
+@pytest.fixture
+def mine(tmp_path) -> Path:
+    """A user's study: a folder beside whose study.toml lie the files that it names."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "study.toml").write_text(MINE)
+    return folder
+
+
+def test_a_study_has_its_own_fields_those_that_it_is_like_and_paths_beside_its_file(mine):
+    study = read_study(str(mine))
+    assert study == read_study(str(mine / "study.toml")) and study.question == "Does it fall?"
+    assert study.body == mine / "mine.npz" and study.motions == (str(mine / "clips"), "library")
+    assert study.metrics == (str(mine / "height.py"),)
+    assert study.parts["speed"].methods == ("simulation", str(mine / "mine.py"))
+    assert study.parts["speed"].optional_methods == read_study("smoke").parts["speed"].optional_methods
+    assert list(study.parts) == ["garments", "speed", "validation", "extremes", "shapes"]
+    quick = find_preset("quick")
+    assert study.sizes.frames == 60 and study.sizes.steps == {**quick.steps, "snug": 7}
+    assert study.sizes.dependence.frames == 3 and study.sizes.dependence.meshes == quick.dependence.meshes
+    assert study.garment.path == mine / "shirt.obj" and study.garment.shift == (0.0, 0.1, 0.0)
+    assert study.rollouts["theirs"].path == str(mine / "out/{scene}.npz")
+    assert study.rollouts["others"].stated.units == "cm" and study.rollouts["others"].declared_ms == 2.5
+    assert study.written["sizes"]["frames"] == 60 and "like" not in study.written
+    (mine / "other.toml").write_text('like = "study.toml"\nbody = "other.npz"\n')
+    assert read_study(str(mine / "other.toml")).body == mine / "other.npz"
+
+
+def test_options_hold_before_the_file_and_their_paths_are_relative_to_where_one_is(mine):
+    options = [parse_setting(text) for text in ("sizes.frames=9", "garment.units=cm", "body=b.npz")]
+    study = read_study(f"{mine}:speed", options)
+    assert (study.sizes.frames, study.sizes.name, study.garment.units) == (9, "quick", "cm")
+    assert study.body == Path("b.npz") and study.garment.path == mine / "shirt.obj"
+    assert list(study.parts) == ["speed"]
+
+
+@pytest.mark.parametrize(
+    ("text", "table"),
+    [
+        ("seeds=0,1", {"seeds": [0, 1]}),
+        ("split=validation", {"split": "validation"}),
+        ("test_motions=a,b", {"test_motions": ["a", "b"]}),
+        ("sizes=smoke", {"sizes": {"base": "smoke"}}),
+        ('parts.speed.scenes=["flag"]', {"parts": {"speed": {"scenes": ["flag"]}}}),
+        ("rollouts.mine=a.npz", {"rollouts": {"mine": {"path": "a.npz"}}}),
+        ("self_contact=true", {"self_contact": True}),
+        ("motions=clips/a b", {"motions": "clips/a b"}),
+    ],
+)
+def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word(text, table):
+    assert parse_setting(text).table == table
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("seeds = [", "not readable as TOML"),
+        ("sedes = [0]", "study.toml: line 1: sedes: no field is called 'sedes'; did you mean seeds"),
+        ("question = 1", "study.toml: line 1: question: 1: give text"),
+        ("\nseeds = ['a']", "study.toml: line 2: seeds: 'a': give a whole number"),
+        ("seeds = []", "study.toml: line 1: seeds: '': give at least one whole number"),
+        ("seeds = [-1]", "study.toml: line 1: seeds: '-1': give at least one whole number"),
+        ("self_contact = 1", "study.toml: line 1: self_contact: 1: give true or false"),
+        ("split = 'tset'", "study.toml: line 1: split: 'tset': choose from test, validation"),
+        ("device = 'tpu'", "study.toml: line 1: device: 'tpu': choose from cpu, cuda"),
+        ("body = 3", "study.toml: line 1: body: 3: give a path"),
+        (
+            "sizes = 'huge'",
+            "study.toml: line 1: sizes.base: no sizes are called 'huge'; choose from smoke, quick, paper",
+        ),
+        (
+            "[sizes]\nbase = 'smoke'\nframe = 3",
+            "study.toml: line 3: sizes.frame: no field is called 'frame'; did you mean",
+        ),
+        ("[sizes]\nframes = 2", "study.toml: line 2: sizes.frames: 2: give 3 or more"),
+        (
+            "[parts.garmnts]",
+            "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, speed",
+        ),
+        (
+            "[parts.speed]\nscenes = ['flagg']",
+            "study.toml: line 2: parts.speed.scenes: unknown scene 'flagg'; did you mean",
+        ),
+        (
+            "[parts.speed]\nmethods = ['sung']",
+            "study.toml: line 2: parts.speed.methods: unknown method 'sung'; did you",
+        ),
+        (
+            "[parts.validation]\ncases = ['patch']",
+            "study.toml: line 2: parts.validation.cases: unknown case 'patch'",
+        ),
+        ("parts = 3", "study.toml: line 1: parts: 3: give a table"),
+        ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
+        ("garment = { path = 'a b.obj' }", "'a b' cannot name scenes"),
+        (
+            "[rollouts]\nm = { path = 'a', unit = 'cm' }",
+            "study.toml: line 2: rollouts.m: unknown word 'unit'; there are",
+        ),
+        ("like = 'smok'", "no study 'smok'"),
+        ("like = 'study.toml'", "is like itself"),
+        ("[show]\nfilms = 'a.gif'", "study.toml: line 2: show.films: 'a.gif': give a table"),
+    ],
+)
+def test_a_wrong_field_is_refused_with_its_line(text, message, tmp_path, monkeypatch, refused):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text(text)
+    refused(message, run.main, ["study.toml", "-o", "out"])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ["dfault"],
+            "no study 'dfault': name one, or a file or folder with study.toml; did you mean default",
+        ),
+        (["full:garment"], "study full: no part 'garment'; it has garments, speed"),
+        (["--set", "seeds"], "--set seeds: give field=value"),
+        (["--set", "sizes.frames=2"], "--set sizes.frames=2: 2: give 3 or more"),
+        (["--seeds", "one"], "--seeds: 'one': give a whole number"),
+        (["--rollout", "mine"], "mine: give NAME=FILE"),
+    ],
+)
+def test_a_wrong_option_is_refused_by_its_name(words, message, tmp_path, monkeypatch, refused):
+    monkeypatch.chdir(tmp_path)
+    refused(message, run.main, [*words, "-o", "out"])
+
+
+@pytest.mark.parametrize("option", REPLACED)
+def test_a_former_option_is_answered_with_the_field(option, refused):
+    refused(f"{option} is no option any more: ", run.main, [option, "x"])
+
+
+def test_lines_of_fields_are_those_of_their_tables():
+    field = ("parts", "speed", "methods")
+    assert line_of("a = 1\n[parts.speed]\n\nmethods = 1", field) == 4
+    assert line_of("[parts]\nspeed = { methods = 1 }", field) == 2
+    assert line_of('[show]\nfilms."a.gif" = 1', ("show", "films", "a.gif")) == 2
+
+
+def test_short_forms_are_fields_and_every_field_is_described():
+    from benchmarks.declarations import attributes_of
+
+    assert set(OF_SCENES) < set(SHORT) <= set(attributes_of(Study))
+    assert study_with(trained=True).trained == FOLDER and study_with(trained=False).trained is None
+
+
+@pytest.mark.parametrize("name", study_names())
+def test_every_study_of_the_package_has_a_question_and_can_be_planned(name):
+    study = read_study(name)
+    assert study.question.endswith((".", "?")) or ":" in study.question
+    words = ("--methods", "simulation") if name in ("paper", "full") else ()
+    plan = planned(name, *words)
+    assert set(plan.suites) <= set(study.parts) and plan.study["name"] == name
+    cells = [cell for cell in plan.cells if cell.entry.skip(cell.scene) is None]
+    assert {cell.scene.name for cell in cells} == {scene.name for scene in plan.scenes}
+
+
+def test_published_pictures_are_those_that_reports_draw():
+    patterns = [pattern for figure in FIGURES for pattern in figure.patterns]
+    assert len(published_studies()) >= 10
+    for name in published_studies():
+        for picture in read_study(name).show.pictures:
+            assert any(fnmatch(f"{picture}.png", pattern) for pattern in patterns), picture
+
+
+def test_a_study_error_keeps_the_field_until_its_place_is_known():
+    with pytest.raises(StudyError, match="give at least one") as refused:
+        Study(seeds=())
+    assert refused.value.field == ("seeds",) and Study().place("sizes", "frames") == "sizes.frames"
