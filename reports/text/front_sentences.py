@@ -34,7 +34,7 @@ def front_sentences(run: Run) -> str:
     solver = fastest(truncated(run, points), network.error) if network else None
     faster = compare_methods(run, timed, run.metrics[run_time(timed)], run.reference, NETWORK).effect
     if not (snug and pbns and supervised and swing and alike and network and solver and faster):
-        raise ValueError(f"run {run.folder}: lacks SNUG, PBNS, the supervised network or their times")
+        raise ValueError("the run lacks SNUG, PBNS, the supervised network, or their times beside solvers")
     worst, most = snug.worst
     least = min(faster.interval or (faster.shown,))
     times = math.floor(least / 10 ** math.floor(math.log10(least))) * 10 ** math.floor(math.log10(least))
