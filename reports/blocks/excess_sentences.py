@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import pandas as pd
 
 from reports.run.finished_run import Run
 from reports.statistics.body_shapes import rows_of_other_shapes
-from reports.statistics.effects import RECORDING, Effect, recording_of
+from reports.statistics.effects import Effect, is_recorded, recording_of
 from reports.statistics.page_one_methods import EXTERNAL, LEARNED, leads
 from reports.statistics.published import published_beside
 from reports.statistics.relative_excess import (
@@ -39,20 +39,21 @@ def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
     beside = published_beside(run, first)
     motions = f"{count} {_kind(run, scenes)}motion{'' if count == 1 else 's'}"
     paired = [f"; {says}" for says in _paired(run, worn, first, others)]
+    pooled = {name: f"pooled {number(of.pooled, 2)} %" if count > 1 else "" for name, of in known.items()}
+    first_share = f"{_share(excess, pooled[first])}{f' ({beside})' if beside else ''}"
     shares = [
-        f"{run.label(first)} has a relative excess of {_share(excess)}{f' ({beside})' if beside else ''}",
-        *(f"{run.label(name)} of {_share(known[name])}" for name in others),
+        f"{run.label(first)} has a relative excess of {first_share}",
+        *(f"{run.label(name)} of {_share(known[name], pooled[name])}" for name in others),
     ]
     scale = "where the reference has 0 % and skinning alone 100 %"
     sentences = [f"On {motions} {listed(shares)}, {scale}{''.join(paired)}"]
     if count > 1:
-        means = listed([f"{run.label(name)} {number(of.mean, 2)} %{of.fewer}" for name, of in known.items()])
         worst = listed(
             [f"{run.label(name)} {number(of.worst[1], 2)} %{of.fewer}" for name, of in known.items()]
         )
         sentences += [
-            f"These percentages are geometric means over {_repeated(run, scenes)}. Arithmetic means: "
-            f"{means}; worst motions: {worst}",
+            f"These percentages are geometric means over {_repeated(run, scenes, known)}; pooled: the ratio "
+            f"of the sums over motions. Worst motions: {worst}"
         ]
     return [*sentences, _against_reference(run.label(first), excess)]
 
@@ -78,27 +79,36 @@ def _kind(run: Run, scenes: Collection[str]) -> str:
     return "validation " if validation == set(scenes) else "validation and other unseen "
 
 
-def _repeated(run: Run, scenes: Collection[str]) -> str:
-    """Return what the means are taken over: "motions", or how many sources of which kinds."""
+def _repeated(run: Run, scenes: Collection[str], known: Mapping[str, Excess]) -> str:
+    """Return what the means are taken over: "motions", or how many sources of which kinds, with theirs."""
     sources = {recording_of(scene) for scene in scenes}
     count = len(sources)
     if count == len(scenes):
         return "motions"
-    recordings = {name for name in sources if RECORDING.search(name)}
+    recordings = {name for name in sources if is_recorded(name)}
     others = sources - recordings
     origins = run.config.get("motion_sources", {})
     made = all(origins.get(scene.partition("/")[2], "").startswith(BY_CODE) for scene in others)
     motions = f"motion{'' if len(others) == 1 else 's'}"
     kind = f"{motions} made by code" if made else f"other {motions}"
-    more = f", and {len(others)} {kind}" if others else ""
     recorded = f"{len(recordings)} recording{'' if len(recordings) == 1 else 's'}"
-    return f"{count} sources treated as independent: {recorded}, each averaged over its segments{more}"
+    parts = f"{recorded}, each averaged over its segments"
+    if others:
+        of_recordings, of_others = (_typical(run, known, recorded=kept) for kept in (True, False))
+        parts += f" ({of_recordings}), and {len(others)} {kind} ({of_others})"
+    return f"{count} sources treated as independent: {parts}"
 
 
-def _share(excess: Excess) -> str:
+def _typical(run: Run, known: Mapping[str, Excess], *, recorded: bool) -> str:
+    """Return "SNUG 3.8 % and PBNS 12 %": typical over the recorded motions, or over the others."""
+    shares = {name: number(excess.typical_of(recorded=recorded), 2) for name, excess in known.items()}
+    return listed([f"{run.label(name)} {share} %" for name, share in shares.items()])
+
+
+def _share(excess: Excess, *remarks: str) -> str:
     """Return a relative excess as "6.1 % (95 % interval 2.3 to 14)", and of how many roll-outs if not all."""
-    interval = _interval(excess.effect)
-    return f"{number(excess.typical, 2)} %{f' ({interval})' if interval else ''}{excess.fewer}"
+    inside = "; ".join(filter(None, [_interval(excess.effect), *remarks]))
+    return f"{number(excess.typical, 2)} %{f' ({inside})' if inside else ''}{excess.fewer}"
 
 
 def _interval(effect: Effect) -> str:

@@ -44,7 +44,7 @@ def topics(run: Run) -> list[tuple[str, list[str]]]:
     timed = cells[cells["scene"].isin(compared)] if compared else worn
     beside = cells[cells["scene"].isin(reference_scenes(run))]
     sentences = {
-        "How near": relative_excesses(run, worn) or _distances(run, cells), "How it moves": _moves(run, worn),
+        "How near": relative_excesses(run, worn), "How it moves": _moves(run, worn),
         "At what cost": _cost(run, timed, compared), "How certain": _trust(run, beside, worn),
         "On other bodies": on_other_bodies(run),
         "Textile tests": [textile_tests(run)], "Engines": [engines(run)],
@@ -58,18 +58,6 @@ def topics(run: Run) -> list[tuple[str, list[str]]]:
 def headline(run: Run) -> list[tuple[str, str]]:
     """Return (topic, its sentences as one paragraph) for each topic of page one that the run can tell."""
     return [(topic, " ".join(sentences)) for topic, sentences in topics(run)]
-
-
-def _distances(run: Run, rows: pd.DataFrame) -> list[str]:
-    """Say how far the subjects are from the reference, for a run without skinning."""
-    parts = []
-    for method in subjects(run, set(rows[rows["usable"]]["method"])):
-        distance, gap = (mean_of(rows, method, name) for name in (DISTANCE, GAP))
-        if distance is not None:
-            above = "" if gap is None else f", with an energy gap of {number(gap.value)} J{gap.fewer}"
-            far = f"{number(distance.value)} mm from the reference{distance.fewer}"
-            parts.append(f"{run.label(method)} lies {far}{above}")
-    return ["; ".join(parts)]
 
 
 def _ended(sentence: str) -> str:
@@ -239,7 +227,7 @@ def _smaller_steps(run: Run, rows: pd.DataFrame) -> list[str]:
 
 
 def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
-    """Return a sentence on the fastest solver that is as accurate, and one on the best method as fast."""
+    """Return a sentence on the fastest solver that is as accurate, and one on a method as fast and better."""
     points = points_of(run, frame, scenes, GAP)
     network = next((p for p in points if p.method == NETWORK), None)
     if network is None:
@@ -255,25 +243,15 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
             f"{number(network.error)} J{network.fewer}) takes {number(solver.time)} ms, "
             f"{number(solver.time / network.time, 2)} times as long as {snug}"
         )
-    if best is None:
-        rows = frame[frame["scene"].isin(list(scenes)) & (frame["metric"] == GAP) & frame["usable"]]
-        partly_measured = set(rows["method"]) - {point.method for point in points}
-        where = "timed in all of these scenes" if partly_measured else "timed here"
-        gaps = f"no method {where} is as fast with a smaller energy gap"
-        if solver is None:
-            gaps = (
-                f"{snug} has an energy gap, a frame's energy above the minimum of its own time step, of "
-                f"{number(network.error)} J{network.fewer}; {gaps}"
-            )
-    else:
+    if best is not None:
         within = " within repeats" if best.time > network.time else ""
         apart = network.error - best.error > network.error_spread + best.error_spread
         scatter = "" if apart else ", by less than seeds and equally valid simulations scatter"
-        gaps = (
+        sentences.append(
             f"{run.label(best.method)} is no slower{within} and has an energy gap of {number(best.error)} J"
             f"{best.fewer}, below the {number(network.error)} J{network.fewer} of {snug}{scatter}"
         )
-    return [*sentences, gaps]
+    return sentences
 
 
 def unbroken(text: str) -> str:

@@ -268,7 +268,7 @@ def _moved_by(mean: Mean, name: str, scale: str) -> float:
 
 
 SEGMENT = re.compile(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)")
-RECORDING = re.compile(r"/\d+_\d+(@|$)")  # names of clips of the library, as `recording_of` gives them
+RECORDING = re.compile(r"/\d+_\d+(_[a-z])?(@|$)")  # names of clips of the library, and of segments
 
 
 def recording_of(scene: str) -> str:
@@ -278,6 +278,15 @@ def recording_of(scene: str) -> str:
     ('tshirt/01_01@clip', 'tshirt/06_15', 'tshirt/kick')
     """
     return SEGMENT.sub(r"\1", scene)
+
+
+def is_recorded(scene: str) -> bool:
+    """Return whether the motion of the scene is a recording of the library, by its name.
+
+    >>> is_recorded("tshirt/01_01_a@clip"), is_recorded("tshirt/kick")
+    (True, False)
+    """
+    return RECORDING.search(scene) is not None
 
 
 def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:

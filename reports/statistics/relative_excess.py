@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
@@ -24,6 +25,7 @@ from reports.statistics.effects import (
     EXCESS,
     Effect,
     effect,
+    is_recorded,
     mean_by_recording,
     off_scale,
     on_scale,
@@ -118,13 +120,20 @@ class Excess:
 
     Attributes:
         effect: against the reference, from which the verdict comes; its interval is that of `typical`.
-        by_motion: scene -> mean over seeds.
+        cells: (scene, seed) -> value.
+        pooled: excess energy, the mean over seeds, summed over motions, as a share of skinning's so summed.
         fewer: remark on roll-outs that are missing, empty where none is.
     """
 
     effect: Effect
-    by_motion: Mapping[str, float]
+    cells: Mapping[tuple[str, int], float]
+    pooled: float
     fewer: str = ""
+
+    @property
+    def by_motion(self) -> dict[str, float]:
+        """Scene -> mean over seeds."""
+        return pd.Series(dict(self.cells)).groupby(level=0, sort=False).mean().to_dict()
 
     @property
     def typical(self) -> float:
@@ -139,28 +148,22 @@ class Excess:
     @property
     def mean(self) -> float:
         """Arithmetic mean over recordings, of a recording over its segments."""
-        return float(np.mean(list(mean_by_recording(self._cells).values())))
+        cells = {(scene, 0): value for scene, value in self.by_motion.items()}
+        return float(np.mean(list(mean_by_recording(cells).values())))
 
-    @property
-    def _cells(self) -> dict[tuple[str, int], float]:
-        """Values as cells of one seed."""
-        return {(scene, 0): value for scene, value in self.by_motion.items()}
+    def typical_of(self, *, recorded: bool) -> float | None:
+        """Return the typical value of recorded motions alone, or of the others alone; None without any."""
+        scaled = {
+            cell: float(on_scale(value, EXCESS)) for cell, value in self.cells.items()
+            if is_recorded(cell[0]) == recorded
+        }  # fmt: skip
+        means = list(mean_by_recording(scaled).values())
+        return float(off_scale(np.mean(means), EXCESS)) if means else None
 
     @property
     def worst(self) -> tuple[str, float]:
         """Scene with the largest relative excess, and its value."""
-        scene = max(self.by_motion, key=lambda name: self.by_motion[name])
-        return scene, self.by_motion[scene]
-
-    @property
-    def without_each_recording(self) -> tuple[float, float]:
-        """Smallest and largest typical value when one recording is left out."""
-        scaled = {cell: float(on_scale(value, EXCESS)) for cell, value in self._cells.items()}
-        cells = np.array(list(mean_by_recording(scaled).values()))
-        if len(cells) < 2:
-            return self.typical, self.typical
-        left = (cells.sum() - cells) / (len(cells) - 1)
-        return float(off_scale(left.min(), EXCESS)), float(off_scale(left.max(), EXCESS))
+        return max(self.by_motion.items(), key=itemgetter(1))
 
 
 def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
@@ -168,8 +171,13 @@ def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
     one, zero = compared_excess(run, rows, method, run.reference)
     if one is None or zero is None:
         return None
-    by_motion = pd.Series(dict(one.cells)).groupby(level=0, sort=False).mean()
-    return Excess(effect(one, zero, EXCESS), by_motion.to_dict(), one.fewer)
+    motions = {scene for scene, _ in one.cells}
+    totals = _values(rows, TOTAL, [method, run.reference, SKINNING])
+    own, skinning = (
+        sum(totals[scene][name] - totals[scene][run.reference] for scene in motions)
+        for name in (method, SKINNING)
+    )
+    return Excess(effect(one, zero, EXCESS), one.cells, 100.0 * own / skinning, one.fewer)
 
 
 def compared_excess(

@@ -13,7 +13,6 @@ from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import shapes
 from reports.tables.dictionary import dictionary
 from reports.tables.engines.audit import engine_audit, engine_laws
-from reports.tables.equal_data import EQUAL_DATA
 from reports.tables.fabric.textile_tests import (
     fabric_bands,
     fabric_drape,
@@ -28,6 +27,7 @@ from reports.tables.findings import (
 from reports.tables.latex import write_latex
 from reports.tables.outcomes import endings, extremes, unfinished, validation
 from reports.tables.page_one_table import overview
+from reports.tables.paper_values import paper_table_1
 from reports.tables.pivot import metric_tables
 from reports.tables.speed import SPEED, crossings, error_rivals, reference_uncertainty
 from reports.tables.table import Table
@@ -36,11 +36,11 @@ from reports.tables.trainings import training_curves, trainings
 TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     metric_tables,
     overview,
+    paper_table_1,
     relative_excess,
     relative_excess_by_motion,
     errors_in_spreads,
     findings,
-    EQUAL_DATA,
     ablations,
     ablation_effects,
     crossings,

@@ -53,9 +53,8 @@ def findings(run: Run) -> list[Table]:
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
     "arithmetic well below; under it the 95 % interval. Segments of a recording count as one motion. Mean: "
-    "arithmetic. Left out: smallest and largest typical value without any one motion. Uncertain by: the "
-    "spread over the reference's ensemble. Energy against the reference: more or less where p < 0.05 and the "
-    "difference exceeds that spread."
+    "arithmetic. Uncertain by: the spread over the reference's ensemble. Energy against the reference: more "
+    "or less where p < 0.05 and the difference exceeds that spread."
 )
 
 
@@ -63,24 +62,25 @@ def relative_excess(run: Run) -> list[Table]:
     """Tabulate the relative excess of each method over the motions of a garment."""
     lines: list[tuple[Cell, ...]] = []
     for garment, method, excess in _measured(run):
-        low, high = excess.without_each_recording
         worst, most = excess.worst
         stands = standing(excess.effect, excess.effect.p_value()) + untested(excess.effect)
         lines.append((
-            garment, method, excess.effect, excess.mean, most, worst.partition("/")[2] or worst, low, high,
-            excess.uncertainty or None, len(excess.by_motion), stands,
+            garment, method, excess.effect, excess.typical_of(recorded=True),
+            excess.typical_of(recorded=False), excess.pooled, excess.mean, most,
+            worst.partition("/")[2] or worst, excess.uncertainty or None, len(excess.by_motion), stands,
         ))  # fmt: skip
     columns = (
-        GARMENT, METHOD, Column("typical", "Typical", "%", digits=2), Column("mean", "Mean", "%", digits=2),
+        GARMENT, METHOD, Column("typical", "Typical", "%", digits=2),
+        Column("recorded", "Recorded", "%", digits=2), Column("others", "Others", "%", digits=2),
+        Column("pooled", "Pooled", "%", digits=2), Column("mean", "Mean", "%", digits=2),
         Column("worst", "Worst", "%", digits=2), Column("worst_motion", "Worst motion", text=True),
-        Column("left_out_low", "Left out, low", "%", digits=2),
-        Column("left_out_high", "Left out, high", "%", digits=2),
         Column("uncertain_by", "Uncertain by", "%"), Column("motions", "Motions"),
         Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
     caption = (
         "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E. Typical "
-        "(geometric, with its interval) and mean: over independent sources and seeds."
+        "(geometric, with its interval) and mean: over independent sources and seeds. Recorded, others: "
+        "typical of the library's recordings, and of other motions. Pooled: ratio of the sums over motions."
     )
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
 

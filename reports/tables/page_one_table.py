@@ -54,16 +54,18 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
     faster = {name: _times_faster(run, timed, name) for name in chosen}
-    by_definition = {run.reference: 0.0} if any(excess.values()) else {}
+    shares: dict[str, tuple[Cell, Cell]] = {name: (of.effect, of.pooled) for name, of in excess.items() if of}
+    shares |= {run.reference: (0.0, 0.0)} if shares else {}
     lines: list[tuple[Cell, ...]] = [
         (
-            method, known.effect if (known := excess.get(method)) else by_definition.get(method),
+            method, *shares.get(method, (None, None)),
             *(mean_of(rows, method, metric.name) for metric, rows in asked), faster[method],
         )
         for method in chosen
     ]  # fmt: skip
     columns = [
         Column("relative_excess", "Relative excess", "%", digits=2),
+        Column("pooled", "Pooled", "%", digits=2),
         *(metric_column(metric) for metric, _ in asked), Column("faster", "Times faster"),
     ]  # fmt: skip
     kept = [k for k in range(1, len(columns) + 1) if any(line[k] is not None for line in lines)]
@@ -72,8 +74,8 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     if not columns:
         return []
     of_motions = (
-        f"{garment}: relative excess as a geometric mean over independent sources, the rest as arithmetic "
-        "means over motions"
+        f"{garment}: relative excess as a geometric mean over independent sources, pooled as the ratio of "
+        "sums over motions, the rest as arithmetic means over motions"
     )
     caption = of_motions if garment else f"Means {in_scenes(scenes)}"
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."

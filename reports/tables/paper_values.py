@@ -1,6 +1,10 @@
-"""Values that the paper printed, as data. Santesteban, Otaduy, Casas: SNUG, CVPR 2022, tables 1 to 3."""
+"""Values that the paper printed. Santesteban, Otaduy, Casas: SNUG, CVPR 2022, tables 1 to 3."""
 
 from __future__ import annotations
+
+from reports.run.finished_run import Run
+from reports.statistics.effects import recording_of
+from reports.tables.table import Column, Table, table
 
 # Table -> method -> metric -> as printed. A column that the paper does not report is a dash.
 PRINTED = {
@@ -32,3 +36,32 @@ NOTES = {
     "curvature": "In grey the paper's value, whose operator and unit it does not state.",
     "cost": "In grey the paper's values, on its own machine with a GPU.",
 }
+
+TEST_CLIPS = ("tshirt/01_01", "tshirt/07_02")  # two of the paper's four test sequences
+
+
+def paper_table_1(run: Run) -> list[Table]:
+    """Tabulate energies of the paper's recipe on two of its test sequences, with what its table 1 has.
+
+    Each number is a mean over all frames and seeds. The paper does not state the zero of its gravity.
+    """
+    frames = run.frame_energies
+    if frames.empty:
+        return []
+    kept = frames[frames["scene"].map(recording_of).isin(TEST_CLIPS)]
+    means = kept.groupby("method")[["strain", "bending", "inertia"]].mean()
+    if not {"pbns-paper", "snug-paper"} <= set(means.index):
+        return []
+    lines = []
+    for term in means:
+        printed = [float(values[f"energy/{term}"]) for values in PRINTED["energies"].values()]
+        pairs = (means.loc["pbns-paper", term], means.loc["snug-paper", term]), printed
+        lines.append((term, *(x for pbns, snug in pairs for x in (pbns, snug, snug / pbns))))
+    columns = [Column("energy", "Energy", text=True)]
+    for name, where in (("here", "here"), ("paper", "in the paper")):
+        columns += [Column(f"{m}_{name}", f"{m}, {where}", "J", trim=True) for m in ("PBNS", "SNUG")]
+        columns.append(Column(f"ratio_{name}", f"SNUG / PBNS, {where}", digits=2))
+    caption = (
+        "Table 1 of the paper: means over the frames of 01_01 and 07_02, two of its four test sequences."
+    )
+    return table("paper_table_1", columns, lines, caption)

@@ -8,7 +8,7 @@ A new table is one declaration in reports.tables.TABLES, for instance
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import pandas as pd
 
@@ -33,8 +33,7 @@ class Pivot:
     rows: columns of results.csv whose values make the lines; the last is "method". metrics: names of the
     first columns, in order. of_table: then come all metrics that declare this table. select: rows of the run
     that count. lines: those that are shown, by the values of `rows`; all by default. grouped_by: of `rows`,
-    those that become headings in the PDF. required: metric without which a line is left out. counts: metrics
-    that are whole numbers.
+    those that become headings in the PDF. required: metric without which a line is left out.
     """
 
     name: str
@@ -46,7 +45,6 @@ class Pivot:
     lines: Callable[[Run, pd.DataFrame], Container[tuple[str, ...]]] | None = None
     grouped_by: tuple[str, ...] = ()
     required: str = ""
-    counts: tuple[str, ...] = ()
 
     def __call__(self, run: Run) -> list[Table]:
         """Return the table in a list, which is empty where the run has no number for it."""
@@ -63,14 +61,9 @@ class Pivot:
             shown = self.lines(run, wanted)
             lines = [line for line in lines if line[:width] in shown]
         heads = [HEADS.get(name, Column(name, name.capitalize(), text=True)) for name in self.rows]
-        columns = [
-            replace(metric_column(metric), digits=6, trim=True)
-            if metric.name in self.counts
-            else metric_column(metric)
-            for metric in metrics
-        ]
         return table(
-            self.name, (*heads, *columns), lines, self.caption, grouped_by=self.grouped_by,
+            self.name, (*heads, *map(metric_column, metrics)), lines, self.caption,
+            grouped_by=self.grouped_by,
             references=tuple(PRINTED.get(self.name, {}).items()), note=NOTES.get(self.name, ""),
         )  # fmt: skip
 

@@ -27,6 +27,7 @@ from reports.statistics.pareto import (
     points_of,
     truncated,
 )
+from reports.statistics.relative_excess import excess_of
 from reports.tables.pivot import Pivot
 from reports.tables.table import GARMENT, Cell, Column, Table, metric_column, table
 
@@ -124,19 +125,27 @@ def reference_uncertainty(run: Run) -> list[Table]:
     ensemble = [
         None if metric.name in OF_STEPS else indistinct(run, rows, metric.name) or None for metric in metrics
     ]
-    lines: list[tuple[Cell, ...]] = [("ensemble of the reference, root mean square", *ensemble)]
+    lines: list[tuple[Cell, ...]] = [
+        ("ensemble of the reference, root mean square", *[None] * len(scenes), *ensemble)
+    ]
     steps = [m for m in run.methods.values() if m.family == SMALLER_STEPS and m.level]
     if not (steps or any(value is not None for value in ensemble)):
         return []
-    for method in sorted(steps, key=lambda m: m.level or 0.0):
-        distances = [value_of(rows, method.name, metric.name) for metric in metrics]
-        lines.append((f"{method.level:g} steps a frame", *distances))
-    for name in (run.reference, NETWORK):
-        lines.append((run.label(name), *(value_of(rows, name, metric.name) for metric in metrics)))
+    labels = {m.name: f"{m.level:g} steps a frame" for m in sorted(steps, key=lambda m: m.level or 0.0)}
+    labels |= {name: run.label(name) for name in (run.reference, NETWORK, "pbns")}
+    for name, label in labels.items():
+        excess = excess_of(run, rows, name)
+        values = (value_of(rows, name, metric.name) for metric in metrics)
+        shares = excess.by_motion if excess else {}
+        lines.append((label, *map(shares.get, scenes), *values))
     lines = [line for line in lines if any(value is not None for value in line[1:])]
-    columns = (Column("of", "Simulation or network", text=True), *map(metric_column, metrics))
+    of_scenes = [
+        Column(f"excess_{scene}", f"Relative excess, {scene.partition('/')[2]}", "%", digits=2)
+        for scene in scenes
+    ]
+    columns = (Column("of", "Simulation or network", text=True), *of_scenes, *map(metric_column, metrics))
     caption = (
-        f"Reference, simulations with smaller time steps, and SNUG in {', '.join(scenes)}. Errors below the "
-        "ensemble's are as small as those of another valid simulation."
+        f"Reference, simulations with smaller time steps, and networks in {', '.join(scenes)}. Errors below "
+        "the ensemble's are as small as those of another valid simulation."
     )
     return table("reference_uncertainty", columns, lines, caption)

@@ -40,8 +40,9 @@ def front_sentences(run: Run) -> str:
     times = math.floor(least / 10 ** math.floor(math.log10(least))) * 10 ** math.floor(math.log10(least))
     return "\n".join([
         f"**In a typical unseen motion SNUG removes {number(100.0 - snug.typical, 2)} % of the energy that "
-        f"skinning has in excess of a converged simulation, more than {times} times faster than that "
-        "simulation; its garments have almost no secondary motion.**",
+        f"skinning has in excess of a converged simulation ({number(100.0 - snug.pooled, 2)} % pooled over "
+        f"all motions), more than {times} times faster than that simulation; its garments have almost no "
+        "secondary motion.**",
         "",
         f"- Good at: energy for its time. PBNS leaves {number(pbns.typical, 2)} % of that excess, the "
         f"supervised network {number(supervised.typical, 2)} %; solvers as accurate take at least "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
@@ -43,14 +44,18 @@ def test_a_member_of_the_ensemble_that_stalled_takes_no_part(status, members):
     assert [name for name, _ in made.loc["snug", "moved"]] == members
 
 
-def test_the_mean_is_over_independent_sources_and_the_caption_says_so():
-    energies = {"01_01_a": 10.0, "01_01_b": 20.0, "kick": 60.0}
+def test_means_are_over_sources_recorded_ones_apart_and_the_pooled_share_over_motions():
+    energies = {"01_01_a": (10.0, 100.0), "01_01_b": (20.0, 100.0), "kick": (180.0, 300.0)}
     rows = [
         row(f"tshirt/{motion}", method, "energy/total", value)
-        for motion, energy in energies.items()
-        for method, value in (("simulation", 0.0), ("skinning", 100.0), ("snug", energy))
+        for motion, (energy, skinning) in energies.items()
+        for method, value in (("simulation", 0.0), ("skinning", skinning), ("snug", energy))
     ]
     (made,) = relative_excess(run_of(rows))
-    mean = made.rows[0][[column.name for column in made.columns].index("mean")]
-    assert mean == pytest.approx((15.0 + 60.0) / 2.0)
-    assert made.caption.endswith("and mean: over independent sources and seeds.")
+    shown = dict(zip((column.name for column in made.columns), made.rows[0]))
+    recorded = (np.arcsinh(10.0) + np.arcsinh(20.0)) / 2.0
+    assert shown["recorded"] == pytest.approx(np.sinh(recorded))
+    assert shown["others"] == pytest.approx(60.0)
+    assert shown["typical"].shown == pytest.approx(np.sinh((recorded + np.arcsinh(60.0)) / 2.0))
+    assert shown["mean"] == pytest.approx((15.0 + 60.0) / 2.0)
+    assert shown["pooled"] == pytest.approx(100.0 * (10.0 + 20.0 + 180.0) / 500.0)

@@ -28,7 +28,7 @@ def test_the_answer_is_a_table_of_few_methods_and_one_line_below():
     assert head.split()[:3] == ["Method", "Relative", "excess"] and len(lines) == MOST_METHODS
     assert not [line for line in lines if line.startswith("SNUG, cleaned up")]
     assert last.startswith(
-        "On 3 unseen motions SNUG has a relative excess of 12 % and PBNS of 25 %, where the"
+        "On 3 unseen motions SNUG has a relative excess of 12 % (pooled 12 %) and PBNS of 25 % (pooled "
     )
     assert last.endswith("has less is inconclusive. The report also has SNUG, cleaned up.")
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from benchmarks.metrics import find_metric
@@ -153,3 +155,20 @@ def test_rows_of_a_table_can_be_chosen_by_method_and_an_unknown_one_is_refused()
     assert not part.splitlines()[4].startswith("|")
     with pytest.raises(ValueError, match="no row of snugg; it has"):
         published_part("table energies of quick; method; snugg")
+
+
+def test_table_1_of_the_paper_is_of_the_frames_of_its_own_clips():
+    frames = pd.read_csv(PUBLISHED / "paper_text" / "frame_energies.csv")
+    frames = frames[frames["scene"].str.contains("/01_01_|/07_02")]
+    means = frames.groupby("method")[["strain", "bending", "inertia"]].mean()
+    rows = [
+        line.split(" | ") for line in published_part("table paper_table_1 of paper_text").split("\n")[2:5]
+    ]
+    assert [row[0].strip("| ") for row in rows] == [*means]
+    for row, term in zip(rows, means):
+        here, paper = np.array([cell.strip(" |") for cell in row[1:]], float).reshape(2, 3)
+        assert here[:2] == pytest.approx(means.loc[["pbns-paper", "snug-paper"], term].to_numpy(), rel=2e-3)
+        for pbns, snug, ratio in (here, paper):
+            assert ratio == pytest.approx(snug / pbns, abs=6e-3)
+    with pytest.raises(ValueError, match="no table paper_table_1"):
+        published_part("table paper_table_1 of quick")
