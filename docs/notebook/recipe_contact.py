@@ -1,0 +1,63 @@
+"""Converged simulations with the contact of recipe `paper`: a file of methods for benchmarks.run.
+
+    python -m benchmarks.run full:garments --motions library \
+        --test-motions 07_02,01_01_a,02_07_a,push_recovery,07_01,06_05 \
+        --methods simulation,skinning,docs/notebook/recipe_contact.py -o DIR
+
+DIR/tables/relative_excess_by_motion.csv has the numbers of training.md#the-contact-of-the-papers-recipe.
+Everything but contact is the reference's: terms, start, time step and tolerance. Contact is that of the
+recipe, whole or with one or two constants replaced by the reference's. The run measures these simulations as
+it measures every method: by the contact of the scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from benchmarks import MethodEntry
+from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.scene import BuiltScene
+from reference_sim.energies import ContactPenalty
+from snug.recipes.named import PAPER
+from snug.recipes.recipe import DEFAULT
+from snug.training.losses.physics_loss import make_contact
+
+KEPT = "recipe's contact"
+REPLACED = {
+    "recipe-contact": (),
+    "recipe-contact-stiffness": ("contact_stiffness",),
+    "recipe-contact-samples": ("contact_samples",),
+    "recipe-contact-margin": ("contact_margin",),
+    "recipe-contact-stiffness-margin": ("contact_stiffness", "contact_margin"),
+}
+METHODS = tuple(
+    MethodEntry(
+        name=name,
+        label=", the reference's ".join([KEPT, *(option.removeprefix("contact_") for option in options)]),
+        description=f"the reference with the contact of recipe paper, without its {options}",
+        role="solver",
+        options={"replaced": options},
+    )
+    for name, options in REPLACED.items()
+)
+
+
+@dataclass(kw_only=True)
+class RecipeContact(Simulation):
+    """Reference simulation with another contact term. replaced: fields of Recipe taken from the default."""
+
+    replaced: tuple[str, ...]
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Exchange the contact term and prepare; the start stays that of the scene's own contact."""
+        start = scene.start_state
+        recipe = replace(PAPER, **{option: getattr(DEFAULT, option) for option in self.replaced})
+        contact = make_contact(scene.cloth, recipe)
+        terms = tuple(contact if isinstance(term, ContactPenalty) else term for term in scene.energies)
+        super().prepare(replace(scene, energies=terms, settle=lambda: start))
+
+
+def make(*, models: Path, seed: int, replaced: tuple[str, ...]) -> RecipeContact:
+    """Make the simulation whose contact has these fields of the default recipe."""
+    return RecipeContact(options={}, replaced=replaced)
