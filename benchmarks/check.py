@@ -192,7 +192,7 @@ def _preparation(cell: Cell) -> PrepareCell:
         label=cell.label,
         cell=cell,
         inputs={},
-        modules=(__name__,),
+        code=("benchmarks/check.py",),
         deadline=SIZES.cell_seconds,
     )
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import sys
 import time
-import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ import numpy as np
 
 from benchmarks.assets.inputs import FEWEST_FRAMES
 from benchmarks.cell import TaskId
-from benchmarks.fingerprint.dependencies import code_of
+from benchmarks.declarations import raised_at
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import Method, MethodEntry
 from benchmarks.process.errors import one_line
@@ -60,10 +59,8 @@ def naming(what: str, home: str) -> Iterator[None]:
     except ContractError:
         raise
     except Exception as error:
-        code = code_of(home)
-        frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in code]
-        where = f" ({frames[-1].filename}: line {frames[-1].lineno})" if frames else ""
-        raise ContractError(f"{what} raises {one_line(error)}{where}") from None
+        where = raised_at(error, home)
+        raise ContractError(f"{what} raises {one_line(error)}{f' ({where})' if where else ''}") from None
 
 
 # --- methods -----------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import importlib.util
 import inspect
 import re
 import sys
+import traceback
 from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
@@ -71,6 +72,15 @@ def load(module: str) -> ModuleType:
     importlib.invalidate_caches()  # it may have been written a moment ago
     demand_that_it_is(path.stem, path)
     return importlib.import_module(path.stem)
+
+
+def raised_at(error: BaseException, home: str) -> str:
+    """Return file and line where an error was raised in or below the folder of a user's file; else empty."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}: line {error.lineno}"
+    lines = traceback.extract_tb(error.__traceback__)
+    frames = [frame for frame in lines if Path(frame.filename).is_relative_to(Path(home).parent)]
+    return f"{frames[-1].filename}: line {frames[-1].lineno}" if frames else ""
 
 
 def demand_that_it_is(name: str, path: Path) -> None:

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load
-from benchmarks.fingerprint.dependencies import code_of, find_module, place_of
+from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
+from benchmarks.fingerprint.dependencies import find_module, imported_beside
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.trainings import TRAININGS
@@ -182,16 +181,14 @@ def _demand(fine: bool, otherwise: str) -> None:
 
 def import_file(home: str) -> ModuleType:
     """Load the module of a file. Raises DeclarationError, with the line of the file at fault."""
-    code = code_of(home)  # of syntax errors the line
     try:
         module = load(home)
     except DeclarationError:
         raise
     except BaseException as error:  # whatever a user's file raises, also what usually ends a program
-        frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in code]
-        where = f"{frames[-1].filename}: line {frames[-1].lineno}" if frames else home
-        raise DeclarationError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from None
-    for path in code:  # two folders may have a utils.py each
-        if Path(path).is_absolute() and not path.endswith("/__init__.py"):
-            demand_that_it_is(".".join([*place_of(path)[1], Path(path).stem]), Path(path))
+        what = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
+        where = raised_at(error, home) or home
+        raise DeclarationError(f"{where}: {' '.join(what.split())}") from None
+    for name, path in imported_beside(home).items():  # two folders may have a utils.py each
+        demand_that_it_is(name, path)
     return module

@@ -49,8 +49,8 @@ class Cached:
 
 
 def dependencies(task: Task) -> dict[str, str]:
-    """Return name -> digest or version of each input, source file, package and data file of a task."""
-    return {name: digest(value) for name, value in task.inputs.items()} | software(*task.modules)
+    """Return name -> digest or version of each input, folder of code and package of a task."""
+    return {name: digest(value) for name, value in task.inputs.items()} | software(*task.code)
 
 
 class Cache:

@@ -145,7 +145,7 @@ def software_of(task: Task) -> dict[str, str]:
     """Return name -> digest or version of all that computes an outcome, files of a user's method included."""
     files = task.cell.entry.files if isinstance(task, CellTask) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
-    return software(__name__, *task.modules) | digests | {"package Python": platform.python_version()}
+    return software("benchmarks/runner", *task.code) | digests | {"package Python": platform.python_version()}
 
 
 # --- in a worker -------------------------------------------------------------------------------------------

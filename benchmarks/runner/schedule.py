@@ -16,10 +16,11 @@ from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import COMPARED_WITH
-from benchmarks.metrics import MODULE_OF, names_of
+from benchmarks.metrics import names_of
 from benchmarks.plan.plan import Network, Plan, network_of, runs
+from benchmarks.runner import task_inputs
 from benchmarks.runner.cache import dependencies
-from benchmarks.runner.task_inputs import ASSETS, TaskInputs, declared, modules_behind, modules_of
+from benchmarks.runner.task_inputs import TaskInputs, code_behind, declared, users_code
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
 from benchmarks.tasks.case import RunCase
@@ -36,15 +37,12 @@ if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
-TASKS = "benchmarks.tasks"
+TASKS = "benchmarks/tasks"
 
 
 def tasks_of(plan: Plan) -> list[Task]:
     """Return every task of the plan. Raises DeclarationError where an entry names a missing module."""
-    tasks = list(Schedule(plan).tasks())
-    for module in {module for task in tasks for module in task.modules}:
-        find_module(module)
-    return tasks
+    return list(Schedule(plan).tasks())
 
 
 class Schedule:
@@ -81,7 +79,7 @@ class Schedule:
         needs = (SettleStart.id_of(self._settled_in(scene)),) if scene.start_of else ()
         return SettleStart(
             name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.settle_frames,
-            needs=needs, **self.inputs.of_scene(scene, f"{TASKS}.ground_truth"),
+            needs=needs, **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
         )  # fmt: skip
 
     def ground_truth(self, network: Network) -> list[SimulateMotion | SimulateClips]:
@@ -101,7 +99,7 @@ class Schedule:
         return SimulateMotion(
             name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry), scene=scene,
             entry=entry, units=self.preset.settle_frames + self._frames(motion),
-            **self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}.ground_truth")),
+            **self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py")),
         )  # fmt: skip
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> SimulateClips:
@@ -109,7 +107,7 @@ class Schedule:
         sort, entry = "swinging" if simulated.swinging else "mixed", find_method(simulated.method)
         clips = f"{garment}/{sort}-{len(motions)}"
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
-        of_scene = self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}.ground_truth"))
+        of_scene = self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"))
         mixed_of = {name: self.inputs.motion(name) for name in motions}
         inputs = of_scene["inputs"] | {"part": part, "swinging": simulated.swinging, "motions": mixed_of}
         return SimulateClips(
@@ -117,7 +115,7 @@ class Schedule:
             label=_label(f"{garment}, {sort} clips of {len(motions)} motions, part {part}", entry),
             scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=simulated.swinging,
             units=sum(map(self._frames, motions)),
-            **of_scene | {"inputs": inputs},
+            **of_scene | {"inputs": inputs, "code": (*of_scene["code"], *task_inputs.CLIPS)},
         )  # fmt: skip
 
     def obtained(self, network: Network) -> TrainNetwork | TakeNetwork:
@@ -152,11 +150,9 @@ class Schedule:
         truth = self.ground_truth(network)
         simulated = {task.scene.motion: task.id for task in truth if isinstance(task, SimulateMotion)}
         clips = tuple(task.id for task in truth if isinstance(task, SimulateClips))
-        terms = modules_of(chosen.recipe.terms) if chosen else ()
-        declared_in = (network.declared_in,) if network.declared_in else ()
         task = TrainNetwork(
             name=network.task_id[1], label=network.label,
-            inputs=inputs, modules=(f"{TASKS}.training", ASSETS, *terms, *declared_in),
+            inputs=inputs, code=(*task_inputs.TRAINING, *users_code(network.declared_in)),
             reads=(*simulated.values(), *clips), units=max(steps, 1), training=network.name, chosen=chosen,
             home=network.declared_in, seed=network.seed, garment=network.garment, steps=steps,
             motions=motions, held_out=held_out, simulated=simulated, clips=clips, device=self.plan.device,
@@ -187,7 +183,7 @@ class Schedule:
 
     def cell(self, cell: Cell) -> RunCell:
         """Return the task that runs a cell."""
-        of_scene = self.inputs.of_scene(cell.scene, f"{TASKS}.cell_task", *modules_behind(cell.entry))
+        of_scene = self.inputs.of_scene(cell.scene, *code_behind(cell.entry))
         inputs = of_scene["inputs"] | {"method": declared(cell.entry)}
         if cell.timed:
             inputs["least"] = self._least(cell)
@@ -211,7 +207,7 @@ class Schedule:
         least = self._least(cell)
         return kind(
             name=name, label=cell.label, cell=cell, inputs={"least": least},
-            modules=(f"{TASKS}.cell_task",), needs=(cell.task_id,),
+            code=task_inputs.RUNS, needs=(cell.task_id,),
             process=cell.name, deadline=self.preset.cell_seconds, least=least, **fields,
         )  # fmt: skip
 
@@ -225,7 +221,7 @@ class Schedule:
         """Return the task that simulates each frame of a scene held still."""
         return SimulateQuasiStatic(
             name=flat(scene.name), label=scene.name, scene=scene, units=self._frames(scene.motion),
-            needs=(SettleStart.id_of(scene),), **self.inputs.of_scene(scene, f"{TASKS}.ground_truth"),
+            needs=(SettleStart.id_of(scene),), **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
         )  # fmt: skip
 
     def metrics(self, cell: Cell) -> MeasureCell:
@@ -246,8 +242,9 @@ class Schedule:
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, counterpart.task_id)
         names = names_of(scene.metrics)
-        modules = [MODULE_OF[name] for name in names] + list(plan.metrics)
-        of_scene = self.inputs.of_scene(scene, f"{TASKS}.metric_task", *modules)
+        of_scene = self.inputs.of_scene(
+            scene, f"{TASKS}/metric_task.py", *task_inputs.METRICS, *users_code(*plan.metrics)
+        )
         inputs = {
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
@@ -279,7 +276,7 @@ class Schedule:
         return RunCase(
             name=case.name, label=case.name, case=case, deadline=case.seconds, process=case.process,
             inputs=self.inputs.machine() | {"declared": declared(case)},
-            modules=(case.module, "benchmarks.validation.case", f"{TASKS}.case"),
+            code=(find_module(case.module), *task_inputs.CASES),
         )  # fmt: skip
 
     # --- facts of the plan ---------------------------------------------------------------------------------

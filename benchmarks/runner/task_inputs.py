@@ -1,25 +1,41 @@
-"""Inputs and modules of each task: where one of them changes, its stored result is stale."""
+"""Inputs and code of each task: where one of them changes, its stored result is stale.
+
+The code is declared, by folders and files that count as a whole: a test compares them with what they import.
+Code that no task names plans, carries out, stores or reports.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
+from benchmarks.fingerprint.dependencies import find_module
 from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.method import MethodEntry
 from benchmarks.plan.plan import Plan
 from benchmarks.scene import Scene
-from snug.recipes.recipe import TERMS
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
-ASSETS = "benchmarks.assets.assets"
+SIMULATOR = "reference_sim"
+DRESSING = ("snug/data", "snug/body", "snug/motion", "snug/garments", "benchmarks/assets")
+CLIPS = ("snug/training/augmentation", "snug/recipes")  # that are mixed from motions, to be simulated
+NETWORKS = ("snug", "benchmarks/assets")
+SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py", "benchmarks/fabrics")
+RUNS = (
+    SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/process",
+    "benchmarks/tasks/cell_task.py",
+)  # fmt: skip
+SOLVERS = ("benchmarks/methods/solvers", "benchmarks/engines")
+METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "snug")
+CASES = ("benchmarks/tasks/case.py", "benchmarks/validation", "benchmarks/assets", *SOLVERS, *METRICS, *RUNS)
+TRAINING = ("benchmarks/tasks/training.py", SIMULATOR, *NETWORKS)
+USERS_OWN = ("benchmarks/methods", *METRICS, *RUNS)  # what a user's file may import
 
 
 class TaskInputs:
@@ -38,20 +54,20 @@ class TaskInputs:
     def _hardware(self) -> dict[str, Any]:
         return provenance.hardware(self.plan.device)
 
-    def of_scene(self, scene: Scene, *modules: str) -> dict[str, Any]:
-        """Return inputs and modules of a task that builds the scene; its metrics are no part of them."""
+    def of_scene(self, scene: Scene, *code: str) -> dict[str, Any]:
+        """Return inputs and code of a task that builds the scene; its metrics are no part of them."""
         declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
         del declaration["metrics"], declaration["counterpart"]
         inputs = self.machine() | {"scene": declaration}
-        modules = (*modules, *modules_behind(scene))
+        code = (*code, *RUNS, *code_behind(scene))
         if not scene.dressed:
-            return {"inputs": inputs, "modules": modules}
+            return {"inputs": inputs, "code": code}
         inputs |= self.of_body(scene.garment) | {"motion": self.motion(scene.motion)}
         if scene.motion not in self.plan.motions.train:  # those have a length of their own
             inputs["frames"] = self.preset.frames
         if scene.part == "clip":
             inputs["clip_frames"] = self.preset.clip_frames
-        return {"inputs": inputs, "modules": (*modules, ASSETS)}
+        return {"inputs": inputs, "code": (*code, *DRESSING)}
 
     def of_body(self, garment: str) -> dict[str, Any]:
         """Return the inputs that the assets are made from."""
@@ -73,10 +89,10 @@ class TaskInputs:
         return f"{name} {digest(files[name])}" if name in files else name
 
     def simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:
-        """Return inputs and modules of a task that builds the scene, with those of the method."""
+        """Return inputs and code of a task that builds the scene, with those of the method."""
         return {
             "inputs": of_scene["inputs"] | {"method": declared(entry)},
-            "modules": (*of_scene["modules"], *modules_behind(entry)),
+            "code": (*of_scene["code"], *code_behind(entry)),
         }
 
 
@@ -90,15 +106,22 @@ def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
     return values
 
 
-def modules_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
-    """Return the module of a scene or a method, and the file that declares it where that is a user's."""
-    return tuple(dict.fromkeys(filter(None, (entry.module, entry.declared_in))))
+def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
+    """Return the code of a scene or a method: the folder of its module, and what files of a user depend on.
+
+    Raises DeclarationError where its module is missing.
+    """
+    file = find_module(entry.module)
+    code = users_code(file, entry.declared_in)
+    if not code:
+        folder = Path(file).parent
+        code = (file if folder.name == "benchmarks" else folder.as_posix(),)
+    if isinstance(entry, MethodEntry):
+        code = (*code, *SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
+    return code
 
 
-def modules_of(terms: Iterable[str]) -> tuple[str, ...]:
-    """Modules of energies that a recipe names beside the usual ones: they are found by name, not imported."""
-    if set(terms) <= set(TERMS):
-        return ()
-    from reference_sim import energies
-
-    return tuple(f"{energies.__name__}.{module.name}" for module in iter_modules(energies.__path__))
+def users_code(*homes: str) -> tuple[str, ...]:
+    """Return those that are files of users, by absolute paths, and what of ours such a file may import."""
+    own = tuple(home for home in homes if Path(home).is_absolute())
+    return (*own, *USERS_OWN) if own else ()

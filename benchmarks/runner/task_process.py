@@ -54,12 +54,12 @@ class TaskProcess:
         return outcome
 
     def _warm(self, task: Task) -> Outcome | None:
-        """Return what went wrong before the first task of this kind and module, None where nothing did."""
-        if (task.kind, task.modules[0]) in self.warm:
+        """Return what went wrong before the first task of this kind and code, None where nothing did."""
+        if (task.kind, task.code[0]) in self.warm:
             return None
         trouble = call(self.process, task.warm_up, seconds=COMPILING)
         if trouble is None:
-            self.warm.add((task.kind, task.modules[0]))
+            self.warm.add((task.kind, task.code[0]))
         return trouble
 
     def stop(self) -> None:

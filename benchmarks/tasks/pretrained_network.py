@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 NAME = "pretrained"  # in the result of a task: name of the file that its network is of
 MACHINE = "machine"  # the input of a task that says where it runs
 PACKAGE = "package "  # how the name of a package begins among the parts of a task
-# Files of benchmarks that decide the bits of a network; others carry out, store and report.
-DECIDING = ("benchmarks/assets/", "benchmarks/tasks/training.py")
 MAKE = "benchmarks.run -o DIR trains it, --trained DIR takes it"
 PRESET = "quick"  # of the package's networks
 
@@ -100,8 +98,9 @@ def take_network(task: TrainNetwork, folder: Path) -> TakeNetwork:
         differing, refusal = compare(path, task)
     inputs = {"file": digest_of_file(path) if path else "", "differing": differing}
     return TakeNetwork(
-        name=task.name, label=task.label, inputs=inputs, modules=(__name__,),
-        instead_of=task, source=path, refusal=refusal, differing=differing,
+        name=task.name, label=task.label, inputs=inputs,
+        code=("benchmarks/tasks/pretrained_network.py", "snug/networks"), instead_of=task, source=path,
+        refusal=refusal, differing=differing,
     )  # fmt: skip
 
 
@@ -118,8 +117,7 @@ def compare(path: Path, task: TrainNetwork) -> tuple[tuple[str, ...], str]:
     machines = [{MACHINE: parts.pop(MACHINE, "")} for parts in (inputs, here["inputs"])]
     if others := different(inputs, here["inputs"]):
         return (), f"{path}: a network of another training ({', '.join(others)}): {MAKE}"
-    deciding = [dict(filter(_decides, parts.items())) for parts in (software, here["software"])]
-    return (*different(*machines), *different(*deciding)), ""
+    return (*different(*machines), *different(software, here["software"])), ""
 
 
 def different(one: Parts, other: Parts) -> tuple[str, ...]:
@@ -136,17 +134,8 @@ def _mapping(value: object) -> dict[str, Any]:
 
 
 def without_machine(parts: Parts) -> dict[str, str]:
-    """Return the deciding parts of a task without the machine and the versions of packages."""
-    return {
-        name: part
-        for name, part in parts.items()
-        if name != MACHINE and not name.startswith(PACKAGE) and _decides((name, part))
-    }
-
-
-def _decides(part: tuple[str, str]) -> bool:
-    name, _ = part
-    return not name.startswith("benchmarks/") or name.startswith(DECIDING)
+    """Return the parts of a task without the machine and the versions of packages."""
+    return {name: part for name, part in parts.items() if name != MACHINE and not name.startswith(PACKAGE)}
 
 
 def put_into_package(run: str | Path, package: Path = FOLDER) -> list[str]:

@@ -78,7 +78,7 @@ class Task:
         name: unique among the tasks of its kind; part of file names.
         label: for messages.
         inputs: plain values that the outcome depends on.
-        modules: modules whose source, with all that they import, the outcome depends on.
+        code: folders and files whose content the outcome depends on, see benchmarks.fingerprint.dependencies.
         needs: tasks without whose success it cannot be run; their outcomes count as inputs.
         reads: tasks whose outcomes it uses where they succeeded; they count as inputs too.
         units: of progress.
@@ -96,7 +96,7 @@ class Task:
     name: str
     label: str
     inputs: Mapping[str, Any]
-    modules: tuple[str, ...]
+    code: tuple[str, ...]
     needs: tuple[TaskId, ...] = ()
     reads: tuple[TaskId, ...] = ()
     units: int = 1
@@ -141,7 +141,7 @@ class Task:
         raise NotImplementedError
 
     def warm_up(self) -> None:
-        """Prepare a process for its first task of this kind and module; the deadline does not count."""
+        """Prepare a process for its first task of this kind and code; the deadline does not count."""
 
     def rows(self, outcome: Outcome) -> list[Row]:
         """Return the rows of an outcome, skips aside; unit, commit and remark are filled in later."""

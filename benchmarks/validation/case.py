@@ -47,7 +47,7 @@ class Case:
 
     Attributes:
         name: unique over all cases, and the row's scene unless `scene` is given.
-        module: dotted; with all that it imports it is what the row depends on.
+        module: dotted.
         smoke: whether the smallest preset runs it.
         long: whether it is left out where no suite is named.
         seconds: after which the case's process is ended; None: never.

@@ -124,10 +124,11 @@ def look(make, tmp_path, monkeypatch, scene="hanging_sheet", **fields) -> str:
     module = type(sys)("breaches")
     module.make = make
     monkeypatch.setitem(sys.modules, "breaches", module)
-    entry = watched_method(MethodEntry(name="m", description="", module="breaches", **fields))
+    entry = watched_method(
+        MethodEntry(name="m", description="", module="breaches", declared_in=__file__, **fields)
+    )
     cell = Cell(SCENE[scene].at(TINY), entry, 0, ("speed",))
-    context, tasks = Context(RunFolder(tmp_path)), {"name": "m", "label": "", "inputs": {}, "modules": ()}
-    monkeypatch.setattr("benchmarks.contract.code_of", lambda home: {__file__: ""})
+    context, tasks = Context(RunFolder(tmp_path)), {"name": "m", "label": "", "inputs": {}, "code": ()}
     outcome = RunCell(cell=cell, least=0.02, **tasks).run(context, {})
     if not outcome.failed and entry.batched:
         outcome = BatchCell(cell=cell, least=0.02, **tasks).run(context, {})

@@ -47,7 +47,7 @@ class Train(Task):
 
 def cell(name: str, machine: str, **inputs) -> Task:
     given = {"scene": "kick", "machine": machine, **inputs}
-    return Run(name=name, label=name, inputs=given, modules=("benchmarks.results.json_file",))
+    return Run(name=name, label=name, inputs=given, code=("benchmarks/results",))
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_two_networks_of_one_name_are_refused(folder, tmp_path):
         file = path / "models/snug.safetensors"
         file.parent.mkdir(exist_ok=True)
         write_tensors(file, {"weight": torch.full((2,), weight)}, {"seconds": seconds})
-        network = Train(name="snug", label="snug seed 0", inputs={}, modules=())
+        network = Train(name="snug", label="snug seed 0", inputs={}, code=())
         kept = Cache(RunFolder(path)).keep(network, Outcome(files=("models/snug.safetensors",)), {})
         config = RunFolder(path).read_config()
         RunFolder(path).write_config(config | {"digests": config["digests"] | kept.outcome.digests})
@@ -175,13 +175,11 @@ def test_two_networks_of_one_name_are_refused(folder, tmp_path):
     merge(folders, tmp_path / "both")
 
 
-def test_runs_of_other_code_are_refused_by_the_name_of_the_file(folder, tmp_path, monkeypatch):
+def test_runs_of_other_code_are_refused_by_the_name_of_the_folder(folder, tmp_path, monkeypatch):
     one = folder("one", [row("energy/total", 1.0)])
-    monkeypatch.setattr(
-        "benchmarks.fingerprint.dependencies.code_of", lambda *_: {"benchmarks/results/json_file.py": "other"}
-    )
+    monkeypatch.setattr("benchmarks.runner.cache.software", lambda *_: {"benchmarks/results": "other"})
     two = folder("two", [row("energy/total", 1.0, seed=1)], cells=("other",))
-    other = r"cell other: another benchmarks/results/json_file\.py in .*run both by the same code"
+    other = r"cell other: another benchmarks/results in .*run both by the same code"
     with pytest.raises(MergeError, match=other):
         merge([one, two], tmp_path / "both")
 

@@ -1,45 +1,30 @@
-"""A task's dependencies are read from the source: all that it uses, and nothing else that would rerun it."""
+"""A task's dependencies: all that its code imports is among them, and what decides no result is not."""
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.fingerprint import dependencies as source
-from benchmarks.fingerprint.dependencies import code_of, data_of, packages_of
+from benchmarks.declarations import DeclarationError
+from benchmarks.fingerprint import dependencies
+from benchmarks.fingerprint.dependencies import _files_of, find_module, imported_beside, software
 from benchmarks.fingerprint.digest import digest
-from benchmarks.methods.catalogue.all_methods import METHODS
-from benchmarks.metrics import MODULE_OF
-from benchmarks.scenes import FURTHER_SCENES, SCENES
+from benchmarks.runner import task_inputs
+from tests.project.test_layers import LAYERS, imports
 
 FILES = {
-    "reference_sim/__init__.py": "from .cloth import Cloth\n",
-    "reference_sim/cloth.py": "class Cloth:\n    pass\n",
-    "reference_sim/stretch.py": "K = 1.0\n",
-    "reference_sim/bend.py": "K = 2.0\n",
-    "reference_sim/terms/__init__.py": "def __getattr__(name):\n    return load(name)\n",
-    "reference_sim/terms/stretch.py": "class Stretch:\n    pass\n",
-    "reference_sim/terms/bend.py": "class Bend:\n    pass\n",
-    "reference_sim/terms/twist/__init__.py": "",
-    "reference_sim/terms/twist/definition.py": (
-        "class Twist:\n"
-        "    kernels: ClassVar = {'lanes': 'reference_sim.terms.twist.lanes:make', 'own': 'f'}\n"
-    ),
-    "reference_sim/terms/twist/lanes.py": "def make(term):\n    return 2 * term\n",
-    "snug/network.py": "import torch\nfrom reference_sim.terms import Unknown\n",
+    "snug/network.py": '"""Words."""\nimport torch\n\n\ndef f():\n    import nowhere, snug\n    return 1\n',
+    "snug/train.py": "a command",
+    "snug/body/__init__.pyi": "# says where names come from\nfrom .a import f\n",
+    "snug/NOTICE.md": "prose",
     "snug/data/body.npz": "weights",
     "snug/trained/snug-tshirt.safetensors": "a network, which counts where it is read",
-    "benchmarks/methods/catalogue/all_methods.py": "from . import one, other\n",
-    "benchmarks/methods/one.py": (
-        '"""Words."""\nfrom typing import TYPE_CHECKING\nfrom reference_sim import Cloth\n'
-        "from ..scene import build\nif TYPE_CHECKING:\n    from snug.network import Network\n"
-        "def make():\n    import numpy, nowhere\n    from reference_sim.terms import Stretch\n"
-    ),
-    "benchmarks/methods/other.py": "import snug.network\nfrom . import one\n",
-    "benchmarks/scene.py": "import os\ndef build():\n    return 1\n",
+    "snug/__pycache__/kernel.nbi": "compiled",
+    "reference_sim/cloth.py": "import os\nimport numpy as np\nfrom scipy import sparse\n",
 }
 
 
@@ -52,7 +37,7 @@ def project(tmp_path, monkeypatch):
         (tmp_path / path).write_text(text)
         forget()
 
-    monkeypatch.setattr(source, "ROOT", tmp_path)
+    monkeypatch.setattr(dependencies, "ROOT", tmp_path)
     for path, text in FILES.items():
         write(path, text)
     yield write
@@ -60,97 +45,177 @@ def project(tmp_path, monkeypatch):
 
 
 def forget() -> None:
-    for name in ("_source", "_exported", "_names", "_file_of", "_closure", "_data_files"):
-        getattr(source, name).cache_clear()
+    for name in ("_content", "_read"):
+        getattr(dependencies, name).cache_clear()
 
 
-def test_the_code_is_what_is_imported_also_inside_functions_and_by_first_use(project):
-    assert set(code_of("benchmarks.methods.one")) == {
-        "benchmarks/methods/one.py", "benchmarks/scene.py", "reference_sim/__init__.py",
-        "reference_sim/cloth.py", "reference_sim/terms/__init__.py", "reference_sim/terms/stretch.py",
-    }  # fmt: skip
-    assert "snug/network.py" in code_of("benchmarks.methods.other")
+# --- the project's own code --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    "path", ["reference_sim/terms/bend.py", "benchmarks/methods/other.py", "snug/network.py"]
+    ("path", "text", "counts"),
+    [
+        ("snug/network.py", FILES["snug/network.py"].replace("1", "2"), True),
+        ("snug/another.py", "", True),
+        ("snug/data/body.npz", "other weights", True),
+        ("snug/body/__init__.pyi", "from .b import f\n", True),
+        ("snug/body/__init__.pyi", "from .a import f\n", False),
+        (
+            "snug/network.py",
+            FILES["snug/network.py"].replace("Words", "Other words") + "\n# a remark\n",
+            False,
+        ),
+        ("reference_sim/cloth.py", "import numpy\nx = 1\n", False),
+        *((path, "another", False) for path in (list(FILES)[1], list(FILES)[3], *list(FILES)[5:7])),
+    ],
 )
-def test_what_is_not_used_may_change(project, path):
-    before = code_of("benchmarks.methods.one")
-    project(path, "CHANGED = True\n")
-    assert code_of("benchmarks.methods.one") == before
-
-
-@pytest.mark.parametrize(
-    "path", ["reference_sim/terms/stretch.py", "benchmarks/scene.py", "reference_sim/cloth.py"]
-)
-def test_what_is_used_may_not(project, path):
-    before = code_of("benchmarks.methods.one")
-    project(path, FILES[path] + "CHANGED = True\n")
-    after = code_of("benchmarks.methods.one")
-    assert [name for name in after if after[name] != before[name]] == [path]
-
-
-def test_what_runs_beside_the_type_checkers_imports_counts(tmp_path, project):
-    """The other branch is run, and so are the packages that a user's module is imported through."""
-    file = tmp_path / "mine.py"
-    file.write_text(
-        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import unused\nelse:\n    import fast\n"
-        "if not TYPE_CHECKING:\n    import faster\nimport helpers.inner.solver\n"
-    )
-    inner = ("helpers/__init__", "helpers/inner/__init__", "helpers/inner/solver")
-    for name in ("unused", "fast", "faster", *inner):
-        path = tmp_path / f"{name}.py"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("")
-    forget()
-    names = {Path(path).relative_to(tmp_path).as_posix() for path in code_of(str(file))}
-    assert names == {
-        "mine.py", "fast.py", "faster.py",
-        "helpers/__init__.py", "helpers/inner/__init__.py", "helpers/inner/solver.py",
-    }  # fmt: skip
-
-
-def test_words_and_blanks_do_not_count(project):
-    before = code_of("benchmarks.methods.one")
-    text = FILES["benchmarks/methods/one.py"].replace("Words.", "Other words.")
-    project("benchmarks/methods/one.py", f"{text}\n\n# a remark\n")
-    assert code_of("benchmarks.methods.one") == before
+def test_statements_and_data_of_a_folder_count_and_words_commands_and_networks_do_not(
+    project, path, text, counts
+):
+    before = software("snug")
+    project(path, text)
+    assert (software("snug") != before) is counts
 
 
 def test_packages_are_those_that_the_code_imports_installed_or_not(project):
-    assert set(packages_of(code_of("benchmarks.methods.one"))) == {"numpy", "nowhere"}
-    packages = packages_of(code_of("benchmarks.methods.other"))
-    assert packages["nowhere"] == "absent" and packages["numpy"].startswith("numpy ") and "torch" in packages
+    parts = software("snug")
+    assert set(parts) == {"snug", "package torch", "package nowhere"}
+    assert parts["package nowhere"] == "absent" and parts["package torch"].startswith("torch ")
 
 
-def test_a_name_that_nobody_defines_makes_all_of_its_package_count(project):
-    code = code_of("snug.network")
-    assert {"reference_sim/terms/stretch.py", "reference_sim/terms/bend.py"} < set(code)
+def test_a_place_within_another_is_no_part_and_one_that_is_not_there_is_refused(project):
+    assert set(software("snug/data", "snug", "reference_sim/cloth.py")) == {
+        "snug", "reference_sim/cloth.py", "package numpy", "package scipy", "package torch",
+        "package nowhere",
+    }  # fmt: skip
+    with pytest.raises(DeclarationError, match=r"snug/nothing: no such folder or file"):
+        software("snug/nothing")
 
 
-def test_what_lies_beside_the_source_counts_where_its_package_is_reached(project):
-    assert set(data_of(code_of("benchmarks.methods.other"))) == {"snug/data/body.npz"}
-    assert data_of(code_of("benchmarks.methods.one")) == {}
+# --- files of users ----------------------------------------------------------------------------------------
+
+MINE = "import numpy, absent_package\ndef make():\n    import helper\n    from deep.inner import solver\n"
+BESIDE = {
+    "mine.py": MINE, "helper.py": "", "unused.py": "half a line (", "deep/__init__.py": "",
+    "deep/inner/solver.py": "", "deep/inner/__init__.py": "", "plain/module.py": "",
+}  # fmt: skip
+NOT_BESIDE = {"other/place/module.py": "", "mine.txt": "", ".hidden/a.py": "", "deep/data/a.json": ""}
 
 
-def test_a_stub_says_which_module_a_lazy_name_comes_from(project):
-    """Also where a module of the package has the same name as what it exports."""
-    project("reference_sim/__init__.py", "__getattr__ = lazy\n")
-    project("reference_sim/__init__.pyi", "from .bend import stretch as stretch\n")
-    project("benchmarks/three.py", "from reference_sim import stretch\n")
-    files = {"benchmarks/three.py", "reference_sim/__init__.py", "reference_sim/bend.py"}
-    assert set(code_of("benchmarks.three")) == files
+@pytest.fixture
+def home(tmp_path):
+    for name, text in (BESIDE | NOT_BESIDE).items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    forget()
+    return tmp_path / "mine.py"
 
 
-def test_the_kernels_that_a_term_declares_count_with_it(project):
-    project("benchmarks/three.py", "from reference_sim.terms import Twist\n")
-    terms = "reference_sim/terms"
-    files = {"benchmarks/three.py", f"{terms}/__init__.py"}
-    assert set(code_of("benchmarks.three")) == files | {
-        f"{terms}/twist/definition.py",
-        f"{terms}/twist/lanes.py",
-    }
+@pytest.mark.parametrize("name", [*BESIDE, *NOT_BESIDE])
+def test_a_users_file_counts_with_the_modules_beside_it(home, name):
+    before = software(str(home))
+    (home.parent / name).write_text("CHANGED = True\n" + (BESIDE | NOT_BESIDE)[name])
+    forget()
+    after = software(str(home))
+    changed = [part for part in before if after.get(part) != before[part]]
+    assert changed == ([str(home)] if name in BESIDE else [])
+    packages = {name: part for name, part in before.items() if name != str(home)}
+    assert set(packages) == {"package absent_package", "package numpy"}
+
+
+def test_what_a_users_file_imports_from_beside_it_is_told_from_packages(home):
+    assert imported_beside(str(home)) == {
+        "helper": home.parent / "helper.py", "deep": home.parent / "deep" / "__init__.py",
+    }  # fmt: skip
+
+
+def test_a_file_in_a_package_counts_with_the_package_and_one_installed_without_what_lies_beside(
+    home, monkeypatch
+):
+    solver = str(home.parent / "deep" / "inner" / "solver.py")
+    before = software(solver)
+    (home.parent / "helper.py").write_text("CHANGED = True\n")
+    forget()
+    assert software(solver) != before
+    monkeypatch.setattr(dependencies, "_distributions", lambda: {"deep": ["deep"]})
+    forget()
+    before = software(solver)
+    (home.parent / "helper.py").write_text("CHANGED = False\n")
+    forget()
+    assert software(solver) == before
+    (home.parent / "deep" / "__init__.py").write_text("CHANGED = True\n")
+    forget()
+    assert software(solver) != before
+
+
+# --- what tasks declare ------------------------------------------------------------------------------------
+
+# What tasks import and what decides no result: names, files and their formats, origin, sizes that are inputs.
+CARRYING = (
+    "benchmarks/cell.py", "benchmarks/declarations.py", "benchmarks/fingerprint", "benchmarks/presets.py",
+    "benchmarks/provenance.py", "benchmarks/results", "benchmarks/tasks/task.py", "benchmarks/training.py",
+    "snug/trained", *dependencies.NO_RESULT,
+)  # fmt: skip
+TASKS = {
+    "simulation": ("benchmarks/tasks/ground_truth.py", *task_inputs.RUNS, *task_inputs.SOLVERS,
+                   *task_inputs.NETWORKS),
+    "network": ("benchmarks/methods", *task_inputs.RUNS, *task_inputs.SOLVERS, *task_inputs.NETWORKS),
+    "training": task_inputs.TRAINING,
+    "metrics": ("benchmarks/tasks/metric_task.py", *task_inputs.METRICS, *task_inputs.RUNS,
+                *task_inputs.DRESSING),
+    "case": task_inputs.CASES,
+}  # fmt: skip
+SETTLED = ("benchmarks/tasks/ground_truth.py", *task_inputs.RUNS, *task_inputs.DRESSING)
+
+
+def file_behind(name: str) -> str:
+    """Return the file of ours that has a dotted name, or that defines it."""
+    try:
+        return find_module(name)
+    except DeclarationError:
+        return find_module(name.rpartition(".")[0])
+
+
+@pytest.mark.parametrize("place", dependencies.NO_RESULT)
+def test_what_decides_no_result_is_there(place):
+    assert (dependencies.ROOT / place).exists()
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_what_a_task_declares_holds_all_that_it_imports(task):
+    root = dependencies.ROOT
+    declared = {file.relative_to(root).as_posix() for place in TASKS[task] for file in _files_of(place)}
+    missing = set()
+    for path in sorted(name for name in declared if name.endswith(".py")):
+        package = ".".join(Path(path).parent.parts)
+        for _, name in imports(ast.parse((root / path).read_text(encoding="utf-8")), package):
+            if name.split(".")[0] in LAYERS:
+                needed = file_behind(name)
+                if needed not in declared and not needed.startswith(CARRYING):
+                    missing.add(f"{path} imports {needed}")
+    assert sorted(missing) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "stale"),
+    [
+        ("reference_sim/minimise/newton.py", {*TASKS, "settled"}),
+        ("snug/body/skinning.py", {*TASKS, "settled"}),
+        ("snug/training/training_loop.py", {*TASKS}),
+        ("benchmarks/metrics/surface/curvature.py", {"metrics", "case"}),
+        ("benchmarks/scenes/flag.py", {*TASKS, "settled"} - {"training"}),
+        ("benchmarks/run.py", set()),
+        ("benchmarks/plan/make_plan.py", set()),
+        ("benchmarks/runner/schedule.py", set()),
+        ("snug/train.py", set()),
+        ("reports/build.py", set()),
+    ],
+)
+def test_a_change_makes_stale_what_it_may_move(path, stale):
+    places = TASKS | {"settled": SETTLED}
+    files = {task: {f for place in code for f in _files_of(place)} for task, code in places.items()}
+    assert {task for task in files if dependencies.ROOT / path in files[task]} == stale
 
 
 def test_digests_tell_values_apart():
@@ -165,50 +230,3 @@ def test_digests_tell_values_apart():
     assert len({digest(value) for value in (one, *others)}) == 4
     with pytest.raises(TypeError, match="object"):
         digest({"a": object()})
-
-
-def test_a_scene_without_obstacle_or_body_depends_on_neither():
-    code = code_of(
-        "benchmarks.tasks.cell_task",
-        "benchmarks.scenes.hanging_sheet",
-        "benchmarks.methods.solvers.simulation",
-    )
-    assert "reference_sim/energies/bend_hinge.py" in code and "reference_sim/minimise/newton.py" in code
-    unused = ("snug/", "reports/", "reference_sim/energies/contact", "benchmarks/methods/__init__")
-    assert [path for path in code if path.startswith(unused)] == []
-
-
-def test_training_does_not_hang_on_the_solver():
-    code = code_of("benchmarks.tasks.training")
-    assert "snug/training/losses/physics_loss.py" in code
-    assert "reference_sim/energies/bend_hinge.py" in code
-    assert [path for path in code if path.startswith("reference_sim/minimise")] == []
-
-
-def test_no_task_depends_on_the_lists_of_scenes_methods_and_metrics():
-    """A line more in one of them makes nothing stale."""
-    lists = {f"benchmarks/{name}" for name in (
-        "scenes/__init__.py", "methods/__init__.py", "methods/solvers.py", "methods/learned.py",
-        "presets.py", "plan/choose_cells.py", "plan/study.py", "plan/plan.py",
-        "runner/schedule.py", "validation/registry.py",
-    )}  # fmt: skip
-    lists.add("snug/recipes/named.py")
-    names = (
-        "cell_task",
-        "ground_truth",
-        "training",
-        "metric_task",
-        "case",
-    )
-    modules = [f"benchmarks.tasks.{name}" for name in names]
-    modules += [entry.module for entry in (*SCENES, *FURTHER_SCENES, *METHODS)]
-    modules += ["benchmarks.scenes.dressed_body", "benchmarks.assets.assets"]
-    modules += list(MODULE_OF.values())
-    assert {name: files for name in modules if (files := lists & set(code_of(name)))} == {}
-
-
-def test_the_packages_that_move_a_number_are_known():
-    assert {"pymetis", "cvxopt", "scipy", "numba"} <= set(
-        packages_of(code_of("benchmarks.methods.solvers.simulation"))
-    )
-    assert "ipctk" in packages_of(code_of("reference_sim.energies.contact_barrier"))

@@ -12,7 +12,6 @@ import pytest
 from benchmarks import metric, run
 from benchmarks.cell import Cell
 from benchmarks.declarations import DeclarationError
-from benchmarks.fingerprint.dependencies import code_of
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
@@ -131,14 +130,14 @@ def test_what_is_unchanged_is_cached_and_what_is_edited_is_done_again(done, file
 
     (files / "mine_helper.py").write_text(HELPER.format(shift=0.0) + "# a remark\n")
     assert stale() == set()
-    (files / "mine_helper.py").write_text(HELPER.format(shift=0.5))
     (files / "theirs_run.py").write_text(PROGRAM + "# of what is run elsewhere every byte counts\n")
-    assert stale() == {"mine", "theirs"}
-    (files / "mine_helper.py").write_text(HELPER.format(shift=0.0))
+    assert stale() == {"theirs"}
     (files / "theirs_run.py").write_text(PROGRAM)
     (files / "a.txt").write_text("other weights")
-    (files / "other" / "other_helper.py").write_text(HELPER.format(shift=0.5))
-    assert stale() == {"mine", "other-1"}
+    assert stale() == {"mine"}
+    (files / "a.txt").write_text("weights")
+    (files / "mine_helper.py").write_text(HELPER.format(shift=0.5))
+    assert stale() == {"simulation", "mine", "theirs", "other-1"}  # it lies beside the scene's file too
 
 
 # --- refusals ----------------------------------------------------------------------------------------------
@@ -175,7 +174,7 @@ PLAIN = 'name="a", description="b"'
         (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-b'))\n" + MAKE,
          "free_fall x a-b and free_fall x a/b would have the same files: rename one"),
         (HEAD + "from random_helper import f\n", "bad.py: line 2: ModuleNotFoundError"),
-        ("\udcff", "bad.py: cannot be read"),
+        ("\udcff", "bad.py: line 1: (unicode error) 'utf-8' codec can't decode"),
     ],
 )  # fmt: skip
 def test_a_file_that_cannot_be_meant_is_one_line(text, message, tmp_path, monkeypatch, refused):
@@ -256,22 +255,6 @@ def test_two_files_of_one_name_are_refused(tmp_path):
 # --- source, energies and trainings ------------------------------------------------------------------------
 
 
-def test_modules_beside_a_file_and_in_its_package_count_and_those_installed_do_not(tmp_path):
-    package = tmp_path / "cloth_package"
-    (package / "deep").mkdir(parents=True)
-    more = "from cloth_package.deep.more import g\ndef f(): pass\n"
-    for name, text in {
-        "__init__.py": "", "deep/__init__.py": "", "unused.py": "", "helper.py": more,
-        "deep/methods.py": "import numpy\nfrom ..helper import f\n", "deep/more.py": "def g(): pass\n",
-    }.items():  # fmt: skip
-        (package / name).write_text(text)
-    code = code_of(str(package / "deep" / "methods.py"))
-    assert {Path(path).relative_to(tmp_path).as_posix() for path in code} == {
-        "cloth_package/deep/methods.py", "cloth_package/helper.py", "cloth_package/deep/more.py",
-        "cloth_package/__init__.py", "cloth_package/deep/__init__.py",
-    }  # fmt: skip
-
-
 def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
     with pytest.raises(RecipeError, match=r"unknown energy 'levity'.*import the file of your own"):
         dataclasses.replace(DEFAULT, terms=("levity",))
@@ -295,7 +278,7 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
     )  # fmt: skip
     (task,) = (task for task in Schedule(plan).tasks() if task.kind == "network")
     assert (task.chosen, task.home, task.steps) == (Training("snug", recipe), home, TINY.steps["snug"])
-    assert home in task.modules and home in Schedule(plan).cell(cell).modules
+    assert home in task.code and home in Schedule(plan).cell(cell).code
     other = dataclasses.replace(entry, name="b", training=Training("snug", DEFAULT))
     for wrong in ([entry, other], [dataclasses.replace(entry, trained="snug")]):
         with pytest.raises(DeclarationError, match="another training is called"):

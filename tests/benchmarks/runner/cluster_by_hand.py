@@ -136,7 +136,7 @@ class Write(Task):
 
 
 def write(name: str, **fields) -> Write:
-    return Write(name=name, label=name, inputs={}, modules=("benchmarks.results.run_folder",), **fields)
+    return Write(name=name, label=name, inputs={}, code=("benchmarks/results",), **fields)
 
 
 def chain(**fields) -> list[Write]:

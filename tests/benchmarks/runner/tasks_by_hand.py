@@ -46,7 +46,7 @@ def assets_of(dressed, motion) -> Assets:
 def training(name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu") -> TrainNetwork:
     """The task that trains a network of the T-shirt."""
     return TrainNetwork(
-        name=name, label=name, inputs={}, modules=(), training=name, seed=0, garment="tshirt", steps=steps,
+        name=name, label=name, inputs={}, code=(), training=name, seed=0, garment="tshirt", steps=steps,
         chosen=TRAININGS.get(name), motions=motions, device=device, parts={"key": key},
         simulated={m: ("data", m) for m in motions if name in TRAININGS and TRAININGS[name].simulated},
     )  # fmt: skip

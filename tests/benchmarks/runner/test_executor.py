@@ -66,7 +66,7 @@ class Add(Task):
 
 
 def add(name: str, **fields) -> Add:
-    return Add(name=name, label=name, inputs={}, modules=("benchmarks.results.run_folder",), **fields)
+    return Add(name=name, label=name, inputs={}, code=("benchmarks/results",), **fields)
 
 
 def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Bar]:

@@ -46,7 +46,7 @@ def task(name: str, *, dies: bool = False, value: int = 0, **ties) -> Written:
         name=name,
         label=name,
         inputs={"value": value},
-        modules=("benchmarks.results.run_folder",),
+        code=("benchmarks/results",),
         dies=dies,
         **ties,
     )
@@ -242,9 +242,7 @@ class Unkept(Task):
     [(Outcome(result={"x": np.float32(1)}), "float32"), (Outcome(files=("nowhere.npy",)), "nowhere.npy")],
 )
 def test_what_cannot_be_kept_has_failed_and_the_others_go_on(outcome, word, tmp_path):
-    bad = Unkept(
-        name="bad", label="bad", inputs={}, modules=("benchmarks.results.run_folder",), outcome=outcome
-    )
+    bad = Unkept(name="bad", label="bad", inputs={}, code=("benchmarks/results",), outcome=outcome)
     runner = run_tasks(tmp_path, bad, task("good"))
     assert runner.outcomes["unkept", "bad"].failed and word in runner.outcomes["unkept", "bad"].reason
     assert runner.outcomes["network", "good"].status == "ok"

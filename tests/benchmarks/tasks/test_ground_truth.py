@@ -30,7 +30,7 @@ MOTION = swaying(90)
 
 def clips_of(part: int, method: str = "simulation") -> SimulateClips:
     return SimulateClips(
-        name=str(part), label="", inputs={}, modules=(), scene=dressed_scene(MOTION.name),
+        name=str(part), label="", inputs={}, code=(), scene=dressed_scene(MOTION.name),
         entry=find_method(method), motions=(MOTION.name,), clips="tshirt/mixed", part=part,
     )  # fmt: skip
 
@@ -110,7 +110,7 @@ def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkey
     import reference_sim
 
     scene, assets = dressed_scene(MOTION.name), assets_of(tube_dress(), MOTION)
-    task = SimulateQuasiStatic(name="still", label="", inputs={}, modules=(), scene=scene)
+    task = SimulateQuasiStatic(name="still", label="", inputs={}, code=(), scene=scene)
     worn = dataclasses.replace(scene.build(assets), frames=5)
     assert worn.start.shape  # it has come to rest
     monkeypatch.setattr(ground_truth, "build_scene", lambda *_: worn)

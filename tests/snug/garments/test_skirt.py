@@ -96,7 +96,7 @@ def test_simulated_and_held_still_the_waistband_goes_with_the_body(scene, small,
     method.prepare(scene)
     moving = method.run().positions
     declared = dressed_scene("turning_stop", "skirt", part="clip")
-    task = SimulateQuasiStatic(name="skirt", label="", inputs={}, modules=(), scene=declared)
+    task = SimulateQuasiStatic(name="skirt", label="", inputs={}, code=(), scene=declared)
     task.run(context(tmp_path, small), {})
     path = RunFolder(tmp_path).quasi_static_path(scene.name)
     still = Trajectory.load(path).positions
