@@ -2,6 +2,7 @@
 
 Reads run.json, results.csv, frame_energies.csv, trajectories and models in RUN_DIR, and nothing else; writes
 tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes.
+Of a run without trajectories, pictures of roll-outs that lie in figures/ stay and stand in the PDF.
 """
 
 from __future__ import annotations
@@ -54,7 +55,8 @@ def build_report(run_dir: str | Path) -> Built:
     run = read_run_with_trainings(folder)
     tables = make_tables(run)
     write_tables(folder.tables, run, tables)
-    remove_figures(folder.figures, FIGURES)
+    if folder.trajectories.is_dir():  # else pictures of roll-outs that are gone stay
+        remove_figures(folder.figures, FIGURES)
     report = Report(run, tables, draw_figures(run, folder.figures, FIGURES))
     write_page(folder, report)
     return Built(write_pdf(folder, report), run.problems, answer(run, tables))

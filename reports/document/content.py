@@ -1,6 +1,6 @@
 """Content of the PDF, as values that the template lays out: the report blocks and what stands around them.
 
-It is to be read in minutes: what is long stands in tables/ and in report.html, and the last page says so.
+It is to be read in minutes: what is long stands in tables/ and in report.html, as its end says.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from typing import Any
 
 from reports.blocks import BLOCKS
 from reports.blocks.block import Heading, Report
-from reports.blocks.printed_tables import cut
 from reports.document.configuration import configuration
 from reports.document.layout import lay_out
 from reports.run.finished_run import Run
@@ -33,11 +32,6 @@ def content(report: Report) -> dict[str, Any]:
         "configuration": configuration(run.config, run.frame),
         "sections": [section for section in sections[1:] if section["blocks"]],
         "definitions": _definitions(report),
-        "elsewhere": [
-            [f"tables/{table.name}.csv", cut(table.caption)]
-            for table in report.tables.values()
-            if table.caption
-        ],
     }
 
 

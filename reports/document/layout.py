@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from reports.blocks.block import Report, SentenceBlock, TableBlock
+from reports.blocks.block import ROWS, Report, SentenceBlock, TableBlock
 from reports.blocks.printed_tables import shortened
 from reports.figures.figure import Figure, Picture
 from reports.run.finished_run import Run
@@ -15,7 +15,6 @@ from reports.tables.number_texts import DASH
 from reports.tables.table import Column, Table
 
 Values = dict[str, Any]  # of one block, as JSON takes them
-LONG = 5  # rows from which a table may run over pages
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
 MOST = 9  # columns of numbers that fit on a page; a wider table goes on below
 
@@ -81,7 +80,7 @@ def _part(run: Run, table: Table) -> Values:
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
         "references": lines[len(table.rows) :],
-        "breakable": len(table.rows) > LONG,
+        "breakable": len(table.rows) > ROWS,
     }
 
 

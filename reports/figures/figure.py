@@ -50,30 +50,48 @@ class Figure:
         """Patterns of its files in the folder of figures."""
         return self.files or (f"{self.name}.*",)
 
+    def files_in(self, folder: Path) -> list[Path]:
+        """Return its files in the folder of figures, the one that was drawn first before the others."""
+        files = {path for pattern in self.patterns for path in folder.glob(pattern)}
+        return sorted(files, key=lambda path: (path.stat().st_mtime_ns, path.name))
+
 
 def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, list[Picture]]:
-    """Draw into the folder all that the run has the data for; return name of the figure -> its pictures."""
+    """Draw into the folder all that the run has the data for; return name of the figure -> its pictures.
+
+    What cannot be drawn is taken from the folder if it lies there, in the order in which it was drawn.
+    """
     return {
-        figure.name: [save_drawing(folder, drawing) for drawing in figure.drawings(run)] for figure in figures
+        figure.name: [save_drawing(folder, drawing) for drawing in figure.drawings(run)]
+        or [kept_picture(path) for path in figure.files_in(folder) if path.suffix == ".png"]
+        for figure in figures
     }
 
 
 def save_drawing(folder: Path, drawing: Drawing) -> Picture:
-    """Write <name>.png and, unless it is a photograph, <name>.svg, which the PDF then takes."""
+    """Write <name>.png, which holds its caption, and, unless it is a photograph, <name>.svg for the PDF."""
     canvas, path = drawing.canvas, folder / f"{drawing.name}.png"
     with replacing(path) as temporary:
-        canvas.savefig(temporary, dpi=DOTS, metadata={"Software": None})
+        canvas.savefig(temporary, dpi=DOTS, metadata={"Software": None, "Description": drawing.caption})
     if drawing.vector:
         canvas.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
-        path = folder / f"{drawing.name}.svg"
-        with replacing(path) as temporary:
+        with replacing(path.with_suffix(".svg")) as temporary:
             canvas.savefig(temporary, metadata={"Date": None})
-    return Picture(path, drawing.caption, min(1.0, float(canvas.get_figwidth()) / PAGE_WIDTH))
+    return kept_picture(path)
+
+
+def kept_picture(path: Path) -> Picture:
+    """Return the picture that `save_drawing` wrote as this PNG, as vector graphic where it has one."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        caption, width = image.info.get("Description", ""), image.width / DOTS / PAGE_WIDTH
+    vector = path.with_suffix(".svg")
+    return Picture(vector if vector.is_file() else path, caption, min(1.0, width))
 
 
 def remove_figures(folder: Path, figures: Iterable[Figure]) -> None:
     """Remove the files of these figures."""
     for figure in figures:
-        for pattern in figure.patterns:
-            for path in folder.glob(pattern):
-                path.unlink()
+        for path in figure.files_in(folder):
+            path.unlink()

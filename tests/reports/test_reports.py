@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_config import FORMAT
 from benchmarks.results.run_folder import RunFolder
 from reports import build
+from reports.blocks import FIGURES
 from reports.document.content import changed_files
+from reports.figures.figure import draw_figures
 from reports.run import training_histories as training
 from reports.run.finished_run import make_run
 from reports.run.reading import read_run
@@ -50,6 +53,10 @@ def made(tmp_path_factory) -> RunFolder:
             cloth, faces = sheet(0.1)
             fields = {f"energy/{t}": np.linspace(0, v, FRAMES) for t, v in TERMS.items()}
             write_mesh(run.trajectory_path(scene, method), cloth, faces, fields)
+    energies = [
+        f"{scene},{m},0,{k / 30},{0.1 * k},0.1" for scene in SCENES for m in METHODS for k in range(3)
+    ]
+    run.frame_energies_path.write_text("\n".join(["scene,method,seed,seconds,strain,bending", *energies, ""]))
     write_model(run.models / "snug-seed0.safetensors", "snug", strain=0.1)
     write_model(run.models / "supervised-seed0.safetensors", "supervised", vertices=2.0)
     run.figures.mkdir()
@@ -105,6 +112,18 @@ def test_made_twice_it_is_the_same_to_the_byte(made):
     before = contents()
     assert build.main([str(made.path)]) == 0
     assert contents() == before
+
+
+def test_pictures_of_roll_outs_that_are_gone_stay_in_the_report(made, tmp_path):
+    published = RunFolder(shutil.copytree(made.path, tmp_path / "published"))
+    shutil.rmtree(published.trajectories)
+    build.build_report(published.path)
+    pictures = draw_figures(read_run(published), published.figures, FIGURES)
+    kept = {
+        picture.path.name: picture for name in ("lead", "hem", "histograms") for picture in pictures[name]
+    }
+    assert list(kept) == ["lead.png", "histograms.svg"] and "walk at" in kept["lead.png"].caption
+    assert b"/Subtype/Image" in published.report_path.read_bytes()
 
 
 def test_figures_of_an_earlier_report_are_removed_and_others_stay(made):
