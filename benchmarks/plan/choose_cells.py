@@ -88,7 +88,7 @@ def _pairs(study: Study, motions: Motions, declared: Declared) -> Iterator[tuple
     scenes = _scenes(study, motions, declared.scenes)
     listed = {name for part in study.parts.values()
               for name in matching(declared.methods, (*part.methods, *part.optional_methods))}  # fmt: skip
-    unlisted = [name for name in declared.methods if name not in listed]
+    unlisted = [name for name in study.methods if name in declared.methods and name not in listed]
     for name, part in study.parts.items():
         methods = matching(declared.methods, part.methods)
         if study.methods:
