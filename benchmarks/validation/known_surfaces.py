@@ -10,7 +10,6 @@ from benchmarks.validation.case import known_answer
 from benchmarks.validation.convergence import fitted_order
 
 SECOND_ORDER = known_answer(expected=2.0, tolerance=0.1, reason="mixed Voronoi areas are second order there")
-FLOOR = known_answer(reason="reported: pointwise, the operator does not converge on irregular triangles")
 
 
 @known_answer(expected=0.0, tolerance=1e-4, reason="second order in cells of a tenth of the radius")
@@ -66,25 +65,6 @@ def curvature_cylinder() -> float:
     curvature, area = mean_curvature(x, faces)
     inside = ~boundary_mask(faces, len(x))
     return float(np.average(curvature[inside], weights=area[inside]))
-
-
-@FLOOR
-def curvature_floor_cylinder() -> float:
-    """Return the relative rms error of H on a cylinder of jittered triangles, at any size."""
-    flat, faces = rectangle("delaunay", 48, 48, 1.0, 1.0)
-    x = _wrapped(flat)
-    inside = ~boundary_mask(faces, len(x))
-    return float(np.sqrt(np.mean((mean_curvature(x, faces)[0][inside] * 2 - 1) ** 2)))
-
-
-@FLOOR
-def curvature_floor_sphere() -> float:
-    """Return the relative rms error of H on a cap of the unit sphere, jittered seen from above."""
-    flat, faces = rectangle("delaunay", 48, 48, 1.0, 1.0)
-    flat = flat - 0.5
-    x = np.column_stack([flat, np.sqrt(1 - (flat**2).sum(axis=1))])
-    inside = ~boundary_mask(faces, len(x))
-    return float(np.sqrt(np.mean((mean_curvature(x, faces)[0][inside] - 1) ** 2)))
 
 
 def _wrapped(flat: np.ndarray) -> np.ndarray:

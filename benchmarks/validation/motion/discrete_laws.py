@@ -164,30 +164,20 @@ def _thrown_sheet() -> tuple[sim.Trajectory, sim.Cloth]:
     return demand_converged(trajectory, "the simulation"), cloth
 
 
-@known_answer(
-    {"ambiguous_step": {"share": None}},
-    unit="m", smoke=False, reason="reported: vertex by vertex agreement means nothing there",
-)  # fmt: skip
-@known_answer(
-    {"unique_step": {"share": 0.9}},
-    unit="m", expected=0.0, tolerance=1e-12, reason="one minimiser; Newton ends at round-off",
-)  # fmt: skip
-def step_distance(share: float | None) -> float:
+@known_answer(unit="m", expected=0.0, tolerance=1e-12, reason="one minimiser; Newton ends at round-off")
+def unique_step() -> float:
     """Return the largest distance of the ends of one step, thrown into disorder, from two far guesses.
 
     The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter than
     h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
-
-    Args:
-        share: of that bound; None: the step is 1/30 s, far above it, where two valid solvers may differ.
+    At 1/30 s, far above that bound, two valid solvers may differ.
     """
     material = sim.Material()
     bound = SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
-    dt = DT if share is None else share * bound
     cells = 12
     points, faces = right_grid(cells, cells, cells * SPACING, cells * SPACING)
     cloth = sim.Cloth(in_space(points), faces, material)
-    inertia = energies.Inertia(cloth, dt)
+    inertia = energies.Inertia(cloth, 0.9 * bound)
     random = np.random.default_rng(5)
     inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
     potential = sim.Potential([energies.StretchStVK(cloth), inertia])

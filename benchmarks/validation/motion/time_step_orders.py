@@ -74,19 +74,8 @@ def pressed_time_step_order() -> float:
     return halving_order(_pressed(), (30, 60, 120, 240))
 
 
-@known_answer(
-    unit="m", reason="reported: sub-steps converge to the motion along chords, not to the smooth one"
-)
-def chord_time_step_distance() -> float:
-    """Return the distance of the sheet on the ball to one whose ball moves evenly between frames of 1/30 s.
-
-    Both with 480 steps: what sub-steps of a body known frame by frame converge to is not the smooth motion.
-    """
-    return _distance(_pressed()(480), _pressed(frames=6)(480))
-
-
-def _pressed(frames: int | None = None) -> Callable[[int], np.ndarray]:
-    """Return a function: number of steps -> positions after 0.2 s; the ball rises smoothly or by `frames`."""
+def _pressed() -> Callable[[int], np.ndarray]:
+    """Return a function: number of steps -> positions after 0.2 s, while the ball rises smoothly."""
     end = 0.2
     flat, faces = square_sheet(8, 0.4)
     border = np.flatnonzero((np.abs(flat[:, [0, 2]]) > 0.2 - 1e-9).any(axis=1))
@@ -102,11 +91,7 @@ def _pressed(frames: int | None = None) -> Callable[[int], np.ndarray]:
         return 0.02 * np.sin(2 * np.pi * t) ** 6 - 0.8 * BALL  # from rest, without a jolt
 
     def ball(n: int) -> Any:
-        t = np.linspace(0, end, n + 1)
-        if frames is None:
-            return MovingBall(height(t))
-        known = np.linspace(0, end, frames + 1)
-        return MovingBall(np.interp(t, known, height(known)))
+        return MovingBall(height(np.linspace(0, end, n + 1)))
 
     tent = 1.1 * flat
     tent[:, 1] = 0.12 * np.maximum(0.2 - np.hypot(flat[:, 0], flat[:, 2]), 0.0)

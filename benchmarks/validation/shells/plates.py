@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import FAMILIES, ROW, in_space, rectangle
+from benchmarks.meshes import ROW, in_space, rectangle
 from benchmarks.validation.case import known_answer
 from reference_sim import energies
 
@@ -101,32 +101,28 @@ def _bent(family: str, cells: int, height: float, curvature: np.ndarray, terms: 
     return 0.5 * float(w @ (K @ w)) / STIFFNESS, float(cloth.hinge_areas.sum() / 3)
 
 
-# Only equilateral triangles make an isotropic plate: there the number is known, elsewhere it is the price.
 @known_answer(
-    _of("plate_morley", [family for family in FAMILIES if family != "equilateral"]),
-    smoke=False, reason="reported: no plate of one D",
-)  # fmt: skip
-@known_answer(
-    {"plate_morley_equilateral_unscaled": {"family": "equilateral", "scaling": "none"}},
+    {"plate_morley_equilateral_unscaled": {"scaling": "none"}},
     smoke=False, expected=3**0.5 / 2, tolerance=0.03 * (3**0.5 / 2),
     reason="edges on the border have no hinge",
 )  # fmt: skip
 @known_answer(
-    {"plate_morley_equilateral_scaled": {"family": "equilateral", "scaling": "length_area"}},
+    {"plate_morley_equilateral_scaled": {"scaling": "length_area"}},
     smoke=False, expected=0.25, tolerance=0.03 * 0.25, reason="edges on the border have no hinge",
 )  # fmt: skip
-def supported_plate(family: str, scaling: str) -> float:
-    """Return the D/k of the Kirchhoff plate that sags as much, on the mean, as hinges on the unit square.
+def supported_plate(scaling: str) -> float:
+    """Return the D/k of the Kirchhoff plate that sags as much, on the mean, as hinges on a square.
 
-    Simply supported along straight sides, uniform load: there the deflection does not depend on nu, so this
-    is the isotropic part of the plate. The reference is solved with Morley's element in scikit-fem.
+    Only equilateral triangles make an isotropic plate, whose number is known. Simply supported along straight
+    sides, uniform load: there the deflection does not depend on nu. The reference is solved with Morley's
+    element in scikit-fem.
     """
     import scipy.sparse.linalg as spla
 
     columns = 24
-    rows = round(columns / ROW) if family == "equilateral" else columns
-    width = rows * ROW / columns if family == "equilateral" else 1.0
-    points, faces = rectangle(family, columns, rows, 1.0, width)
+    rows = round(columns / ROW)
+    width = rows * ROW / columns
+    points, faces = rectangle("equilateral", columns, rows, 1.0, width)
     cloth, K = _stiffness(points, faces, hinges(scaling))
     border = (points < 1e-9).any(axis=1) | (points > np.array([1.0, width]) - 1e-9).any(axis=1)
     inside = np.flatnonzero(~border)
