@@ -158,7 +158,7 @@ class Excess:
             if is_recorded(cell[0]) == recorded
         }  # fmt: skip
         means = list(mean_by_recording(scaled).values())
-        return float(off_scale(np.mean(means), EXCESS)) if means else None
+        return float(off_scale(float(np.mean(means)), EXCESS)) if means else None
 
     @property
     def worst(self) -> tuple[str, float]:
