@@ -2,8 +2,7 @@
 
 A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their sum. A
 term that a scene does not have is left empty. It holds what the paper draws over time: the reference,
-baselines, networks and roll-outs of the user. Curves of all else lie beside their trajectories; they are too
-large to be published.
+baselines and networks. Curves of all else lie beside their trajectories; they are too large to be published.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from reference_sim.files.atomic_files import replacing
 if TYPE_CHECKING:
     import numpy as np
 
-ROLES = ("reference", "baseline", "network", "external")
+ROLES = ("reference", "baseline", "network")
 CELL = ("scene", "method", "seed", "seconds")
 SECONDS = "judged/seconds"  # among the curves of a cell: of each frame, nan where it is not judged
 ENERGY = "energy/"

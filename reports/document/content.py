@@ -1,6 +1,6 @@
 """Content of the PDF, as values that the template lays out: the report blocks and what stands around them.
 
-It is to be read in minutes: what is long stands in tables/ and in report.html, as its end says.
+It is to be read in minutes: what is long stands in tables/ and in report.html, as the protocol says.
 """
 
 from __future__ import annotations

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
+from reports.figures.chosen_roll_outs import long_motion
 from reports.figures.figure import Drawing
 from reports.figures.method_styles import few, style
 from reports.figures.plotting import file_name, fit, log_axis, new_panels
@@ -16,16 +18,12 @@ LEAST = 1e-4  # of the largest energy that is shown: frames at rest would squeez
 
 
 def energy_series(run: Run) -> Iterator[Drawing]:
-    """Draw a panel for each term of the first whole motion, a curve per method (the paper's figure 4)."""
-    frames = run.frame_energies
-    terms = [term for term in TERMS if term in frames]
-    scenes = [scene for of_garment in run.garments(run.garment_rows).values() for scene in of_garment]
-    scene = next((scene for scene in scenes if terms and (frames["scene"] == scene).any()), "")
-    if not scene:
+    """Draw a panel for each term of one whole motion, a curve per method (the paper's figure 4)."""
+    scene, frames = _frames(run)
+    terms = [term for term in TERMS if term in frames and frames[term].notna().any()]
+    if not terms:
         return
-    seeds = shown_seeds(run.garment_rows).loc[scene]
-    frames = frames[(frames["scene"] == scene) & (frames["seed"] == frames["method"].map(seeds))]
-    methods = few(run, frames["method"])
+    methods = few(run, frames.dropna(subset=terms, how="all")["method"])
     curves = {method: frames[frames["method"] == method] for method in methods}
     figure, panels = new_panels(len(terms), 3)
     for axes, term in zip(panels, terms):
@@ -33,7 +31,7 @@ def energy_series(run: Run) -> Iterator[Drawing]:
             look, energy = style(run, method), curve[term].where(curve[term] > 0.0)
             axes.plot(curve["seconds"], energy, color=look.colour, linestyle=look.line)
         shown = np.concatenate([curve[term] for curve in curves.values()])
-        shown = shown[shown > 0.0]
+        shown = shown[np.isfinite(shown) & (shown > 0.0)]
         if len(shown):
             axes.set_ylim(max(shown.min() / 1.5, shown.max() * LEAST), 1.6 * shown.max())
             log_axis(axes, "y")
@@ -42,3 +40,25 @@ def energy_series(run: Run) -> Iterator[Drawing]:
     fit(figure, [style(run, method) for method in methods])
     caption = f"{scene}: energy of each frame by term, logarithmic. A frame with no energy at all is a gap."
     yield Drawing(figure, f"energy_series_{file_name(scene)}", caption)
+
+
+def _frames(run: Run) -> tuple[str, pd.DataFrame]:
+    """Return a motion and method, seconds and energies by term [J] of its frames.
+
+    It is the one shown at length or, where no roll-outs were kept, the first of frame_energies.csv.
+    """
+    if motion := long_motion(run):
+        parts = [
+            pd.DataFrame(
+                {"method": method, "seconds": cloth.times}
+                | {term: cloth.frame_fields.get(f"energy/{term}", np.nan) for term in TERMS}
+            )
+            for method, cloth in motion.roll_outs.series.items()
+        ]
+        return motion.roll_outs.scene, pd.concat(parts)
+    frames = run.frame_energies
+    if frames.empty:
+        return "", frames
+    scene = str(frames["scene"].iloc[0])
+    seeds = shown_seeds(run.frame[run.frame["scene"] == scene]).loc[scene]
+    return scene, frames[(frames["scene"] == scene) & (frames["seed"] == frames["method"].map(seeds))]
