@@ -24,7 +24,7 @@ from reports.statistics.pareto import (
 )
 from reports.tables.number_texts import number
 
-MOST_PANELS, MOST_SCENES = 4, 9  # in the PDF; the page has all
+MOST_PANELS, MOST_SCENES = 4, 7  # in the PDF; the page has all
 BAND_REMARK = " Grey: within the reference's uncertainty."  # remark of a caption
 Scenes = list[tuple[pd.DataFrame, list[tuple[Metric, list[Point]]]]]  # rows and panels of each
 

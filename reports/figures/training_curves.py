@@ -31,7 +31,8 @@ def _draw_garment(run: Run, name: str, garment: str, histories: Sequence[History
             look, seconds = style(run, history.method), history.column("seconds")
             axes.plot(seconds, history.column("loss"), color=look.colour, linestyle=look.line, linewidth=1.1)
         axes.set(xlabel="training time [s]", title=title)
-        log_axis(axes, "y")
+        if min(line.get_ydata().min() for line in axes.get_lines()) > 0.0:  # gravity may make losses negative
+            log_axis(axes, "y")
     shown = leading(run, {history.method for history in histories})
     fit(figure, [style(run, method) for method in shown])
     caption = f"{garment}: training loss against wall time; one curve per model and seed. "

@@ -123,7 +123,8 @@ def _mean(lines: Sequence[_Line], scenes: int, failed: Set[int]) -> Mean:
     of_seeds = [fmean(values) for values in by_seed.values()]
     value, freedom = fmean(of_seeds), len(of_seeds) - 1
     # As statistics.stdev, which sums fractions: that took a third of the time of all means.
-    spread = math.dist(of_seeds, [value] * len(of_seeds)) / math.sqrt(freedom) if freedom else None
+    middle = value if len(set(of_seeds)) > 1 else of_seeds[0]  # the mean of equal numbers may be rounded
+    spread = math.dist(of_seeds, [middle] * len(of_seeds)) / math.sqrt(freedom) if freedom else None
     uncertainties = [line.uncertainty for line in lines if not math.isnan(line.uncertainty)]
     return Mean(
         value=value,
