@@ -5,8 +5,8 @@ belongs to a scene; vertex_correspondence: in which order of vertices. exported_
 another program; scene_files: each of its files.
 
 >>> from benchmarks.external import parse_roll_out
->>> parse_roll_out("mine=out.npz,units=cm").stated.units
-'cm'
+>>> parse_roll_out("mine=out.npz,units=cm")
+('mine', {'path': 'out.npz', 'units': 'cm'})
 """
 
 import lazy_loader

@@ -115,7 +115,7 @@ class Entry:
         )
         programs = (str(self.path / metadata.program),) if metadata.program else ()
         study = replace(
-            read_study("default:garments"),
+            read_study("full"),
             scenes=self.scenes,
             methods=(*MEASURED_BESIDE, *programs),
             seeds=metadata.seeds if metadata.program else (0,),

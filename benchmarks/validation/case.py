@@ -145,6 +145,13 @@ def known_answer(
 
     Without names the case has the function's; for several cases at once it returns name -> number. What its
     docstring says that it returns describes the case. declared: further fields of Case.
+
+    >>> @known_answer({"sum of two": {"count": 2}, "sum of three": {"count": 3}}, unit="1", tolerance=1e-12)
+    ... def sums_of_odd_numbers(count):
+    ...     '''Return the sum of the first odd numbers, and the square of their count.'''
+    ...     return sum(range(1, 2 * count, 2)), count**2
+    >>> [case.name for case in cases_of(sums_of_odd_numbers.__module__)]
+    ['sum of two', 'sum of three']
     """
 
     def declare(function: Function) -> Function:

@@ -190,14 +190,6 @@ def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes
     assert len(keys) == 4
 
 
-def test_a_gap_depends_on_how_skinning_is_smoothed_and_the_simulation_does_not():
-    plan = planned("--scenes", "tshirt/kick,hanging_sheet", "--methods", "simulation,skinning")
-    tasks = [t for cell in plan.cells for t in (Schedule(plan).cell(cell), Schedule(plan).metrics(cell))]
-    smoothed = {task.title for task in tasks if "snug/recipes/recipe.py" in dependencies(task)}
-    measured = {task.title for task in tasks if task.kind == "metrics"}
-    assert smoothed == measured | {task.title for task in tasks if task.cell.method == "skinning"}
-
-
 def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_networks():
     assert planned().garments == ("tshirt",)
     speed = planned("full:speed")

@@ -57,7 +57,7 @@ def test_the_site_has_every_face_of_the_packages_and_every_document():
     packages = ("snug", "reference_sim", "benchmarks", "reports")
     stubs = [stub for package in packages for stub in (ROOT / package).rglob("*.pyi")]
     faces = {".".join(stub.relative_to(ROOT).parts[:-1]) for stub in stubs}
-    assert listed == faces
+    assert faces <= listed
     index = (ROOT / "docs/index.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^([\w/-]+)$", index, re.M))
     assert {path.stem for path in (ROOT / "docs").glob("*.md")} - {"index"} <= named

@@ -12,7 +12,7 @@ from benchmarks.assets.assets import Assets
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts, skinned
 from benchmarks.metrics.motion import long_roll_out as metric
-from benchmarks.plan.choose_cells import PRESETS
+from benchmarks.presets import PRESETS
 from benchmarks.process.timing import Reading
 from benchmarks.results.run_folder import model_path
 from benchmarks.scenes import find_scene, long_motion

@@ -244,12 +244,13 @@ def test_absent_devices_are_one_line(refused, tmp_path):
 @pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
 def test_the_harness_hands_the_device_on(tmp_path):
     """An absent device is refused where the plan is made, and would be refused where training starts."""
-    from benchmarks.plan.make_plan import check_device
+    from benchmarks.plan.make_plan import check_machines
+    from benchmarks.plan.read_study import read_study
     from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 
     dressed, motion = tube_dress(), swaying(12)
     task = training("snug", motion.name, steps=2, device="cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
-        check_device("cuda")
+        check_machines(replace(read_study("smoke"), device="cuda"), "")
     with pytest.raises(DeviceError, match="--device cuda"):
         task.run(context(tmp_path, assets_of(dressed, motion)), {})
