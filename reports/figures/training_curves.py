@@ -27,11 +27,13 @@ def _draw_garment(run: Run, name: str, garment: str, histories: Sequence[History
     titles = [title for title in known if any(h.panel == title for h in histories)]
     figure, panels = new_panels(len(titles), 2)
     for axes, title in zip(panels, titles):
-        for history in (h for h in histories if h.panel == title):
+        of_panel = [history for history in histories if history.panel == title]
+        for history in of_panel:
             look, seconds = style(run, history.method), history.column("seconds")
             axes.plot(seconds, history.column("loss"), color=look.colour, linestyle=look.line, linewidth=1.1)
         axes.set(xlabel="training time [s]", title=title)
-        if min(line.get_ydata().min() for line in axes.get_lines()) > 0.0:  # gravity may make losses negative
+        # Gravity may make losses negative.
+        if min(history.column("loss").min() for history in of_panel) > 0.0:
             log_axis(axes, "y")
     shown = leading(run, {history.method for history in histories})
     fit(figure, [style(run, method) for method in shown])
