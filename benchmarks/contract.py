@@ -42,7 +42,7 @@ DIRECTIONS = 3  # along which derivatives are compared
 
 
 class ContractError(RuntimeError):
-    """What is broken, each with its remedy, separated by semicolons."""
+    """Faults of a user's entry, each with its remedy, separated by semicolons."""
 
 
 def demand(*claims: tuple[object, str]) -> None:

@@ -57,7 +57,7 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Show:
-    """What of a published run the documents show, besides its rows, tables and PDF.
+    """Pictures and films of a published run that the documents show, besides its rows, tables and PDF.
 
     Attributes:
         pictures: names of figures of the report.

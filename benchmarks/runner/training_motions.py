@@ -20,7 +20,6 @@ from benchmarks.tasks.ground_truth import SimulateMotion
 from reference_sim.trajectory import Trajectory
 from snug.training.simulated_data import write_data_set
 
-WORD = "training-motions"  # in the place of a motion
 LEARNER = "supervised"  # the network that learns from the training motions, simulated to convergence
 
 

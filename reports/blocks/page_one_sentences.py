@@ -74,7 +74,7 @@ def _moves(run: Run, worn: pd.DataFrame) -> list[str]:
         if swing is not None:
             amplitude = f"{number(100.0 * swing.value, 2)} % of the simulation's{swing.fewer}"
             sentence = (
-                f"{run.label(method)} has {_secondary_motion(swing.value)} secondary motion: its hem "
+                f"{run.label(method)} has {secondary_motion(swing.value)} secondary motion: its hem "
                 f"amplitude is {amplitude}"
             )
             scale = " (1: the same motion up to its size)" if not sentences else ""
@@ -89,7 +89,7 @@ def _moves(run: Run, worn: pd.DataFrame) -> list[str]:
     return sentences
 
 
-def _secondary_motion(amplitude: float) -> str:
+def secondary_motion(amplitude: float) -> str:
     """Return how much of the simulation's secondary motion there is, in words."""
     if amplitude < 0.2:
         return "almost no"

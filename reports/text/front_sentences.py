@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from reports.blocks.page_one_sentences import ALIKE, GAP, SWING
+from reports.blocks.page_one_sentences import ALIKE, GAP, SWING, secondary_motion
 from reports.run.finished_run import Run
 from reports.statistics.break_even import NETWORK, compared_scenes
 from reports.statistics.means_and_spreads import mean_of
@@ -37,12 +37,13 @@ def front_sentences(run: Run) -> str:
         raise ValueError("the run lacks SNUG, PBNS, the supervised network, or their times beside solvers")
     worst, most = snug.worst
     least = min(faster.interval or (faster.shown,))
-    times = math.floor(least / 10 ** math.floor(math.log10(least))) * 10 ** math.floor(math.log10(least))
+    power = 10 ** math.floor(math.log10(least))
+    times = power * math.floor(least / power)  # one digit: the simulation's time is uncertain by half
     return "\n".join([
         f"**In a typical unseen motion SNUG removes {number(100.0 - snug.typical, 2)} % of the energy that "
         f"skinning has in excess of a converged simulation ({number(100.0 - snug.pooled, 2)} % pooled over "
-        f"all motions), more than {times} times faster than that simulation; its garments have almost no "
-        "secondary motion.**",
+        f"all motions), more than {times} times faster than that simulation; its garments have "
+        f"{secondary_motion(swing.value)} secondary motion.**",
         "",
         f"- Good at: energy for its time. PBNS leaves {number(pbns.typical, 2)} % of that excess, the "
         f"supervised network {number(supervised.typical, 2)} %; solvers as accurate take at least "

@@ -115,6 +115,8 @@ def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[
         rows = text_rows(run, overview(run, own)[0], wanted)
         tables.append(rows)
         places |= dict(zip(run.ordered(own), rows[1:]))
+    if absent := [name for name in methods if name not in places]:
+        raise ValueError(f"no run of {', '.join(folder.name for folder in folders)} has {absent[0]}")
     if any(rows[0] != tables[0][0] for rows in tables):
         raise ValueError(f"runs {', '.join(folder.name for folder in folders)} have other columns")
     return markdown_table([tables[0][0], *(places[name] for name in methods)])

@@ -155,7 +155,7 @@ def chain(**fields) -> list[Write]:
 
 
 def executor(folder: RunFolder, address: str = "") -> Executor:
-    """Of a cluster, or without an address of two processes here."""
+    """Return the executor of a cluster, or without an address of two processes here."""
     return Executor(folder, None, 2, Cluster(folder, None, address) if address else None)
 
 

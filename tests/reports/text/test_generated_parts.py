@@ -55,6 +55,10 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
         ("everything of quick", "known: front"),
         ("table nothing of quick", "no table nothing; it has"),
         ("table overview of quick; colour", "no column colour; it has"),
+        (
+            "table overview of quick, paper_text; method; snug, nobody",
+            "no run of quick, paper_text has nobody",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             published_part(request)
