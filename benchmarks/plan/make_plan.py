@@ -308,8 +308,6 @@ def choose_folder(folder: Path | None) -> Path:
 
 def _check_run(folder: Path) -> None:
     try:
-        config = RunFolder(folder).read_config()
+        RunFolder(folder).read_config()
     except ResultsError as error:
         raise PlanError(f"--out {error}; name another folder") from None
-    if "merged" in config:
-        raise PlanError(f"--out {folder}: is merged of several runs, which go on in their own folders")

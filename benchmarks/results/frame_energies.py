@@ -50,19 +50,6 @@ def write(folder: RunFolder, rows: Iterable[Row]) -> None:
         lines.to_csv(temporary, index=False, float_format="%.5g", lineterminator="\n")
 
 
-def join(paths: Iterable[Path], out: Path) -> None:
-    """Join the files that exist into one: every term, and each frame once. Raises ResultsError."""
-    import pandas as pd
-
-    parts = []
-    for path in filter(Path.is_file, paths):
-        read(path)  # refuses what is none
-        parts.append(pd.read_csv(path, dtype=str, keep_default_na=False))
-    if any(map(len, parts)):
-        with replacing(out) as temporary:
-            pd.concat(parts).drop_duplicates([*CELL]).to_csv(temporary, index=False, lineterminator="\n")
-
-
 def _curves(path: Path) -> dict[str, np.ndarray]:
     """Read seconds, and energies by term, of a cell; empty where somebody removed its file."""
     from reference_sim.files.array_file import read_arrays
