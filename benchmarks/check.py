@@ -20,7 +20,8 @@ from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files
 from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
-from benchmarks.plan.plan import STATES, Motions, Plan
+from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.plan import STATES, Plan
 from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder

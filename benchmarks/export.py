@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.options import OF_SCENES, REPLACED, add_study_options, study_of
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.process.timing import one_thread
 from reference_sim.command_line import Parser, command
 
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             folder, plan.scenes[0], scene, preset=plan.preset.name, score=score, simulation=simulation
         )
     except RuntimeError as error:  # a simulation that did not stay finite
-        raise PlanError(str(error)) from error
+        raise StudyError(str(error)) from error
     print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")
     return 0
 

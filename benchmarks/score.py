@@ -26,7 +26,8 @@ from benchmarks.external.roll_out_option import (
 )
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
-from benchmarks.plan.plan import Plan, PlanError
+from benchmarks.plan.study import StudyError
+from benchmarks.plan.plan import Plan
 from benchmarks.plan.read_study import read_study
 from benchmarks.plan.study import Study
 from benchmarks.process.timing import one_thread
@@ -190,7 +191,7 @@ def plan_score(
         folder=folder, command=command, scenes=scenes,
     )  # fmt: skip
     if len(plan.scenes) != 1:
-        raise PlanError(f"{scene}: name one scene; see python -m benchmarks.run --list")
+        raise StudyError(f"{scene}: name one scene; see python -m benchmarks.run --list")
     cells = [_reference(cell, reference) for cell in plan.cells]
     if not report:  # nobody looks at times and gaps of what the roll-out is compared with
         cells = [replace(cell, entry=replace(cell.entry, timed=False)) for cell in cells]

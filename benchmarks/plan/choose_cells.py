@@ -10,7 +10,8 @@ from fnmatch import fnmatchcase
 from benchmarks.cell import Cell
 from benchmarks.method import MethodEntry
 from benchmarks.metrics import MODULES
-from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.study import StudyError
+from benchmarks.plan.motion_split import Motions
 from benchmarks.plan.study import Part, Study, nearest
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes
@@ -36,7 +37,7 @@ def choose_cells(
     """Return the cells and cases that a study names.
 
     Raises:
-        PlanError: a word that names nothing, a choice of nothing, a roll-out that cannot take part.
+        StudyError: a word that names nothing, a choice of nothing, a roll-out that cannot take part.
     """
     _check_words(study, motions, declared)
     chosen: dict[tuple[str, str, int], Cell] = {}
@@ -47,7 +48,7 @@ def choose_cells(
             chosen[key] = Cell(scene.at(study.sizes), entry, seed, (*before, part))
     cases = tuple(_cases(study, declared.cases))
     if not (chosen or cases):
-        raise PlanError(
+        raise StudyError(
             f"nothing to run: no such scene meets such a method in part{'s' * (len(study.parts) > 1)} "
             f"{', '.join(study.parts)}; see --list, or name another study"
         )
@@ -177,13 +178,13 @@ def _cases(study: Study, cases: Sequence[Case]) -> Iterator[Case]:
 
 
 def _check_user_scene(scene: Scene, known: Mapping[str, Scene], motions: Motions) -> None:
-    """Raise PlanError for a start or a motion that a user's scene names and nobody knows."""
+    """Raise StudyError for a start or a motion that a user's scene names and nobody knows."""
     chain, last = {scene.name}, scene
     while last.start_of:
         before = known.get(last.start_of)
         if before is None or not before.simulated or before.name in chain:
             others = [name for name, other in known.items() if other.simulated and name not in chain]
-            raise PlanError(
+            raise StudyError(
                 f"{last.declared_in}: scene '{last.name}': start_of='{last.start_of}': name another scene "
                 f"whose garment settles, of the run or without a motion; {nearest(last.start_of, others)}"
             )
@@ -193,14 +194,14 @@ def _check_user_scene(scene: Scene, known: Mapping[str, Scene], motions: Motions
         from snug.motion.library import LIBRARY  # loads numpy
 
         if scene.motion not in (names := [*motions.files, *LIBRARY]):
-            raise PlanError(
+            raise StudyError(
                 f"{scene.declared_in}: scene '{scene.name}': no motion is called '{scene.motion}'; "
                 f"{nearest(scene.motion, names)}"
             )
 
 
 def _check_words(study: Study, motions: Motions, declared: Declared) -> None:
-    """Raise PlanError for a word of a field that nothing has as its name."""
+    """Raise StudyError for a word of a field that nothing has as its name."""
     cases = [case.name for case in declared.cases]
     scenes, methods = list(declared.scenes), list(declared.methods)
     words: list[tuple[tuple[str, ...], Sequence[str], Sequence[str]]]
@@ -220,14 +221,14 @@ def _check_words(study: Study, motions: Motions, declared: Declared) -> None:
             what, hint = field[-1].removesuffix("s"), ""
             if what == "scene" and word.partition("/")[0] in {g.garment for g in GARMENT_SCENES}:
                 hint = " (scenes of a dressed body are the validation and test motions: see test_motions)"
-            raise PlanError(f"{study.place(*field)}: unknown {what} '{word}'; {nearest(word, known)}{hint}")
+            raise StudyError(f"{study.place(*field)}: unknown {what} '{word}'; {nearest(word, known)}{hint}")
 
 
 def roll_out_cells(study: Study, cells: Sequence[Cell], declared: Declared) -> list[Cell]:
     """Return the cells of stored roll-outs: each meets the scenes for which it has a file, in their parts.
 
     Raises:
-        PlanError: a name that a method has, or a file of one scene where several are asked for.
+        StudyError: a name that a method has, or a file of one scene where several are asked for.
         RollOutFileError: a file that cannot be read.
     """
     if not study.rollouts:
@@ -242,14 +243,14 @@ def roll_out_cells(study: Study, cells: Sequence[Cell], declared: Declared) -> l
     for option in study.rollouts.values():
         what = f"{option.name}={option.path}"
         if option.name in declared.methods:
-            raise PlanError(f"{what}: a method is called {option.name}: give another name, as in NAME=FILE")
+            raise StudyError(f"{what}: a method is called {option.name}: give another name, as in NAME=FILE")
         if len(scenes) != 1 and not option.places:
-            raise PlanError(
+            raise StudyError(
                 f"{what}: is of one scene, and {len(scenes)} are asked for: name it with --scenes, or put "
                 "{scene} into the path"
             )
         entries = {name: entry for name in scenes if (entry := entry_of(option, name))}
         if not entries:
-            raise PlanError(f"{what}: no file for {', '.join(scenes)}")
+            raise StudyError(f"{what}: no file for {', '.join(scenes)}")
         stored += [Cell(scenes[name], entry, 0, suites[name]) for name, entry in entries.items()]
     return stored

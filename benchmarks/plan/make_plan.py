@@ -16,7 +16,9 @@ from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.plan import user_files
 from benchmarks.plan.choose_cells import Declared, choose_cells
 from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Motions, Plan, PlanError
+from benchmarks.plan.study import StudyError
+from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Plan
 from benchmarks.plan.study import Study, nearest
 from benchmarks.provenance import usable_cores
 from benchmarks.results.json_file import ResultsError
@@ -115,7 +117,7 @@ def plan_scene(study: Study, name: str) -> Plan:
     read = read_files(study)
     declared = read.declared.scenes
     if name not in declared:
-        raise PlanError(f"no scene '{name}'; {nearest(name, list(declared))}")
+        raise StudyError(f"no scene '{name}'; {nearest(name, list(declared))}")
     cell = Cell(declared[name].at(study.sizes), find_method("simulation"), 0, ("speed",))
     check_body_shapes(study, read.inputs, [cell.scene])
     return Plan(
@@ -138,7 +140,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
         motions = replace(motions, worn=(scenes_of_file(study.garment), *motions.worn[1:]))
     if study.self_contact:
         if not installed("ipctk"):
-            raise PlanError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
+            raise StudyError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
         motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
     fabric_scenes, fabric_cases = tests_of_fabrics(study)
     cases = (*CASES, *fabric_cases)
@@ -163,7 +165,7 @@ def tests_of_fabrics(study: Study) -> tuple[Sequence[Scene], Sequence[Case]]:
     cases: list[Case] = []
     for field in ("fabrics", "gauge"):
         if getattr(study, field) and "fabric" not in study.parts:
-            raise PlanError(f"{study.place(field)}: only study fabric tests fabrics: benchmarks.run fabric")
+            raise StudyError(f"{study.place(field)}: only study fabric tests fabrics: benchmarks.run fabric")
     if study.fabrics is not None:
         from benchmarks.fabrics.measured import read_fabrics, spread_sample
         from benchmarks.validation.fabric.cases import percentiles
@@ -192,7 +194,7 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
     for name in names:
         if name not in {metric.name for metric in metrics}:
             what = f"{study.place('metrics')}: {name}: is no file"
-            raise PlanError(f"{what}; those of the project are measured without it")
+            raise StudyError(f"{what}; those of the project are measured without it")
     homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
     declared(homes)  # each name stands once
     return homes
@@ -205,18 +207,18 @@ def check_garment_name(file: GarmentFile) -> None:
         scenes.garment for scenes in GARMENT_SCENES
     }
     if file.name in taken:
-        raise PlanError(
+        raise StudyError(
             f"garment {file.path}: the project has scenes of that name: give the file another name"
         )
 
 
 def check_body_shapes(study: Study, inputs: Inputs, scenes: Sequence[Scene]) -> None:
-    """Raise PlanError for a user's body with fewer shapes than a scene of the project sets."""
+    """Raise StudyError for a user's body with fewer shapes than a scene of the project sets."""
     count = inputs.body.body.shape_count if inputs.body else 0
     for scene in scenes if inputs.body else ():
         needed = 0 if scene.declared_in else len(scene.options.get("betas", ()))
         if needed > count:
-            raise PlanError(
+            raise StudyError(
                 f"body {study.body}: has {count} body shapes (array 'shapedirs'), scene {scene.name} "
                 f"needs {needed}: give a body with as many, or name other scenes by --scenes"
             )
@@ -228,20 +230,20 @@ def scenes_of_file(file: GarmentFile) -> GarmentScenes:
 
 
 def choose_workers(count: int | None) -> int:
-    """Return how many processes run side by side. Raises PlanError for less than one."""
+    """Return how many processes run side by side. Raises StudyError for less than one."""
     workers = min(WORKERS, usable_cores()) if count is None else count
     if workers < 1:
-        raise PlanError(f"--workers {workers}: give a whole number, 1 or more")
+        raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
     return workers
 
 
 def choose_states(states: Sequence[str], *, fresh: bool) -> frozenset[str]:
-    """Return the states of records whose work is done again. Raises PlanError."""
+    """Return the states of records whose work is done again. Raises StudyError."""
     for state in states:
         if state not in STATES[1:]:
-            raise PlanError(f"--only: unknown state '{state}'; choose from {', '.join(STATES[1:])}")
+            raise StudyError(f"--only: unknown state '{state}'; choose from {', '.join(STATES[1:])}")
     if states and fresh:
-        raise PlanError("--fresh does everything again: leave out --only")
+        raise StudyError("--fresh does everything again: leave out --only")
     return frozenset(states or DEFAULT_ONLY)
 
 
@@ -254,9 +256,9 @@ def check_machines(study: Study, scheduler: str) -> None:
     if not scheduler:
         return
     if study.device != "cpu":
-        raise PlanError(f"{study.place('device')}: on a cluster networks train on cpu; leave out --scheduler")
+        raise StudyError(f"{study.place('device')}: on a cluster networks train on cpu; leave out --scheduler")
     if study.rollouts:
-        raise PlanError(
+        raise StudyError(
             f"{study.place('rollouts')}: its files lie on this machine alone; leave out --scheduler"
         )
     from benchmarks.process.cluster_address import check_scheduler  # loads dask
@@ -268,17 +270,17 @@ def check_trained(study: Study, folder: Path, scheduler: str) -> Path | None:
     """Return the folder of pretrained networks, None without one.
 
     Raises:
-        PlanError: it is no folder, or the run's own, where networks of another training are removed.
+        StudyError: it is no folder, or the run's own, where networks of another training are removed.
     """
     if study.trained is None:
         return None
     what = f"{study.place('trained')} {study.trained}"
     if not study.trained.is_dir():
-        raise PlanError(f"{what}: no such folder; without DIR the package's are taken")
+        raise StudyError(f"{what}: no such folder; without DIR the package's are taken")
     if study.trained.resolve() == folder.resolve():
-        raise PlanError(f"{what}: the folder of this run itself: give another by --out")
+        raise StudyError(f"{what}: the folder of this run itself: give another by --out")
     if scheduler:
-        raise PlanError(f"{what}: its files lie on this machine alone; leave out --scheduler")
+        raise StudyError(f"{what}: its files lie on this machine alone; leave out --scheduler")
     return study.trained
 
 
@@ -286,7 +288,7 @@ def choose_folder(folder: Path | None) -> Path:
     """Return the folder of the run, not created yet; one that holds a run is continued.
 
     Raises:
-        PlanError: where it cannot be made, or holds other things.
+        StudyError: where it cannot be made, or holds other things.
     """
     if folder is None:
         root = Path("reports") / "runs"
@@ -294,15 +296,15 @@ def choose_folder(folder: Path | None) -> Path:
         candidates = [root / stamp, *(root / f"{stamp}-{n}" for n in range(2, 100))]
         folder = next(path for path in candidates if not path.exists())
     elif folder.exists() and not folder.is_dir():
-        raise PlanError(f"--out {folder}: is a file; name a folder")
+        raise StudyError(f"--out {folder}: is a file; name a folder")
     elif RunFolder(folder).config_path.is_file():
         _check_run(folder)
     elif folder.is_dir() and any(folder.iterdir()):
-        raise PlanError(f"--out {folder}: is not empty and holds no run; name a new folder")
+        raise StudyError(f"--out {folder}: is not empty and holds no run; name a new folder")
     try:
         demand_writable_folder(folder)
     except ValueError as error:
-        raise PlanError(f"--out {error}") from None
+        raise StudyError(f"--out {error}") from None
     return folder
 
 
@@ -310,4 +312,4 @@ def _check_run(folder: Path) -> None:
     try:
         RunFolder(folder).read_config()
     except ResultsError as error:
-        raise PlanError(f"--out {error}; name another folder") from None
+        raise StudyError(f"--out {error}; name another folder") from None

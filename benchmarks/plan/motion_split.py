@@ -3,9 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
-from benchmarks.plan.plan import Motions, PlanError
-from benchmarks.plan.study import Study, nearest
+from benchmarks.plan.study import Study, StudyError, nearest
+from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Names of the motions of a run by their roles.
+
+    files: those that came from a user's files. dynamic_*: those measured of garments that swing. worn: the
+    garments of the run; the first is that of a run where none is named. split: the role whose motions stand
+    in the suites' scenes, "test" or "validation". few: so many of them, the first, stand there; None: all.
+    """
+
+    train: tuple[str, ...] = ()
+    test: tuple[str, ...] = ()
+    files: Collection[str] = ()
+    dynamic_test: tuple[str, ...] = ()
+    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
+    validation: tuple[str, ...] = ()
+    dynamic_validation: tuple[str, ...] = ()
+    split: str = "test"
+    few: int | None = None
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Those of the split."""
+        return (self.test if self.split == "test" else self.validation)[: self.few]
+
+    @property
+    def dynamic_measured(self) -> tuple[str, ...]:
+        """The same for garments that swing."""
+        return (self.dynamic_test if self.split == "test" else self.dynamic_validation)[: self.few]
+
+    def role_of(self, motion: str) -> str:
+        """Return its role: "training", "validation", "test", or empty where it has none in this run."""
+        roles = {
+            "test": (*self.test, *self.dynamic_test),
+            "validation": (*self.validation, *self.dynamic_validation),
+            "training": self.train,
+        }
+        return next((role for role, names in roles.items() if motion in names), "")
+
+    @property
+    def first_garment(self) -> str:
+        """The name of the first one."""
+        return self.worn[0].garment
+
+    def by_role(self, garment: str) -> dict[str, tuple[str, ...]]:
+        """Return role -> names of a garment's motions."""
+        if of_garment(garment, self.worn).dynamic:
+            return {"train": self.train, "validation": self.dynamic_validation, "test": self.dynamic_test}
+        return {"train": self.train, "validation": self.validation, "test": self.test}
+
+    def measured_of(self, garment: str) -> tuple[str, ...]:
+        """Return the names of a garment's motions of the split."""
+        return self.by_role(garment)[self.split][: self.few]
 
 
 def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
@@ -22,7 +77,7 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     library trains.
 
     Raises:
-        PlanError: a name that no motion has, or a split without motions.
+        StudyError: a name that no motion has, or a split without motions.
     """
     from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION
     from snug.motion.recorded.table import clip_of
@@ -34,12 +89,12 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     for field, chosen in (("test_motions", test_names), ("validation_motions", validation_names)):
         for name in chosen:
             if name not in names:
-                raise PlanError(f"{study.place(field)}: unknown motion '{name}'; {nearest(name, names)}")
+                raise StudyError(f"{study.place(field)}: unknown motion '{name}'; {nearest(name, names)}")
     tested = {clip_of(name) for name in (*test_names, *(TEST if with_library else ()))}
     for name in validation_names:
         if clip_of(name) in tested:
             place = study.place("validation_motions")
-            raise PlanError(f"{place}: '{name}' is a test motion; choose others")
+            raise StudyError(f"{place}: '{name}' is a test motion; choose others")
     # Whoever names motions means all of them, whatever the sizes.
     named = test_names if study.split == "test" else validation_names
     test = tuple(name for name in names if name in test_names)
@@ -63,7 +118,7 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
         few=None if named else study.sizes.test_motions,
     )
     if not motions.measured:
-        raise PlanError(
+        raise StudyError(
             f"{study.place('split')}: no motion has this role; name some by {study.split}_motions"
         )
     return motions

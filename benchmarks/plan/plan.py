@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.assets.inputs import Inputs
 from benchmarks.cell import Cell, TaskId
 from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.study import StudyError
 from benchmarks.presets import Preset
 from benchmarks.results.row import LONGEST_NAME
 from benchmarks.scene import Scene
-from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
 from benchmarks.training import Training
 
 if TYPE_CHECKING:
@@ -24,10 +25,6 @@ if TYPE_CHECKING:
 # Of a task in the folder of a run, and the states in which it is done again unless --only names others.
 STATES = ("finished", "failed", "stale", "missing")
 DEFAULT_ONLY = ("stale", "missing")
-
-
-class PlanError(ValueError):
-    """A study that cannot be run; the message names the word and what there is instead."""
 
 
 @dataclass(frozen=True)
@@ -59,60 +56,6 @@ class Network:
         return self.users_training or TRAININGS.get(self.name)
 
 
-@dataclass(frozen=True)
-class Motions:
-    """Names of the motions of a run by their roles.
-
-    files: those that came from a user's files. dynamic_*: those measured of garments that swing. worn: the
-    garments of the run; the first is that of a run where none is named. split: the role whose motions stand
-    in the suites' scenes, "test" or "validation". few: so many of them, the first, stand there; None: all.
-    """
-
-    train: tuple[str, ...] = ()
-    test: tuple[str, ...] = ()
-    files: Collection[str] = ()
-    dynamic_test: tuple[str, ...] = ()
-    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
-    validation: tuple[str, ...] = ()
-    dynamic_validation: tuple[str, ...] = ()
-    split: str = "test"
-    few: int | None = None
-
-    @property
-    def measured(self) -> tuple[str, ...]:
-        """Those of the split."""
-        return (self.test if self.split == "test" else self.validation)[: self.few]
-
-    @property
-    def dynamic_measured(self) -> tuple[str, ...]:
-        """The same for garments that swing."""
-        return (self.dynamic_test if self.split == "test" else self.dynamic_validation)[: self.few]
-
-    def role_of(self, motion: str) -> str:
-        """Return its role: "training", "validation", "test", or empty where it has none in this run."""
-        roles = {
-            "test": (*self.test, *self.dynamic_test),
-            "validation": (*self.validation, *self.dynamic_validation),
-            "training": self.train,
-        }
-        return next((role for role, names in roles.items() if motion in names), "")
-
-    @property
-    def first_garment(self) -> str:
-        """The name of the first one."""
-        return self.worn[0].garment
-
-    def by_role(self, garment: str) -> dict[str, tuple[str, ...]]:
-        """Return role -> names of a garment's motions."""
-        if of_garment(garment, self.worn).dynamic:
-            return {"train": self.train, "validation": self.dynamic_validation, "test": self.dynamic_test}
-        return {"train": self.train, "validation": self.validation, "test": self.test}
-
-    def measured_of(self, garment: str) -> tuple[str, ...]:
-        """Return the names of a garment's motions of the split."""
-        return self.by_role(garment)[self.split][: self.few]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """Everything to be done.
@@ -121,7 +64,7 @@ class Plan:
     done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
     metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. scheduler: address
     of a cluster that does what is not timed; empty: this machine does. trained: folder whose networks take
-    the place of trainings; None: networks are trained. study: what was asked, as written. Raises PlanError,
+    the place of trainings; None: networks are trained. study: what was asked, as written. Raises StudyError,
     see check_names.
     """
 
@@ -191,7 +134,7 @@ class Plan:
 
 
 def check_names(cells: Sequence[Cell]) -> None:
-    """Raise PlanError where a name makes no file, or the files of another.
+    """Raise StudyError where a name makes no file, or the files of another.
 
     In names of files slashes become hyphens, and a seed stands behind a hyphen.
     """
@@ -199,13 +142,13 @@ def check_names(cells: Sequence[Cell]) -> None:
     for cell in cells:
         for what, name in (("scene", cell.scene.name), ("method", cell.method)):
             if len(name.encode()) > LONGEST_NAME:
-                raise PlanError(
+                raise StudyError(
                     f"{what} '{name[:40]}...': its name has more than {LONGEST_NAME} bytes: shorten it"
                 )
         if cell.method == "body" or cell.method.endswith("quasi-static"):
-            raise PlanError(f"method '{cell.method}': files of the project have this name: give it another")
+            raise StudyError(f"method '{cell.method}': files of the project have this name: give it another")
         if (other := cell_of.setdefault(cell.name, cell)) is not cell:
-            raise PlanError(f"{cell.label} and {other.label} would have the same files: rename one")
+            raise StudyError(f"{cell.label} and {other.label} would have the same files: rename one")
 
 
 def runs(cell: Cell) -> bool:

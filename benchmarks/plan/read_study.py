@@ -20,7 +20,7 @@ FILE = "study.toml"  # of a study that is a folder
 PACKAGED = Path(__file__).parents[1] / "studies"
 FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
 HIDDEN = ("written", "origin", "name", "description")  # attributes that no file gives
-SHORT = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
+WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
 Field = tuple[str, ...]
 
@@ -142,7 +142,7 @@ def _layers(path: Path) -> Iterator[Layer]:
 
 def _with_tables(table: dict[str, Any]) -> dict[str, Any]:
     """Return the fields with a table for each word that may stand in place of one."""
-    table = {name: {SHORT[name]: value} if name in SHORT and isinstance(value, str) else value
+    table = {name: {WORDS_FOR_TABLES[name]: value} if name in WORDS_FOR_TABLES and isinstance(value, str) else value
              for name, value in table.items()}  # fmt: skip
     if isinstance(files := table.get("rollouts"), Mapping):
         table["rollouts"] = {n: {"path": v} if isinstance(v, str) else v for n, v in files.items()}

@@ -135,7 +135,7 @@ def cell_text(text: str) -> str:
 
 
 @cache
-def _is_name(text: str) -> bool:
+def _is_short(text: str) -> bool:
     return text.isprintable() and len(text.encode()) <= LONGEST_NAME
 
 
@@ -168,7 +168,7 @@ def cells_to_row(cells: dict[str, str]) -> Row:
             if abs(values[name]) >= 1 << 63:
                 raise ValueError("a number beyond 64 bits")
         for name in _NAMES:
-            if not _is_name(cells[name]):
+            if not _is_short(cells[name]):
                 raise ValueError(f"no name of at most {LONGEST_NAME} printable bytes")
         name = "seeded"
         values[name] = _TRUTHS[cells[name]]

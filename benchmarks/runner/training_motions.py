@@ -9,7 +9,8 @@ from pathlib import Path
 
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import study_of
-from benchmarks.plan.plan import DEFAULT_ONLY, Network, Plan, PlanError
+from benchmarks.plan.study import StudyError
+from benchmarks.plan.plan import DEFAULT_ONLY, Network, Plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
@@ -41,7 +42,7 @@ def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
         Names of the motions that were written.
 
     Raises:
-        PlanError: a simulation failed, or did not reach its last frame.
+        StudyError: a simulation failed, or did not reach its last frame.
     """
     run, assets = RunFolder(out.with_name(f"{out.name}.parts")), plan.open_assets()
     tasks = Schedule(plan).ground_truth(Network(LEARNER, 0, garment))
@@ -55,7 +56,7 @@ def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
             outcome = runner.outcomes[task.id]
             if outcome.failed or not outcome.result["whole"]:
                 why = outcome.reason or outcome.result.get("reason", "")
-                raise PlanError(f"training motion {task.scene.motion}: {outcome.status}: {why}")
+                raise StudyError(f"training motion {task.scene.motion}: {outcome.status}: {why}")
             files[task.scene.motion] = outcome.files[0]
         simulations = (
             (assets.motions[name], Trajectory.load(run.path / file).positions) for name, file in files.items()

@@ -13,7 +13,7 @@ from benchmarks import run
 from benchmarks.methods.catalogue import all_methods as methods
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.plan.make_plan import choose_folder, make_plan
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from reference_sim.files.array_file import array_names
@@ -102,7 +102,7 @@ def test_a_wrong_word_is_one_line_and_leaves_nothing(options, hint, tmp_path, mo
 
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda *_: False)
-    with pytest.raises(PlanError, match="cannot be written"):
+    with pytest.raises(StudyError, match="cannot be written"):
         choose_folder(tmp_path / "new")
 
 

@@ -16,7 +16,7 @@ from benchmarks.external.scene_files import write_obj
 from benchmarks.fingerprint.digest import digest
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
@@ -195,7 +195,7 @@ def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_chang
     np.savez(tmp_path / "hanging_sheet.npz", positions=frames + 1e-3)
     assert of_mine()[0] != key
     flags[-1] = f"mine={tmp_path}/hanging_sheet.npz"
-    with pytest.raises(PlanError, match="2 are asked for: name it with"):
+    with pytest.raises(StudyError, match="2 are asked for: name it with"):
         of_mine()
 
 

@@ -7,7 +7,7 @@ import pytest
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.plan.read_study import read_study
 from benchmarks.presets import find_preset
 from snug.motion.library import TEST, VALIDATION
@@ -41,7 +41,7 @@ def test_a_recipe_is_never_chosen_by_the_test_motions():
     assert ablations.split == "validation" and not ablations.test_motions
     motions = split_motions(ablations)
     assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
-    with pytest.raises(PlanError, match="'dance_turn' is a test motion"):
+    with pytest.raises(StudyError, match="'dance_turn' is a test motion"):
         split_motions(study_with(validation_motions="dance_turn", split="validation"))
 
 

@@ -15,7 +15,7 @@ from benchmarks.method import Method
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion.dynamics import shares_quasi_static
-from benchmarks.plan.plan import Motions
+from benchmarks.plan.motion_split import Motions
 from benchmarks.presets import find_preset
 from benchmarks.process import timing
 from benchmarks.results import frame_energies

@@ -11,7 +11,8 @@ from benchmarks.metrics import names_of
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.plan import Motions, PlanError
+from benchmarks.plan.study import StudyError
+from benchmarks.plan.motion_split import Motions
 from benchmarks.plan.study import Study
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
@@ -200,7 +201,7 @@ def test_motions_are_divided_as_help_says():
         ({"validation_motions": "d"}, "--validation_motions: unknown motion 'd'"),
         ({"test_motions": "a", "split": "validation"}, "name some by validation_motions"),
     ):
-        with pytest.raises(PlanError, match=message):
+        with pytest.raises(StudyError, match=message):
             divided(clips, **fields)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from snug.body.parametric_body import Body
 from tests.benchmarks.plan.planned import planned
 
@@ -28,7 +28,7 @@ def shapeless(tmp_path_factory) -> str:
 )
 def test_scenes_of_other_body_shapes_need_a_body_that_has_shapes(suite, scene, count, shapeless, tmp_path):
     options = (f"full:{suite}", "--body", shapeless, "-o", str(tmp_path / "run"))
-    with pytest.raises(PlanError, match=r"mine\.npz: has 0 body shapes .*'shapedirs'") as refused:
+    with pytest.raises(StudyError, match=r"mine\.npz: has 0 body shapes .*'shapedirs'") as refused:
         planned(*options)
     assert f"scene {scene} needs {count}" in str(refused.value) and "\n" not in str(refused.value)
 

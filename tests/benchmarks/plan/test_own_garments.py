@@ -7,7 +7,7 @@ from dataclasses import asdict
 import pytest
 
 from benchmarks import run as run_command
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from reference_sim.material import Material
@@ -31,7 +31,7 @@ def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, t
     assert worn == {"mine"} and {network.garment for network in plan.networks} == {"mine"}
     names = {scene.name for scene in plan.scenes}
     assert {"mine/01_01_a", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
-    with pytest.raises(PlanError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
+    with pytest.raises(StudyError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
         planned("--garment", str(path), "--scenes", "dependence/mesh/500", "-o", out)
     usual = planned("smoke", "-o", out)
     assert {scene.garment for scene in usual.scenes if scene.dressed} == {"tshirt"}
@@ -64,7 +64,7 @@ def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, 
     ("name", "error", "remedy"),
     [
         ("tshirt.obj", ValueError, "give the file another name"),
-        ("out_of_distribution.obj", PlanError, "give the file another name"),
+        ("out_of_distribution.obj", StudyError, "give the file another name"),
         ("my shirt.obj", ValueError, "give the file a name of letters and digits"),
         ("a*.obj", ValueError, "give the file a name of letters and digits"),
     ],

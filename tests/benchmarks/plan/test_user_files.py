@@ -18,7 +18,8 @@ from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.methods.outside.program import program
 from benchmarks.plan import user_files
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.plan import Motions, Plan
+from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.plan import Plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from benchmarks.runner.task_inputs import declared

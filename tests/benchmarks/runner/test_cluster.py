@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import run
 from benchmarks.plan.make_plan import check_machines
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.process import cluster_address as scheduler
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as runner_side
@@ -201,5 +201,5 @@ def test_a_worker_is_no_scheduler(two):
 @pytest.mark.parametrize(("field", "value"), [("device", "cuda"), ("rollouts", {"mine": {"path": "a.npz"}})])
 def test_what_a_cluster_cannot_do_is_refused(field, value, monkeypatch):
     monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
-    with pytest.raises(PlanError, match=f"--{field}.*leave out --scheduler"):
+    with pytest.raises(StudyError, match=f"--{field}.*leave out --scheduler"):
         check_machines(study_with(**{field: value}), "tcp://127.0.0.1:1")

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.plan.plan import Motions, Network
+from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache

@@ -12,7 +12,7 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import conservation
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.protocol.row_protocol import protocol_of
 from benchmarks.results.protocol import OWN
 from benchmarks.scenes import of_garment
@@ -137,7 +137,7 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     without = make_plan(dataclasses.replace(study, self_contact=False))
     assert not any(scene.self_contact for scene in without.scenes)
     monkeypatch.setitem(make_plan.__globals__, "installed", lambda package: False)
-    with pytest.raises(PlanError, match="--self_contact: needs the package ipctk: pip install ipctk"):
+    with pytest.raises(StudyError, match="--self_contact: needs the package ipctk: pip install ipctk"):
         make_plan(study)
 
 

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.surface import textile_tests as metrics
-from benchmarks.plan.plan import PlanError
+from benchmarks.plan.study import StudyError
 from benchmarks.presets import find_preset
 from benchmarks.scenes.textile_tests import TEXTILE_TESTS
 from benchmarks.validation.fabric.cases import DRAPE
@@ -39,7 +39,7 @@ def test_a_users_fabrics_are_tested_and_snug_is_placed_among_them(tmp_path):
     plan = planned("fabric", "--set", f"fabrics={path}")
     assert {"fabric/drape/measured/voile", "fabric/cantilever/measured/voile"} < {s.name for s in plan.scenes}
     assert {"percentile_snug", "percentile_snug_printed"} < {case.name for case in plan.cases}
-    with pytest.raises(PlanError, match="only study fabric tests fabrics"):
+    with pytest.raises(StudyError, match="only study fabric tests fabrics"):
         planned("--set", f"fabrics={path}")
 
 
@@ -51,7 +51,7 @@ def test_a_copy_of_gauge_brings_its_fabrics(tmp_path):
     assert {"simulation", *(entry.name for entry in METHODS if entry.role == "solver")} < methods
     alone = planned("fabric", "--set", f"gauge={folder}", "--scenes", "fabric/*/gauge/satin")
     assert len(alone.scenes) == 2 and not alone.cases
-    with pytest.raises(PlanError, match=r"gauge=.*: only study fabric"):
+    with pytest.raises(StudyError, match=r"gauge=.*: only study fabric"):
         planned("--set", f"gauge={folder}")
 
 

@@ -13,7 +13,9 @@ from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.plan.make_plan import check_trained
 from benchmarks.plan.options import make_parser, study_of
-from benchmarks.plan.plan import Motions, Network, Plan, PlanError
+from benchmarks.plan.study import StudyError
+from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.plan import Network, Plan
 from benchmarks.plan.study import Study
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder
@@ -160,11 +162,11 @@ def test_the_option_takes_the_package_or_a_folder(tmp_path):
 
     assert folder() is None and folder("--trained") == trained.FOLDER
     assert folder("--trained", str(tmp_path)) == tmp_path
-    with pytest.raises(PlanError, match="no such folder"):
+    with pytest.raises(StudyError, match="no such folder"):
         check_trained(Study(trained=tmp_path / "none"), tmp_path / "run", "")
-    with pytest.raises(PlanError, match="leave out --scheduler"):
+    with pytest.raises(StudyError, match="leave out --scheduler"):
         check_trained(Study(trained=tmp_path), tmp_path / "run", "tcp://there")
-    with pytest.raises(PlanError, match="the folder of this run itself: give another by --out"):
+    with pytest.raises(StudyError, match="the folder of this run itself: give another by --out"):
         check_trained(Study(trained=tmp_path), tmp_path / "deeper" / "..", "")
 
 
