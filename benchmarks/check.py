@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from benchmarks.assets.assets import Assets
-from benchmarks.cell import Cell, TaskId
 from benchmarks.contract import PrepareCell, watched_method, watched_scene
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import MethodEntry
@@ -19,9 +18,9 @@ from benchmarks.metric import Metric
 from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files
 from benchmarks.plan.make_plan import plan_scene
+from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.plan import STATES, Plan
+from benchmarks.plan.plan import STATES, Cell, Plan, TaskId
 from benchmarks.presets import find_preset
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.assets.inputs import FEWEST_FRAMES
-from benchmarks.cell import TaskId
 from benchmarks.declarations import raised_at
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import Method, MethodEntry
+from benchmarks.plan.plan import TaskId
 from benchmarks.process.errors import one_line
 from benchmarks.scene import BuiltScene, Scene
 from benchmarks.tasks.cell_task import CellTask

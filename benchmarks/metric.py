@@ -9,7 +9,7 @@ and where numbers compare a roll-out with the reference simulation
 
     compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]     name -> value
 
-which is called with the reference, and with each member of its ensemble (benchmarks.results.ensemble): the
+which is called with the reference, and with each member of its ensemble (benchmarks.results.protocol): the
 standard deviation of a number over them is its uncertainty. And where it wants curves beside the trajectory
 
     series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,), or (T,V) of every vertex
@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from benchmarks.results.ensemble import is_member
+from benchmarks.results.protocol import is_member
 from benchmarks.results.row import USABLE
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = make_parser().parse_args(command_line)
         study = study_of(options, options.study)
         if options.list:
-            from benchmarks.plan.list_names import list_names
+            from benchmarks.plan.options import list_names
 
             print_text(list_names(study))
             return 0

@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from benchmarks.cell import Cell
 from benchmarks.external.roll_out_option import (
     FileConventions,
     RollOutFileError,
@@ -26,10 +25,8 @@ from benchmarks.external.roll_out_option import (
 )
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
-from benchmarks.plan.study import StudyError
-from benchmarks.plan.plan import Plan
-from benchmarks.plan.read_study import read_study
-from benchmarks.plan.study import Study
+from benchmarks.plan.plan import Cell, Plan
+from benchmarks.plan.study import Study, StudyError, read_study
 from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 

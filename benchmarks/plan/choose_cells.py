@@ -7,12 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
-from benchmarks.cell import Cell
 from benchmarks.method import MethodEntry
 from benchmarks.metrics import MODULES
-from benchmarks.plan.study import StudyError
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.study import Part, Study, nearest
+from benchmarks.plan.motions import Motions
+from benchmarks.plan.plan import Cell
+from benchmarks.plan.study import Part, Study, StudyError, nearest
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes
 from benchmarks.validation.case import METHOD, Case

@@ -9,19 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.assets.inputs import Inputs, read_inputs
-from benchmarks.cell import Cell
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import installed
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.plan import user_files
 from benchmarks.plan.choose_cells import Declared, choose_cells
-from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.study import StudyError
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Plan
-from benchmarks.plan.study import Study, nearest
+from benchmarks.plan.motions import Motions, split_motions
+from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Cell, Plan
+from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.provenance import usable_cores
-from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
@@ -73,7 +70,7 @@ def make_plan(
         ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing has
             been created then.
 
-    >>> from benchmarks.plan.read_study import option, read_study
+    >>> from benchmarks.plan.study import option, read_study
     >>> study = read_study("default", [option("", "scenes", "flag"), option("", "methods", "simulation")])
     >>> [scene.name for scene in make_plan(study).scenes]
     ['flag']
@@ -256,7 +253,9 @@ def check_machines(study: Study, scheduler: str) -> None:
     if not scheduler:
         return
     if study.device != "cpu":
-        raise StudyError(f"{study.place('device')}: on a cluster networks train on cpu; leave out --scheduler")
+        raise StudyError(
+            f"{study.place('device')}: on a cluster networks train on cpu; leave out --scheduler"
+        )
     if study.rollouts:
         raise StudyError(
             f"{study.place('rollouts')}: its files lie on this machine alone; leave out --scheduler"

@@ -3,23 +3,92 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets.inputs import Inputs
-from benchmarks.cell import Cell, TaskId
+from benchmarks.external.roll_out_option import MODULE as STORED
+from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import StudyError
-from benchmarks.presets import Preset
+from benchmarks.presets import Preset, find_preset
+from benchmarks.results.protocol import NUMBER, OWN
 from benchmarks.results.row import LONGEST_NAME
 from benchmarks.scene import Scene
+from benchmarks.scenes import all_scenes
 from benchmarks.training import Training
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
     from benchmarks.validation.case import Case
+
+TaskId = tuple[str, str]  # kind and name of a task
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One scene computed by one method with one seed; `suites` are those that report it."""
+
+    scene: Scene
+    entry: MethodEntry
+    seed: int
+    suites: tuple[str, ...]
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return self.entry.name
+
+    @property
+    def label(self) -> str:
+        """Scene, method and seed for messages."""
+        return f"{self.scene.name} x {self.method}" + (f" (seed {self.seed})" if self.seed else "")
+
+    @property
+    def name(self) -> str:
+        """<scene>/<method>, and the seed where it is not 0: part of paths and of ids."""
+        return f"{flat(self.scene.name)}/{flat(self.method)}" + (f"-seed{self.seed}" if self.seed else "")
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """Scene, method and seed, by which RunFolder names its files."""
+        return self.scene.name, self.method, self.seed
+
+    @property
+    def task_id(self) -> TaskId:
+        """Id of the task that runs the cell."""
+        return "cell", self.name
+
+    @property
+    def metrics_id(self) -> TaskId:
+        """Id of the task that measures the cell's trajectory."""
+        return "metrics", self.name
+
+    @property
+    def batch_id(self) -> TaskId:
+        """Id of the task that times many bodies at once."""
+        return "batch", self.name
+
+    def repeat_id(self, number: int) -> TaskId:
+        """Return the id of a repeat for its time alone; `number` counts from 1."""
+        return "repeat", f"{self.name}-{number}"
+
+    @property
+    def timed(self) -> bool:
+        """True if its costs are measured; other cells run side by side."""
+        return self.scene.timed and self.entry.timed
+
+
+def flat(name: str) -> str:
+    """Return a name as part of a path.
+
+    >>> flat("tshirt/walk")
+    'tshirt-walk'
+    """
+    return name.replace("/", "-")
 
 
 # Of a task in the folder of a run, and the states in which it is done again unless --only names others.
@@ -73,7 +142,7 @@ class Plan:
     cells: tuple[Cell, ...]
     cases: tuple[Case, ...]
     metrics: tuple[str, ...] = ()
-    motions: Motions = Motions()
+    motions: Motions = field(default_factory=Motions)
     inputs: Inputs = field(default_factory=Inputs)
     seeds: tuple[int, ...]
     device: str
@@ -163,3 +232,50 @@ def network_of(cell: Cell) -> Network | None:
         return None
     home = entry.declared_in if entry.training else ""
     return Network(entry.trained, cell.seed, cell.scene.garment, entry.training, home)
+
+
+def protocol_of(cell: Cell, plan: Plan) -> str:
+    """Return the protocol of a cell's rows: its number, or OWN where scene or settings are a user's.
+
+    Settings are the preset, the body, the garment with its material, the motion, the reference, and what the
+    project's own networks train on.
+    """
+    scene, inputs = cell.scene, plan.inputs
+    given = scene.dressed and (inputs.body or scene.motion in inputs.motions)
+    if given or plan.preset != find_preset(plan.preset.name) or not _is_declared(scene, plan.preset.name):
+        return OWN
+    if any(c.entry.role == "reference" and c.entry.module == STORED for c in plan.cells if c.scene == scene):
+        return OWN
+    network = network_of(cell)
+    return NUMBER if network is None or network.users_training or _trains_as_declared(plan) else OWN
+
+
+def protocol_of_case(scene: str, metric: str) -> str:
+    """Return the protocol of a row that no cell gives: OWN of a case that is not the project's."""
+    known = scene in _places() or (scene, metric) in _places()
+    return NUMBER if known else OWN
+
+
+@cache
+def _places() -> frozenset[Any]:
+    from benchmarks.validation.registry import CASES
+
+    return frozenset({case.name for case in CASES} | {(case.scene, case.metric) for case in CASES})
+
+
+@cache
+def _declared_with(motion: str) -> dict[str, Scene]:
+    motions = (motion,) * bool(motion)
+    return all_scenes(motions, motions)
+
+
+def _is_declared(scene: Scene, preset: str) -> bool:
+    """Return whether the project declares the scene so; a run may leave out what is measured in it."""
+    declared = _declared_with(scene.motion).get(scene.name)
+    return declared is not None and replace(declared.at(find_preset(preset)), metrics=scene.metrics) == scene
+
+
+def _trains_as_declared(plan: Plan) -> bool:
+    from snug.motion.library import TRAIN
+
+    return plan.motions.train == TRAIN[: plan.preset.train_motions] and not plan.inputs.motions

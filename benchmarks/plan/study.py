@@ -1,18 +1,25 @@
-"""Study: everything that is asked of a run, as fields of a TOML file (benchmarks/plan/read_study.py)."""
+"""Study: everything that is asked of a run, read from a TOML file and from options.
+
+Every field is an attribute of a dataclass, whose type says what it takes.
+"""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import re
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from types import UnionType
+from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
 
-from benchmarks.assets.inputs import FEWEST_FRAMES
-from benchmarks.external.roll_out_option import RollOutOption
-from benchmarks.presets import Preset, find_preset
+from benchmarks.assets.inputs import FEWEST_FRAMES, LIBRARY
+from benchmarks.external.roll_out_option import RollOutOption, roll_out_of
+from benchmarks.presets import PRESETS, Preset, find_preset
 from snug.garments.options import GarmentFile
 from snug.motion.options import MotionFileOptions
+from snug.trained import FOLDER
 
 PARTS = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "engines")  # that reports know
 
@@ -151,3 +158,266 @@ def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> s
     """Return the names that a wrong word may have meant, as the end of a message."""
     near = difflib.get_close_matches(word, names, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(near)}?" if near else otherwise
+
+
+FILE = "study.toml"  # of a study that is a folder
+PACKAGED = Path(__file__).parents[1] / "studies"
+FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
+HIDDEN = ("written", "origin", "name", "description")  # attributes that no file gives
+WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
+KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
+Field = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Fields of one place: a file, or an option, whose label it has. The first that has a field decides."""
+
+    label: str
+    table: dict[str, Any]
+    text: str = ""
+    folder: Path = Path()
+
+    def has(self, field: Field) -> bool:
+        """Return whether the field stands here."""
+        table: Any = self.table
+        for name in field:
+            if not isinstance(table, Mapping) or name not in table:
+                return False
+            table = table[name]
+        return True
+
+
+def read_study(word: str = "default", options: Sequence[Layer] = ()) -> Study:
+    """Return the study of that name or path, with fields from options in place of its own.
+
+    Args:
+        word: name of a study of the package, or path of a file or folder; behind a colon the names of parts,
+            as in full:garments,speed, for these alone.
+        options: later ones hold before earlier ones.
+
+    Raises:
+        StudyError: no such study, or a field that cannot be meant: file, line, field, and what is near it.
+
+    >>> read_study("full:speed", [option("--seeds", "seeds", [1, 2])]).seeds
+    (1, 2)
+    """
+    name, _, chosen = word.partition(":")
+    layers = [*reversed(options), *_layers(find_study(name))]
+    merged: dict[str, Any] = {}
+    for layer in reversed(layers):
+        merged = _merged(merged, layer.table)
+    merged.pop("like", None)
+    parts = merged.get("parts", {})
+    for part in filter(None, chosen.split(",")):
+        if part not in parts:
+            raise StudyError(f"study {name}: no part '{part}'; it has {', '.join(parts)}")
+    if chosen:
+        merged["parts"] = {part: table for part, table in parts.items() if part in chosen.split(",")}
+    reader = _Reader(layers)
+    study: Study = reader.dataclass_of(Study, merged, ())
+    return replace(study, written={"name": word, **merged}, origin=reader.place)
+
+
+def find_study(name: str) -> Path:
+    """Return the file of a study. Raises StudyError."""
+    path = Path(name)
+    places = [PACKAGED / f"{name}.toml", path, path / FILE, *(folder / name / FILE for folder in FOLDERS)]
+    for place in places:
+        if place.is_file():
+            return place
+    raise StudyError(f"no study '{name}': name one, or a file or folder with {FILE}; "
+                     f"{nearest(name, study_names())}")  # fmt: skip
+
+
+def study_names() -> list[str]:
+    """Return the names of the package's studies, and of those with code that lie beside it."""
+    with_code = {path.parent.name: None for folder in FOLDERS for path in sorted(folder.glob(f"*/{FILE}"))}
+    return [*(path.stem for path in sorted(PACKAGED.glob("*.toml"))), *with_code]
+
+
+def option(label: str, field: str, value: Any) -> Layer:
+    """Return the layer of an option that gives one field, dotted where it is one of a table."""
+    table = value
+    for name in reversed(_names(field)):
+        table = {name: table}
+    return Layer(label, _with_tables(table))
+
+
+def parse_setting(text: str) -> Layer:
+    """Return the layer of --set field=value. Raises StudyError.
+
+    >>> parse_setting("sizes.frames=60").table, parse_setting("seeds=0,1").table
+    ({'sizes': {'frames': 60}}, {'seeds': [0, 1]})
+    """
+    field, equals, value = text.partition("=")
+    if not (field.strip() and equals and value.strip()):
+        raise StudyError(f"--set {text}: give field=value, as in seeds=0,1,2 or sizes.frames=60")
+    return option(f"--set {text}", field, _value(value.strip()))
+
+
+def _value(text: str) -> Any:
+    """Return a value of TOML, a list where there are commas, else the text."""
+    try:
+        return tomllib.loads(f"x = {text}")["x"]
+    except tomllib.TOMLDecodeError:
+        return [_value(word.strip()) for word in text.split(",") if word.strip()] if "," in text else text
+
+
+def _layers(path: Path) -> Iterator[Layer]:
+    """Yield the fields of a file, then those of the study that it is like, and so on."""
+    seen: list[Path] = []
+    while path not in seen:
+        seen.append(path)
+        try:
+            text = path.read_text(encoding="utf-8")
+            table = tomllib.loads(text)
+        except (OSError, ValueError) as error:
+            raise StudyError(f"{path}: not readable as TOML ({' '.join(str(error).split())})") from None
+        folder = Path() if path.parent == PACKAGED else path.parent
+        yield Layer(str(path), _with_tables(table), text, folder)
+        if "like" not in table:
+            return
+        like = str(table["like"])
+        beside = path.parent / like
+        path = beside if beside.is_file() else find_study(str(beside) if beside.is_dir() else like)
+    raise StudyError(f"{path}: like = '{like}': is like itself")
+
+
+def _with_tables(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields with a table for each word that may stand in place of one."""
+    meant = {name: WORDS_FOR_TABLES[name] for name in WORDS_FOR_TABLES if isinstance(table.get(name), str)}
+    table = table | {name: {field: table[name]} for name, field in meant.items()}
+    if isinstance(files := table.get("rollouts"), Mapping):
+        table["rollouts"] = {n: {"path": v} if isinstance(v, str) else v for n, v in files.items()}
+    return table
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of both; tables are joined, all else is that of `above`."""
+    both = {
+        name for name in above if isinstance(below.get(name), Mapping) and isinstance(above[name], Mapping)
+    }
+    return {**below, **above, **{name: _merged(below[name], above[name]) for name in both}}
+
+
+def _names(dotted: str) -> list[str]:
+    return [name.strip("\"'") for name in re.findall(r"\"[^\"]*\"|'[^']*'|[^.\s]+", dotted)]
+
+
+def line_of(text: str, field: Field) -> int:
+    r"""Return the number of the line that gives a field, or else the table that it belongs to.
+
+    >>> line_of("[sizes]\nframes = 2", ("sizes", "frames"))
+    2
+    """
+    header: list[str] = []
+    best, line = 0, 1
+    for number, words in enumerate(text.splitlines(), 1):
+        if match := re.match(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?$", words):
+            header = name = _names(match[1])
+        elif match := re.match(r"\s*([\w.\"'-]+)\s*=", words):
+            name = [*header, *_names(match[1])]
+        else:
+            continue
+        if len(name) > best and tuple(name) == field[: len(name)]:
+            best, line = len(name), number
+    return line
+
+
+class _Reader:
+    """Values of fields by the types of dataclasses."""
+
+    def __init__(self, layers: Sequence[Layer]) -> None:
+        self.layers = layers
+
+    def layer(self, field: Field) -> Layer:
+        """Return the layer that decides a field; of one that is absent, that of the file."""
+        return next((layer for layer in self.layers if layer.has(field)), self.layers[-1])
+
+    def place(self, field: Field) -> str:
+        """Return where a field was said."""
+        layer = self.layer(field)
+        return (
+            f"{layer.label}: line {line_of(layer.text, field)}: {'.'.join(field)}"
+            if layer.text
+            else layer.label
+        )
+
+    def refuse(self, field: Field, message: str) -> NoReturn:
+        """Raise StudyError with the place."""
+        raise StudyError(f"{self.place(field)}: {message}")
+
+    def dataclass_of(self, kind: Any, table: Any, field: Field) -> Any:
+        """Return an object of a dataclass from the table of its fields."""
+        if not isinstance(table, Mapping):
+            self.refuse(field, f"{table!r}: give a table")
+        if kind is RollOutOption:
+            place = {"path": str(self.layer(field).folder / str(table.get("path", "")))}
+            return self.checked(field, lambda: roll_out_of(field[-1], {**table, **place}))
+        declared = {f.name: f for f in fields(kind) if f.name not in HIDDEN}
+        for name in table:
+            if name not in declared and (kind, name) != (Preset, "base"):
+                names = ", ".join(declared)
+                near = nearest(name, list(declared), otherwise=f"there are {names}")
+                self.refuse((*field, name), f"no field is called '{name}'; {near}")
+        if kind is Preset:
+            return self.sizes(table, declared, field)
+        for name, f in declared.items():
+            if f.default is MISSING and f.default_factory is MISSING and name not in table:
+                self.refuse(field, f"{name} is absent: give it")
+        hints = get_type_hints(kind)
+        values = {name: self.value(hints[name], value, (*field, name)) for name, value in table.items()}
+        return self.checked(field, lambda: kind(**values))
+
+    def checked(self, field: Field, make: Any) -> Any:
+        """Return what `make` makes; what it refuses gets its place."""
+        try:
+            return make()
+        except ValueError as error:
+            self.refuse((*field, *getattr(error, "field", ())), str(error))
+
+    def sizes(self, table: Mapping[str, Any], declared: Any, field: Field) -> Preset:
+        """Return the sizes that `base` names, with changes."""
+        base = table.get("base", "quick")
+        if base not in (names := [preset.name for preset in PRESETS]):
+            self.refuse((*field, "base"), f"no sizes are called '{base}'; choose from {', '.join(names)}")
+        preset, hints = find_preset(base), get_type_hints(Preset)
+        changes = {name: value for name, value in table.items() if name != "base"}
+        whole = _merged({name: asdict(preset)[name] for name in declared}, changes)
+        return replace(preset, **{n: self.value(hints[n], whole[n], (*field, n)) for n in changes})
+
+    def value(self, hint: Any, value: Any, field: Field) -> Any:
+        """Return the value of a field as its type asks for it."""
+        origin, types = get_origin(hint), get_args(hint)
+        if origin is UnionType:  # of a type and None
+            return None if value is None else self.value(types[0], value, field)
+        if origin is Literal:
+            if value not in types:
+                self.refuse(field, f"{value!r}: choose from {', '.join(filter(None, types))}")
+            return value
+        if origin is tuple:
+            values = value if isinstance(value, list | tuple) else [value]
+            if types[-1] is not Ellipsis and len(values) != len(types):
+                self.refuse(field, f"{value!r}: give {len(types)} numbers")
+            return tuple(self.value(types[0], v, field) for v in values)
+        if origin in (dict, Mapping):
+            if not isinstance(value, Mapping):
+                self.refuse(field, f"{value!r}: give a table")
+            return {name: self.value(types[1], v, (*field, name)) for name, v in value.items()}
+        if is_dataclass(hint):
+            return self.dataclass_of(hint, value, field)
+        return self.word(hint, value, field)
+
+    def word(self, kind: Any, value: Any, field: Field) -> Any:
+        """Return a number, a text or a path; paths of a file are relative to its folder."""
+        if kind is Path and field == ("trained",) and isinstance(value, bool):
+            return FOLDER if value else None
+        if kind is float and type(value) is int:
+            return float(value)
+        if type(value) is not (str if kind is Path else kind):
+            self.refuse(field, f"{value!r}: give {KINDS.get(kind, 'a path')}")
+        if kind is Path:
+            return self.layer(field).folder / value
+        file = kind is str and (value.endswith(".py") or (field == ("motions",) and value != LIBRARY))
+        return str(self.layer(field).folder / value) if file else value

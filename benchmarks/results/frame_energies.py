@@ -13,8 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.results.json_file import ResultsError
-from benchmarks.results.row import Row
+from benchmarks.results.row import ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
 

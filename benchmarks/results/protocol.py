@@ -1,4 +1,4 @@
-"""Number of the benchmark's protocol, its recorded digests, and the rules of verdicts that reports apply.
+"""Protocol: its number and digests, the ensemble of the reference, and the rules of verdicts of reports.
 
 The number stands for all that a result depends on and that no method brings itself. Two numbers of the same
 protocol can stand in one table.
@@ -6,10 +6,11 @@ protocol can stand in one table.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from benchmarks.fingerprint.digest import digest
-from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import ResultsError
 
 NUMBER = "1.0"
 # Part of the protocol -> digest of its definitions. tests/benchmarks/test_protocol.py holds the code to them.
@@ -55,3 +56,41 @@ def one_protocol(protocols: Iterable[str], where: object) -> str:
             "older ones again, in a new folder or with --fresh"
         )
     return numbers[0] if numbers else ""
+
+
+# Family and level of each member: a start perturbed by 1e-4 m, contact planes searched twice in each step, a
+# tolerance a hundred times tighter. A simulation with another time step is none: it solves another problem.
+MEMBERS = {
+    "simulation-perturbed-1e-4": ("simulation-perturbed", 1e-4),
+    "simulation-refrozen": ("simulation-refrozen", None),
+    "simulation-1e-8": ("simulation-tolerance", 1e-8),
+}
+LEAST_MEMBERS = 2  # of which a spread is taken
+
+
+def is_member(family: str, level: float | None) -> bool:
+    """Return whether methods of that family and level belong to the ensemble.
+
+    >>> is_member("simulation-refrozen", None), is_member("simulation-perturbed", 1e-9)
+    (True, False)
+    """
+    return (family, level) in MEMBERS.values()
+
+
+def spread(changes: Iterable[float]) -> float | None:
+    """Return the standard deviation (n - 1) of a number over the reference and the members of its ensemble.
+
+    Args:
+        changes: by how much each member changes the number when it takes the reference's place.
+
+    Returns:
+        The standard deviation in the unit of the changes; None for fewer than LEAST_MEMBERS.
+
+    >>> spread([0.1, -0.1]), spread([0.1])
+    (0.1, None)
+    """
+    values = [0.0, *changes]
+    if len(values) <= LEAST_MEMBERS:
+        return None
+    mean = sum(values) / len(values)
+    return math.sqrt(sum((value - mean) ** 2 for value in values) / (len(values) - 1))

@@ -8,12 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from benchmarks.cell import Cell, TaskId
 from benchmarks.metrics import find_metric
-from benchmarks.plan.plan import Plan
-from benchmarks.protocol.row_protocol import protocol_of, protocol_of_case
-from benchmarks.results.ensemble import is_member, spread
-from benchmarks.results.protocol import OWN
+from benchmarks.plan.plan import Cell, Plan, TaskId, protocol_of, protocol_of_case
+from benchmarks.results.protocol import OWN, is_member, spread
 from benchmarks.results.row import DECLARED, PRETRAINED, Row
 from benchmarks.tasks.pretrained_network import NAME
 from benchmarks.tasks.task import Outcome, Task

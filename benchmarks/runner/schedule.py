@@ -10,14 +10,13 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.cell import Cell, flat
 from benchmarks.fingerprint.dependencies import find_module
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.metrics import names_of
-from benchmarks.plan.plan import Network, Plan, network_of, runs
+from benchmarks.plan.plan import Cell, Network, Plan, flat, network_of, runs
 from benchmarks.runner import task_inputs
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.task_inputs import TaskInputs, code_behind, declared, users_code

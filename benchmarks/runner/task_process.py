@@ -10,8 +10,8 @@ from contextlib import suppress
 from multiprocessing.queues import SimpleQueue
 from typing import Any
 
-from benchmarks.cell import TaskId
 from benchmarks.fingerprint.digest import damaged
+from benchmarks.plan.plan import TaskId
 from benchmarks.process.isolated_process import IsolatedProcess, WorkerDied, new_processes
 from benchmarks.process.memory import give_back
 from benchmarks.tasks.task import Context, Outcome, RunStopped, Task, failure, tell_nobody

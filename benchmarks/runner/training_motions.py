@@ -9,8 +9,8 @@ from pathlib import Path
 
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import study_of
-from benchmarks.plan.study import StudyError
 from benchmarks.plan.plan import DEFAULT_ONLY, Network, Plan
+from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor

@@ -16,10 +16,10 @@ from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import Plan
-from benchmarks.plan.read_study import read_study
+from benchmarks.plan.study import read_study
 from benchmarks.presets import find_preset
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import NUMBER
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from snug.motion.library import TEST
 

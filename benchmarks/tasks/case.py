@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from benchmarks.cell import TaskId
+from benchmarks.plan.plan import TaskId
 from benchmarks.results.row import Row
 from benchmarks.tasks.task import Context, Outcome, Task
 

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from benchmarks.cell import Cell, TaskId
 from benchmarks.method import Method
+from benchmarks.plan.plan import Cell, TaskId
 from benchmarks.process.memory import peak_memory
 from benchmarks.process.timing import Reading, clocked
 from benchmarks.results.run_folder import RunFolder

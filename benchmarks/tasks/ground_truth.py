@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.cell import TaskId, flat
 from benchmarks.method import MethodEntry
+from benchmarks.plan.plan import TaskId, flat
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import BuiltScene, Scene
 from benchmarks.tasks.cell_task import build_scene

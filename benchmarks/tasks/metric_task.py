@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.cell import Cell, TaskId
 from benchmarks.declarations import load
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
+from benchmarks.plan.plan import Cell, TaskId
 from benchmarks.process.errors import one_line
-from benchmarks.results.ensemble import spread
 from benchmarks.results.frame_energies import SECONDS
+from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.cell_task import build_scene

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
-from benchmarks.cell import TaskId
 from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.plan.plan import TaskId
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.tasks.task import Context, Outcome, Task
 from benchmarks.tasks.training import TrainNetwork, facts_of

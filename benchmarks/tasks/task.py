@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from benchmarks.cell import TaskId
+from benchmarks.plan.plan import TaskId
 from benchmarks.process.errors import one_line
 from benchmarks.process.isolated_process import WorkerDied
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
-from benchmarks.cell import TaskId
 from benchmarks.declarations import load
 from benchmarks.fingerprint.digest import digest
+from benchmarks.plan.plan import TaskId
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.tasks.task import Context, Outcome, Task
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import LEVEL, one_protocol
-from benchmarks.results.run_config import OF_SCENES
+from benchmarks.results.row import ResultsError
+from benchmarks.results.run_folder import OF_SCENES
 from reports.comparison.change import (
     BETTER,
     GONE,

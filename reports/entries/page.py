@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.entries.tables import Scored, entries_tables, of_entry
 from reports.page.page_data import table_data

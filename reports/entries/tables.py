@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlencode
 
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import LEAST_MOTIONS
-from benchmarks.results.row import DECLARED
+from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import Run
 from reports.statistics.effects import Effect

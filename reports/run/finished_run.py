@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.results.ensemble import is_member
+from benchmarks.results.protocol import is_member
 from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row
 from reports.run.training_histories import History
 

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.results import frame_energies
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import one_protocol
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder, model_path
 from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.trajectory import Trajectory, TrajectoryError

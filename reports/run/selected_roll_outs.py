@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.trajectory import Trajectory
 from reports.run.finished_run import Run

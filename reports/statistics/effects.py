@@ -15,8 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.results.ensemble import LEAST_MEMBERS, spread
-from benchmarks.results.protocol import DRAWS, LEVEL, SEED, SOFTENING, TIE
+from benchmarks.results.protocol import DRAWS, LEAST_MEMBERS, LEVEL, SEED, SOFTENING, TIE, spread
 from reports.statistics.means_and_spreads import Mean
 
 RATIO, EXCESS, DIFFERENCE = "ratio", "excess", "difference"  # scales

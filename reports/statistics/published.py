@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import LEVEL, OWN
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.run.finished_run import Run
 from reports.run.reading import read_run

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from benchmarks.results.ensemble import LEAST_MEMBERS
+from benchmarks.results.protocol import LEAST_MEMBERS
 from reports.run.finished_run import Run
 
 # Metric -> its value where a roll-out equals the reference.

@@ -10,7 +10,7 @@ from importlib import import_module
 from benchmarks.declarations import attributes_of
 from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
-from benchmarks.plan.read_study import PACKAGED, read_study
+from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
 from reports.text.metric_families import family_rows
 from snug.recipes.named import RECIPES

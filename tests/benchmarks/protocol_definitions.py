@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results import protocol as recorded
-from benchmarks.results.ensemble import LEAST_MEMBERS, MEMBERS
+from benchmarks.results.protocol import LEAST_MEMBERS, MEMBERS
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes
 from reference_sim.minimise.newton import Newton

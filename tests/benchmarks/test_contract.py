@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from benchmarks import check
-from benchmarks.cell import Cell
 from benchmarks.contract import ContractError, check_derivatives, watched_method
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.make_plan import check_garment_name
+from benchmarks.plan.plan import Cell
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.tasks.cell_task import BatchCell, RunCell
 from benchmarks.tasks.ground_truth import SettleStart

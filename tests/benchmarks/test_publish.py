@@ -7,11 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from benchmarks import publish as command
 from benchmarks.provenance import commit
-from benchmarks.publish import __main__ as command
-from benchmarks.publish.__main__ import PublishError, all_usable, keep, publish
-from benchmarks.results.json_file import ResultsError
-from benchmarks.results.row import Row
+from benchmarks.publish import PublishError, all_usable, keep, publish
+from benchmarks.results.row import ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
 
 FALL = """question = "?"

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.results import frame_energies
-from benchmarks.results.json_file import ResultsError
 from benchmarks.results.protocol import NUMBER, OWN
-from benchmarks.results.row import COLUMNS, Row, with_provenance
-from benchmarks.results.run_config import FORMAT
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.row import COLUMNS, ResultsError, Row, with_provenance
+from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
 from reports.run.reading import read_run
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from benchmarks import run, score
-from benchmarks.cell import Cell
 from benchmarks.external.scene_files import write_obj
 from benchmarks.fingerprint.digest import digest
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.plan.plan import Cell
 from benchmarks.plan.study import StudyError
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder

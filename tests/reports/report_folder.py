@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.results.row import Row
-from benchmarks.results.run_config import FORMAT
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
 from reports.blocks.block import Report
 from reports.run.finished_run import NoRollOuts, Run, make_run

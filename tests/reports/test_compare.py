@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.results.json_file import ResultsError
+from benchmarks.results.row import ResultsError
 from reports import compare as command
 from reports.comparison.compare_runs import compare
 from tests.reports.report_folder import row, run_folder, run_of

@@ -12,8 +12,7 @@ from safetensors.numpy import save_file
 
 from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.results.row import COLUMNS
-from benchmarks.results.run_config import FORMAT
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build
 from reports.blocks import FIGURES
 from reports.document.content import changed_files

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.method import MethodEntry, Reporting
-from benchmarks.results.ensemble import MEMBERS
+from benchmarks.results.protocol import MEMBERS
 
 SHIFTS = (1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4)  # [m]
 _SIMULATION = "benchmarks.methods.solvers.simulation"

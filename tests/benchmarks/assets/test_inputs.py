@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.inputs import InputError, read_inputs
-from benchmarks.plan.read_study import read_study
+from benchmarks.plan.study import read_study
 from benchmarks.runner.execute_plan import check_roll_outs
 from benchmarks.score import plan_score
 from snug.body.parametric_body import Body

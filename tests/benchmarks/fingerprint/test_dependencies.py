@@ -153,9 +153,9 @@ def test_a_file_in_a_package_counts_with_the_package_and_one_installed_without_w
 
 # What tasks import and what decides no result: names, files and their formats, origin, sizes that are inputs.
 CARRYING = (
-    "benchmarks/cell.py", "benchmarks/declarations.py", "benchmarks/fingerprint", "benchmarks/presets.py",
-    "benchmarks/provenance.py", "benchmarks/results", "benchmarks/tasks/task.py", "benchmarks/training.py",
-    "snug/trained", *dependencies.NO_RESULT,
+    "benchmarks/plan/plan.py", "benchmarks/declarations.py", "benchmarks/fingerprint",
+    "benchmarks/presets.py", "benchmarks/provenance.py", "benchmarks/results", "benchmarks/tasks/task.py",
+    "benchmarks/training.py", "snug/trained", *dependencies.NO_RESULT,
 )  # fmt: skip
 TASKS = {
     "simulation": ("benchmarks/tasks/ground_truth.py", *task_inputs.RUNS, *task_inputs.SOLVERS,

@@ -6,9 +6,8 @@ import pytest
 
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.study import StudyError
-from benchmarks.plan.read_study import read_study
+from benchmarks.plan.motions import split_motions
+from benchmarks.plan.study import StudyError, read_study
 from benchmarks.presets import find_preset
 from snug.motion.library import TEST, VALIDATION
 from snug.recipes.deviations import DEVIATIONS

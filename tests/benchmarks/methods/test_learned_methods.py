@@ -8,7 +8,7 @@ import torch
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.methods.catalogue.trainings import LEARN_FROM_SIMULATIONS, TRAININGS
 from benchmarks.plan.choose_cells import matching
-from benchmarks.plan.read_study import read_study
+from benchmarks.plan.study import read_study
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from snug.networks.architectures import ARCHITECTURES

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.assets import embedded_motions, open_assets
-from benchmarks.cell import Cell
 from benchmarks.method import Method
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion.dynamics import shares_quasi_static
-from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.motions import Motions
+from benchmarks.plan.plan import Cell
 from benchmarks.presets import find_preset
 from benchmarks.process import timing
 from benchmarks.results import frame_energies
-from benchmarks.results.ensemble import LEAST_MEMBERS, is_member
+from benchmarks.results.protocol import LEAST_MEMBERS, is_member
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner

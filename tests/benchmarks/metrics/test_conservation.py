@@ -8,12 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import conservation
 from benchmarks.metrics.motion.conservation import law_series
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.scene import Dressed

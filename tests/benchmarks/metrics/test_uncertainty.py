@@ -14,7 +14,7 @@ from benchmarks.metrics.motion import dynamics
 from benchmarks.metrics.motion.hem import HemMotion
 from benchmarks.metrics.surface import curvature
 from benchmarks.metrics.surface import penetration_and_distances as geometry
-from benchmarks.results.ensemble import MEMBERS, is_member
+from benchmarks.results.protocol import MEMBERS, is_member
 from benchmarks.results.row import Row
 from benchmarks.runner.rows import with_uncertainty
 from benchmarks.tasks.metric_task import compared, measured

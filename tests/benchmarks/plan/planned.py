@@ -8,8 +8,7 @@ from typing import Any
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, study_of
 from benchmarks.plan.plan import Plan
-from benchmarks.plan.read_study import option, read_study
-from benchmarks.plan.study import Study
+from benchmarks.plan.study import Study, option, read_study
 
 
 def planned(*words: str) -> Plan:

@@ -10,10 +10,8 @@ from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.metrics import names_of
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.motion_split import split_motions
-from benchmarks.plan.study import StudyError
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.study import Study
+from benchmarks.plan.motions import Motions, split_motions
+from benchmarks.plan.study import Study, StudyError
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
 from tests.benchmarks.plan.planned import planned, study_with

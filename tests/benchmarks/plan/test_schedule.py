@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
-from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.plan import Network
+from benchmarks.plan.motions import Motions
+from benchmarks.plan.plan import Cell, Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks.metric_task import _training_poses

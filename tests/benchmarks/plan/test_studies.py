@@ -9,10 +9,9 @@ import pytest
 
 from benchmarks import run
 from benchmarks.plan.options import OF_SCENES, REPLACED, SHORT
-from benchmarks.plan.read_study import line_of, parse_setting, read_study, study_names
-from benchmarks.plan.study import Study, StudyError
+from benchmarks.plan.study import Study, StudyError, line_of, parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
-from benchmarks.publish.__main__ import published_studies
+from benchmarks.publish import published_studies
 from reports.blocks import FIGURES
 from snug.trained import FOLDER
 from tests.benchmarks.plan.planned import planned, study_with

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from benchmarks import metric, run
-from benchmarks.cell import Cell
 from benchmarks.declarations import DeclarationError
 from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
@@ -18,8 +17,8 @@ from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.methods.outside.program import program
 from benchmarks.plan import user_files
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.motions import Motions
+from benchmarks.plan.plan import Cell, Plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from benchmarks.runner.task_inputs import declared

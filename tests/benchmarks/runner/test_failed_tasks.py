@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
-from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
-from benchmarks.plan.motion_split import Motions
+from benchmarks.plan.motions import Motions
+from benchmarks.plan.plan import Cell
 from benchmarks.process.timing import Reading
 from benchmarks.results.row import Row
 from benchmarks.runner.console import remarks, summary

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from benchmarks.assets.assets import Assets
-from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import extrapolation
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.rows import rows_of_cell

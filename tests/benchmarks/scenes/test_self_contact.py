@@ -12,8 +12,8 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import conservation
 from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.plan import protocol_of
 from benchmarks.plan.study import StudyError
-from benchmarks.protocol.row_protocol import protocol_of
 from benchmarks.results.protocol import OWN
 from benchmarks.scenes import of_garment
 from benchmarks.scenes.self_contact import with_self_contact

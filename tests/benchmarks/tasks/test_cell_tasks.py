@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.program import program
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder

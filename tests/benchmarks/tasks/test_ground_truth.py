@@ -8,11 +8,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.plan import Network
+from benchmarks.plan.motions import Motions
+from benchmarks.plan.plan import Cell, Network
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.tasks import ground_truth
 from benchmarks.tasks.ground_truth import SimulateClips, SimulateQuasiStatic

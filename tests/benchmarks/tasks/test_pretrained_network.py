@@ -9,14 +9,12 @@ from pathlib import Path
 import pytest
 import torch
 
-from benchmarks.cell import Cell
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.plan.make_plan import check_trained
+from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import make_parser, study_of
-from benchmarks.plan.study import StudyError
-from benchmarks.plan.motion_split import Motions
-from benchmarks.plan.plan import Network, Plan
-from benchmarks.plan.study import Study
+from benchmarks.plan.plan import Cell, Network, Plan
+from benchmarks.plan.study import Study, StudyError
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.console import remarks

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 from benchmarks.external.roll_out_files import read_roll_out
 from benchmarks.external.roll_out_option import RollOutFileError
 from benchmarks.process.memory import peak_memory
-from benchmarks.results.json_file import ResultsError, read_json
+from benchmarks.results.row import ResultsError, read_json
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError

@@ -8,8 +8,7 @@ import re
 
 import pytest
 
-from benchmarks.results.json_file import ResultsError
-from benchmarks.results.row import DECLARED
+from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.entries.__main__ import main
 from reports.entries.page import page_of

@@ -245,7 +245,7 @@ def test_absent_devices_are_one_line(refused, tmp_path):
 def test_the_harness_hands_the_device_on(tmp_path):
     """An absent device is refused where the plan is made, and would be refused where training starts."""
     from benchmarks.plan.make_plan import check_machines
-    from benchmarks.plan.read_study import read_study
+    from benchmarks.plan.study import read_study
     from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 
     dressed, motion = tube_dress(), swaying(12)

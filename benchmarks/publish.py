@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.plan.read_study import read_study, study_names
+from benchmarks.plan.study import read_study, study_names
 from benchmarks.process.timing import one_thread
 from benchmarks.provenance import commit
 from benchmarks.results.row import USABLE

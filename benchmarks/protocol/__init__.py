@@ -1,1 +1,0 @@
-"""Protocol: which rows are of it. Its number and digests are in benchmarks.results.protocol."""

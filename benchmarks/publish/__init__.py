@@ -1,1 +1,0 @@
-"""Published studies, run again at one commit: `python -m benchmarks.publish`."""
