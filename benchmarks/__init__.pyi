@@ -8,6 +8,7 @@ from .metric import RollOut as RollOut
 from .scene import BuiltScene as BuiltScene
 from .scene import Scene as Scene
 from .training import Training as Training
+from .validation.case import known_answer as known_answer
 
 __all__ = [
     "BuiltScene",
@@ -19,5 +20,6 @@ __all__ = [
     "RollOut",
     "Scene",
     "Training",
+    "known_answer",
     "program",
 ]

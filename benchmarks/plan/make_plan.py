@@ -128,7 +128,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
 
     scenes: further ones that no file declares.
     """
-    study, user_scenes, user_methods = user_files.declarations_of(study)
+    study, user_scenes, user_methods, user_cases = user_files.declarations_of(study)
     if study.garment:
         check_garment_name(study.garment)
     inputs = read_inputs(study.body, study.garment, study.motions, study.motion_files)
@@ -140,7 +140,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
             raise StudyError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
         motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
     fabric_scenes, fabric_cases = tests_of_fabrics(study)
-    cases = (*CASES, *fabric_cases)
+    cases = tuple(by_name("known answer", (*CASES, *fabric_cases, *user_cases)).values())
     taken = {case.name for case in cases}
     for scene in user_scenes:
         if scene.name in taken:

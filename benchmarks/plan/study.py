@@ -21,7 +21,7 @@ from snug.garments.options import GarmentFile
 from snug.motion.options import MotionFileOptions
 from snug.trained import FOLDER
 
-PARTS = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "engines")  # that reports know
+PARTS = ("garments", "speed", "validation", "extremes", "shapes")  # that reports know
 
 
 class StudyError(ValueError):
@@ -50,7 +50,8 @@ class Part:
         methods: names, patterns and files of methods.
         optional_methods: those that take part only where field `methods` of the study names them.
         untrained: scenes for which no network is trained unless field `scenes` of the study names them.
-        cases: names and patterns of known answers; {smoke} for those marked so, {short} for all but long.
+        cases: names, patterns and files of known answers; {smoke} for those marked so, {short} for all but
+            long.
     """
 
     question: str = ""
@@ -146,8 +147,9 @@ class Study:
         if self.sizes.frames < FEWEST_FRAMES:
             raise StudyError(f"{self.sizes.frames}: give {FEWEST_FRAMES} or more", ("sizes", "frames"))
         for name in self.parts:
-            if name not in PARTS:
-                raise StudyError(f"no part is called so; choose from {', '.join(PARTS)}", ("parts", name))
+            if name not in PARTS and not self.parts[name].question:
+                known = f"no part is called so; choose from {', '.join(PARTS)}, or give it a question"
+                raise StudyError(known, ("parts", name))
 
     def place(self, *field: str) -> str:
         """Return where a field was said: a file, its line and the field; or an option."""

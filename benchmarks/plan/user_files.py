@@ -1,4 +1,4 @@
-"""Methods, scenes and metrics that a user's file declares in METHODS, SCENES or METRICS.
+"""Methods, scenes, metrics and known answers that a user's file declares.
 
 A file is named by its path, which means all that it declares. Entries carry the file that they come from, so
 that every process can load it.
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
 from benchmarks.fingerprint.dependencies import find_module, imported_beside
@@ -22,6 +22,7 @@ from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.study import Part, Study
 from benchmarks.scene import Scene
 from benchmarks.training import Training
+from benchmarks.validation.case import Case, cases_of
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
 
@@ -48,6 +49,7 @@ METHODS = Kind("methods", "METHODS", "make")
 SCENES = Kind("scenes", "SCENES", "build")
 METRICS = Kind("metrics", "METRICS", "measure")
 KINDS = (METHODS, SCENES, METRICS)
+CASES = Kind("cases", "", "")  # declared by @known_answer, which stands on the function
 
 
 def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[list[str], list[Any]]:
@@ -73,28 +75,40 @@ def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[list[str], list
     return names, [entry for some in entries.values() for entry in some]
 
 
-def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]]:
-    """Return the study with the names that its files declare in their places, and what they declare.
+class Users(NamedTuple):
+    """A study with the names that its files declare in their places, and what they declare."""
+
+    study: Study
+    scenes: list[Scene]
+    methods: list[MethodEntry]
+    cases: list[Case]
+
+
+def declarations_of(study: Study) -> Users:
+    """Read the files that a study names; a known answer belongs to the part that names its file.
 
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
     """
-    entries: dict[Kind, dict[tuple[str, str], Any]] = {SCENES: {}, METHODS: {}}
+    entries: dict[Kind, dict[tuple[str, str], Any]] = {SCENES: {}, METHODS: {}, CASES: {}}
 
-    def named(of: Study | Part) -> Any:
+    def named(of: Study | Part, suite: str = "") -> Any:
         changes: dict[str, Any] = {}
         for kind, found in entries.items():
             for field in (kind.word, f"optional_{kind.word}"):
                 if any(word.endswith(".py") for word in getattr(of, field, ())):
                     names, declared = resolve(kind, getattr(of, field))
                     changes[field] = tuple(names)
-                    found |= {(entry.declared_in, entry.name): entry for entry in declared}
+                    if kind is CASES:
+                        declared = [dataclasses.replace(case, suite=suite) for case in declared]
+                    found |= {(getattr(e, "declared_in", suite), e.name): e for e in declared}
         return dataclasses.replace(of, **changes)
 
-    parts = {name: named(part) for name, part in study.parts.items()}
+    parts = {name: named(part, name) for name, part in study.parts.items()}
     study = dataclasses.replace(named(study), parts=parts)
-    check_networks(methods := list(entries[METHODS].values()))
-    return study, list(entries[SCENES].values()), methods
+    scenes, methods, cases = (list(of_kind.values()) for of_kind in entries.values())
+    check_networks(methods)
+    return Users(study, scenes, methods, cases)
 
 
 def check_networks(entries: Sequence[MethodEntry]) -> None:
@@ -125,6 +139,10 @@ def file_of(word: str) -> str:
 def entries_of(kind: Kind, home: str) -> list[Any]:
     """Return what a file declares of that kind. Raises DeclarationError."""
     module = import_file(home)
+    if kind is CASES:
+        if not (cases := cases_of(module.__name__)):
+            raise DeclarationError(f"{home}: declares no known answer, a function with @known_answer")
+        return [dataclasses.replace(case, module=home) for case in cases]
     declared = getattr(module, kind.tuple_name, None)
     if not isinstance(declared, tuple | list) or not all(isinstance(entry, kind.entry) for entry in declared):
         raise DeclarationError(f"{home}: declares no {kind.tuple_name}, a tuple of {kind.entry.__name__}")

@@ -21,6 +21,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from benchmarks.declarations import load
 from benchmarks.results.row import Row
 
 METHOD = "simulation"
@@ -47,7 +48,7 @@ class Case:
 
     Attributes:
         name: unique over all cases, and the row's scene unless `scene` is given.
-        module: dotted.
+        module: dotted, or a path that ends with .py.
         smoke: whether the smallest preset runs it.
         long: whether it is left out where no suite is named.
         seconds: after which the case's process is ended; None: never.
@@ -132,7 +133,7 @@ class Case:
         )
 
     def _imported(self, *name_and_default: Any) -> Any:
-        return getattr(importlib.import_module(self.module), *name_and_default)
+        return getattr(load(self.module), *name_and_default)
 
 
 _declared: dict[str, list[Case]] = defaultdict(list)  # by module

@@ -28,7 +28,7 @@ from reports.comparison.change import (
 )
 from reports.comparison.gone import CELL, endings, gone
 from reports.comparison.scenes import changed_scenes
-from reports.run.finished_run import SUITES, Metric, Run
+from reports.run.finished_run import Metric, Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means
 from reports.statistics.pareto import REPEATS, TIME, WHOLE
@@ -123,7 +123,7 @@ def _entries_of_scenes(run: Run) -> dict[str, Any]:
 def _cells(run: Run) -> pd.DataFrame:
     """Return each cell once, with its garment or scene, and the range of repeats as a time's uncertainty."""
     cases = run.frame[run.frame["case"] != ""].drop_duplicates(CELL)
-    frame = pd.concat([run.cells(*SUITES), cases], ignore_index=True)
+    frame = pd.concat([run.cells(), cases], ignore_index=True)
     frame = frame[frame["status"] != "skipped"]
     worn = (frame["suite"] == "garments") & (frame["garment"] != "")
     frame = frame.assign(place=frame["garment"].where(worn, frame["scene"]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from benchmarks.results.run_folder import RunFolder
-from reports.run.finished_run import SUITES, Run, shown_seeds
+from reports.run.finished_run import Run, shown_seeds
 
 BUDGET = 25_000_000  # bytes of the whole page
 FIRST = ("reference", "bound", "baseline", "network", "external")  # roles of the methods of page one
@@ -20,7 +20,7 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
 
     Those of a scene come in one or two groups.
     """
-    cells = run.cells(*SUITES)
+    cells = run.cells()
     seeds = shown_seeds(cells)
     traits = cells.drop_duplicates("scene").set_index("scene")[["garment", "part"]]
     kinds: list[list[str]] = [[], [], []]

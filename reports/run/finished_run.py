@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster
-SUITES = ("garments", "speed", "validation", "extremes", "shapes", "fabric", "engines")
+SUITES = ("garments", "speed", "validation", "extremes", "shapes")  # that have tables of their own
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,11 @@ class Run:
         return self.frame[self.frame["suite"].isin(names)]
 
     def cells(self, *suites: str) -> pd.DataFrame:
-        """Return the rows of these suites that are no case, each cell from the first suite that has it."""
+        """Return the rows of these suites that are no case, each cell from the first suite that has it.
+
+        Without names they are of all suites, those of a study's own after SUITES.
+        """
+        suites = suites or tuple(dict.fromkeys((*SUITES, *self.frame["suite"])))
         if suites not in self._cells:
             kept = self.suite(*suites)
             kept = kept[kept["case"] == ""]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from reports.run.finished_run import SUITES, Metric, Run
+from reports.run.finished_run import Metric, Run
 from reports.statistics.means_and_spreads import means
 from reports.tables.paper_values import NOTES, PRINTED
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, metric_column, table
@@ -23,7 +23,7 @@ HEADS = {column.name: column for column in (METHOD, GARMENT, SCENE, SUITE)}
 
 def all_cells(run: Run) -> pd.DataFrame:
     """Return the rows of all suites, each cell once."""
-    return run.cells(*SUITES)
+    return run.cells()
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ TOGETHER = (
     " --methods simulation,newton-1,./held.py,./explicit.py --set metrics=./height.py -o "
 )
 LONG = (
+    "A known answer",
     "How to add something",
     "An energy",
     "A program",

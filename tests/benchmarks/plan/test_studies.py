@@ -114,7 +114,8 @@ def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word(text, table):
         ("[sizes]\nframes = 2", "study.toml: line 2: sizes.frames: 2: give 3 or more"),
         (
             "[parts.garmnts]",
-            "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, speed",
+            "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, speed, "
+            "validation, extremes, shapes, or give it a question",
         ),
         (
             "[parts.speed]\nscenes = ['flagg']",

@@ -140,6 +140,46 @@ def test_what_is_unchanged_is_cached_and_what_is_edited_is_done_again(done, file
     assert stale() == {"simulation", "mine", "theirs", "other-1"}  # it lies beside the scene's file too
 
 
+# --- known answers of a study ------------------------------------------------------------------------------
+
+ANSWERS = """
+from benchmarks import known_answer
+
+@known_answer({"half": {"of": 2.0}, "third": {"of": 3.0}}, expected=0.5, tolerance=0.1, reason="by hand")
+def share(of):
+    '''Return the share.'''
+    return 1.0 / of
+"""
+STUDY = """
+[parts.answers]
+question = "does a study bring known answers?"
+cases = ["./{}"]
+"""
+
+
+def test_a_study_brings_known_answers_of_its_own(tmp_path):
+    (tmp_path / "of_mine.py").write_text(ANSWERS)
+    (tmp_path / "study.toml").write_text(STUDY.format("of_mine.py"))
+    out = tmp_path / "out"
+    assert run.main([str(tmp_path), "-o", str(out)]) == 1  # one of the two is wrong
+    rows = {row.scene: row for row in RunFolder(out).read_rows()}
+    assert {name: row.status for name, row in rows.items()} == {"half": "ok", "third": "failed"}
+    assert rows["half"].suite == "answers" and rows["third"].value == pytest.approx(1 / 3)
+    assert "half,1,0.5,0.5,0.1" in (RunFolder(out).tables / "validation.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [("no_answers.py", "x = 1\n", "no_answers.py: declares no known answer, a function with @known_answer"),
+     ("taken_answers.py", ANSWERS.replace("third", CASES[0].name),
+      f"known answer '{CASES[0].name}' is declared twice")],
+)  # fmt: skip
+def test_a_file_of_answers_that_cannot_be_meant_is_one_line(name, text, message, tmp_path, refused):
+    (tmp_path / name).write_text(text)
+    (tmp_path / "study.toml").write_text(STUDY.format(name))
+    refused(message, run.main, [str(tmp_path), "-o", str(tmp_path / "out")])
+
+
 # --- refusals ----------------------------------------------------------------------------------------------
 
 HEAD = "from benchmarks.method import MethodEntry\n"
