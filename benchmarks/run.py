@@ -69,6 +69,10 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         from benchmarks.runner.execute_plan import check_roll_outs, execute
         from reference_sim.progress import announce_compilation
 
+        if plan.scheduler:
+            from benchmarks.process.cluster_address import check_scheduler  # loads dask
+
+            check_scheduler(plan.scheduler)
         announce_compilation()
         dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
         start_loading(*(LOADED_BY_DRESSED if dressed else ()))

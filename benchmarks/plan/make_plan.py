@@ -260,9 +260,6 @@ def check_machines(study: Study, scheduler: str) -> None:
         raise StudyError(
             f"{study.place('rollouts')}: its files lie on this machine alone; leave out --scheduler"
         )
-    from benchmarks.process.cluster_address import check_scheduler  # loads dask
-
-    check_scheduler(scheduler)
 
 
 def check_trained(study: Study, folder: Path, scheduler: str) -> Path | None:
