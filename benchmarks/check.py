@@ -22,15 +22,15 @@ from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
 from benchmarks.plan.plan import STATES, Cell, Plan, TaskId
 from benchmarks.presets import find_preset
-from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import tasks_of
+from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import SCENES, all_scenes, find_scene, of_garment
-from benchmarks.tasks.task import Outcome, Task
+from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 
 PROGRAM = "benchmarks.check"

@@ -19,13 +19,13 @@ import numpy as np
 
 from benchmarks.assets.inputs import FEWEST_FRAMES
 from benchmarks.declarations import raised_at
-from benchmarks.fingerprint.digest import digest
+from benchmarks.isolated_process import one_line
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.plan import TaskId
-from benchmarks.process.errors import one_line
+from benchmarks.provenance import digest
+from benchmarks.runner.cells import CellTask
+from benchmarks.runner.task import Context, Outcome
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.tasks.cell_task import CellTask
-from benchmarks.tasks.task import Context, Outcome
 from reference_sim import Potential, Trajectory
 from reference_sim.energies import Energy, Step
 

@@ -12,7 +12,7 @@ from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.options import OF_SCENES, REPLACED, add_study_options, study_of
 from benchmarks.plan.study import StudyError
-from benchmarks.process.timing import one_thread
+from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 
 PROGRAM = "benchmarks.export"

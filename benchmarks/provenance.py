@@ -1,16 +1,32 @@
-"""Provenance of numbers: code, machine and versions, stated on every row."""
+"""What a number came of: content, code, packages and machine.
+
+As digests they make a stored result stale; in words they stand on every row. A task names the folders and
+files that its outcome depends on (benchmarks.runner.schedule); each counts as a whole, and no import is
+followed. Of Python the statements count, not comments, formatting and docstrings. A user's file counts with
+the modules that lie beside it. Packages that it imports count by their version.
+"""
 
 from __future__ import annotations
 
+import ast
+import dataclasses
+import hashlib
+import importlib.util
+import json
 import os
 import platform
 import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-# For a reader; what a task depends on is found from the source: see benchmarks.fingerprint.dependencies.
+from benchmarks.declarations import DeclarationError
+
+# For a reader; what a task depends on is found from the source: see benchmarks.provenance.
 PACKAGES = (
     "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis", "ipctk",
     "pyvista", "pyacvd",
@@ -93,3 +109,185 @@ def hardware_line(facts: dict[str, Any]) -> str:
 def versions() -> dict[str, str]:
     """Return the installed version of each package that computes."""
     return {name: package_version(name) for name in PACKAGES}
+
+
+def digest(value: Any) -> str:
+    """Return 16 hexadecimal digits of a value: JSON, bytes, arrays, sets and dataclasses of these.
+
+    >>> digest({"b": 1, "a": [2]}) == digest({"a": [2], "b": 1})
+    True
+    """
+    if not isinstance(value, bytes):
+        value = json.dumps(value, sort_keys=True, default=_plain).encode()
+    return hashlib.sha256(value).hexdigest()[:16]
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+    if hasattr(value, "tobytes"):  # an array
+        return [str(value.dtype), list(value.shape), digest(value.tobytes())]
+    if isinstance(value, set | frozenset):
+        return sorted(value)
+    if hasattr(value, "items"):
+        return dict(value)
+    raise TypeError(f"cannot tell apart by content: {type(value).__name__}")
+
+
+def digest_of_file(path: Path) -> str:
+    """Return 16 hexadecimal digits of a file's bytes. Raises OSError."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
+
+
+def damaged(folder: Path, digests: Mapping[str, str]) -> str:
+    """Return which file of a folder, name -> digest, is gone or altered; empty where none is."""
+    for name, content in digests.items():
+        path = folder / name
+        if not path.is_file():
+            return f"{name} is gone"
+        if digest_of_file(path) != content:
+            return f"{name} is damaged"
+    return ""
+
+
+ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
+ROOT = Path(__file__).resolve().parents[1]
+LAYERS = ("reference_sim", "snug", "benchmarks")
+# Prose, compiled kernels; and trained networks: a task that reads one names its digest.
+NO_PART = (".pyc", ".md", ".nbi", ".nbc", ".safetensors")
+# Commands and pictures decide no result.
+NO_RESULT = (
+    "reference_sim/command_line.py", "reference_sim/simulate.py", "reference_sim/simulate_command.py",
+    "snug/check.py", "snug/garments/picture.py", "snug/train.py", "snug/training/command",
+)  # fmt: skip
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def software(*places: str) -> dict[str, str]:
+    """Return place -> digest of its files, and package -> version or "absent" of all that they import.
+
+    Args:
+        *places: folders and files of the project, as `snug/body`, and absolute paths of users' files. A place
+            within another one is no part of its own.
+
+    Raises:
+        DeclarationError: a place that is not there, or a file that cannot be read.
+
+    >>> list(software("benchmarks/declarations.py"))
+    ['benchmarks/declarations.py']
+    """
+    outermost = sorted(p for p in set(places) if not any(p.startswith(f"{other}/") for other in places))
+    contents = {place: _content(place) for place in outermost}
+    packages = sorted(set().union(*(names for _, names in contents.values())))
+    digests = {place: content for place, (content, _) in contents.items()}
+    return digests | {f"package {name}": _version(name) for name in packages}
+
+
+def find_module(module: str) -> str:
+    """Return the file of a module, relative to the project where it is ours. Raises DeclarationError.
+
+    >>> find_module("benchmarks.scene")
+    'benchmarks/scene.py'
+    """
+    if module.endswith(".py"):
+        return module
+    stem = module.replace(".", "/")
+    if path := next((p for p in (f"{stem}.py", f"{stem}/__init__.py") if (ROOT / p).is_file()), None):
+        return path
+    spec = None
+    with suppress(ModuleNotFoundError):  # of its package
+        spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:
+        raise DeclarationError(f"no module {module}: see the entry that names it")
+    return spec.origin
+
+
+def imported_beside(home: str) -> dict[str, Path]:
+    """Return name -> file of the modules and packages beside a user's file that it or one of them imports."""
+    top = _top_of(Path(home))
+    names = set().union(*(_read(path)[1] for path in _neighbours(Path(home))))
+    files = {name: (top / f"{name}.py", top / name / "__init__.py") for name in sorted(names)}
+    return {name: path for name, paths in files.items() for path in paths if path.is_file()}
+
+
+@cache
+def _content(place: str) -> tuple[str, frozenset[str]]:
+    """Return the digest of the files of a place, and the packages that they import."""
+    if Path(place).is_absolute():
+        top, paths = _top_of(Path(place)), _neighbours(Path(place))
+        ours = {*LAYERS, *imported_beside(place)}
+    else:
+        top, paths, ours = ROOT, _files_of(place), set(LAYERS)
+    if not paths:
+        raise DeclarationError(f"{place}: no such folder or file, see benchmarks.runner.schedule")
+    read = {path.relative_to(top).as_posix(): _read(path) for path in paths}
+    packages = frozenset().union(*(names for _, names in read.values()))
+    return digest({name: content for name, (content, _) in read.items()}), packages - ours
+
+
+def _files_of(place: str) -> list[Path]:
+    """Return the files of the project at a place that count, in order."""
+    path = ROOT / place
+    files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())
+    names = [(file, file.relative_to(ROOT)) for file in files if file.suffix not in NO_PART]
+    hidden = [any(part.startswith((".", "__pycache__")) for part in name.parts) for _, name in names]
+    others = [name.as_posix().startswith(NO_RESULT) for _, name in names]
+    return [file for (file, _), *left_out in zip(names, hidden, others) if not any(left_out)]
+
+
+def _neighbours(home: Path) -> list[Path]:
+    """Return the modules beside a user's file or its package, and those of folders of modules there.
+
+    Of an installed package they are its own: what is installed beside it counts by its version.
+    """
+    top = _top_of(home)
+    package = home.relative_to(top).parts[0]
+    found = []
+    for folder, folders, names in os.walk(top / package if package in _distributions() else top):
+        modules = sorted(name for name in names if name.endswith(".py"))
+        folders[:] = sorted(name for name in folders if name.isidentifier()) if modules else []
+        found += [Path(folder, name) for name in modules]
+    return found
+
+
+def _top_of(home: Path) -> Path:
+    """Return the folder that a file is imported from: above the packages that it lies in."""
+    top = home.parent
+    while (top / "__init__.py").is_file():
+        top = top.parent
+    return top
+
+
+@cache
+def _read(path: Path) -> tuple[str, frozenset[str]]:
+    """Return the digest of what counts of a file, and the top-level modules that it imports."""
+    try:
+        if path.suffix not in (".py", ".pyi"):
+            return digest_of_file(path), frozenset()
+        tree = ast.parse(path.read_text(encoding=ENCODING))
+    except OSError as error:
+        raise DeclarationError(f"{path}: cannot be read: {error}") from None
+    except (SyntaxError, ValueError):  # beside a user's file, and not imported by it: that was loaded
+        return digest_of_file(path), frozenset()
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module.split(".")[0])
+        elif isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            node.body[0].value.value = ""  # type: ignore[attr-defined]
+    return digest(ast.dump(tree).encode()), frozenset(names - sys.stdlib_module_names)
+
+
+@cache
+def _distributions() -> dict[str, list[str]]:
+    return dict(metadata.packages_distributions())
+
+
+@cache
+def _version(package: str) -> str:
+    """Return names and versions of the distributions that an import of this name loads."""
+    names = sorted(set(_distributions().get(package, ())))
+    return ", ".join(f"{name} {metadata.version(name)}" for name in names) or "absent"

@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from benchmarks.plan.study import read_study, study_names
-from benchmarks.process.timing import one_thread
 from benchmarks.provenance import commit
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.execute_plan import accepted
+from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
 

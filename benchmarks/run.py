@@ -16,8 +16,8 @@ from benchmarks.external.roll_out_option import RollOutFileError
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import PROGRAM, make_parser, split, study_of
 from benchmarks.plan.plan import Plan
-from benchmarks.process.timing import one_thread
-from benchmarks.tasks.task import RunStopped
+from benchmarks.runner.task import RunRefused, RunStopped
+from benchmarks.timing import one_thread
 from reference_sim.command_line import heeded_interrupts, print_text
 
 
@@ -57,20 +57,17 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     for name, text in plan.cut_motions.items():
         print(f"motion {name}: {text} are measured; --set sizes.frames=N measures more", file=sys.stderr)
-    from benchmarks.runner.lock import HeldError, held
+    from benchmarks.runner.execute_plan import check_roll_outs, describe, execute, held
 
     try:
         if dry_run:
-            from benchmarks.runner.dry_run import describe
-
             print_text(describe(plan))
             return 0
-        from benchmarks.process.isolated_process import LOADED_BY_DRESSED, start_loading
-        from benchmarks.runner.execute_plan import check_roll_outs, execute
+        from benchmarks.isolated_process import LOADED_BY_DRESSED, start_loading
         from reference_sim.progress import announce_compilation
 
         if plan.scheduler:
-            from benchmarks.process.cluster_address import check_scheduler  # loads dask
+            from benchmarks.runner.cluster import check_scheduler  # loads dask
 
             check_scheduler(plan.scheduler)
         announce_compilation()
@@ -79,7 +76,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         assets = check_roll_outs(plan)
         with held(plan.folder), heeded_interrupts():
             return execute(plan, assets, report=report)
-    except (HeldError, DeclarationError, RollOutFileError) as error:
+    except (RunRefused, DeclarationError, RollOutFileError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
     except (RunStopped, OSError) as error:

@@ -27,9 +27,9 @@ from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
 from benchmarks.plan.plan import Cell, Plan
 from benchmarks.plan.study import Study, StudyError, read_study
-from benchmarks.process.timing import one_thread
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
+from benchmarks.timing import one_thread
 from reference_sim.command_line import INTERRUPTED, Parser
 
 PROGRAM = "benchmarks.score"

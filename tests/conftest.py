@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.process.timing import one_thread
+from benchmarks.timing import one_thread
 
 one_thread()  # before any library reads it: the processes of the tests would fight over the cores
 

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.fingerprint.digest import digest
+from benchmarks.provenance import digest
 
 if TYPE_CHECKING:
     from snug.body.parametric_body import Body

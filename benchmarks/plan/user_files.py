@@ -15,11 +15,10 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
-from benchmarks.fingerprint.dependencies import find_module, imported_beside
-from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.study import Part, Study
+from benchmarks.provenance import digest, find_module, imported_beside
 from benchmarks.scene import Scene
 from benchmarks.training import Training
 from benchmarks.validation.case import Case, cases_of

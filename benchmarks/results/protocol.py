@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from benchmarks.fingerprint.digest import digest
+from benchmarks.provenance import digest
 from benchmarks.results.row import ResultsError
 
 NUMBER = "1.0"

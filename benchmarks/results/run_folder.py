@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import COLUMNS, ResultsError, Row, cells_to_row, read_json, row_to_cells
 from reference_sim.files.atomic_files import replacing
 

@@ -16,12 +16,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.fingerprint.dependencies import software
-from benchmarks.fingerprint.digest import damaged, digest, digest_of_file
 from benchmarks.plan.plan import DEFAULT_ONLY, TaskId
+from benchmarks.provenance import damaged, digest, digest_of_file, software
 from benchmarks.results.row import ResultsError, read_json
 from benchmarks.results.run_folder import FORMAT, RunFolder
-from benchmarks.tasks.task import Outcome, Task
+from benchmarks.runner.task import Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
 NOWHERE: Mapping[str, Any] = {}

@@ -6,7 +6,9 @@ run's folder, which all machines have to see under one path.
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
+import logging
 import multiprocessing
 import pickle
 import platform
@@ -22,18 +24,46 @@ from typing import TYPE_CHECKING
 
 from benchmarks import provenance
 from benchmarks.assets.assets import Assets
-from benchmarks.fingerprint.dependencies import software
-from benchmarks.fingerprint.digest import damaged, digest_of_file
-from benchmarks.process.cluster_address import check_scheduler
-from benchmarks.process.errors import one_line
-from benchmarks.process.timing import one_thread
+from benchmarks.isolated_process import one_line
+from benchmarks.provenance import damaged, digest_of_file, software
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.task_process import Needed, TaskProcess, begin_tasks
-from benchmarks.tasks.cell_task import CellTask
-from benchmarks.tasks.task import Context, Outcome, RunStopped, Task, failure
+from benchmarks.runner.cells import CellTask
+from benchmarks.runner.executor import Needed, TaskProcess, begin_tasks
+from benchmarks.runner.task import Context, Outcome, RunRefused, RunStopped, Task, failure
+from benchmarks.timing import one_thread
 
 if TYPE_CHECKING:
     from distributed import Future
+
+FIRST = 5.0  # [s] in which a scheduler answers at first
+
+
+def check_scheduler(address: str) -> None:
+    """Raise RunRefused unless a scheduler answers; a client of another server would hang."""
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        raise RunRefused("--scheduler needs dask.distributed: pip install '.[cluster]'") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
+    try:
+        kind = asyncio.run(asyncio.wait_for(_kind_of_server(address), FIRST))
+    except Exception as error:  # whatever the bytes of another server lead to, a MemoryError too
+        kind = one_line(error)
+    if kind != "Scheduler":
+        raise RunRefused(
+            f"--scheduler {address}: no scheduler of dask answers there ({kind}); start one by `dask "
+            "scheduler` and give the address that it prints, as tcp://HOST:8786"
+        )
+
+
+async def _kind_of_server(address: str) -> str:
+    """Return what a server of dask calls itself, as "Scheduler"."""
+    from distributed import Security
+    from distributed.core import rpc
+
+    async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
+        return str((await server.identity())["type"])
+
 
 LOOK = 2.0  # [s] between looks at how many threads there are
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
@@ -44,7 +74,7 @@ SEVERAL = 3  # differences of software that are named
 class Cluster:
     """The back end of a cluster: each thread of its workers does a task at a time. Workers come and go.
 
-    Raises ClusterError where no scheduler answers.
+    Raises RunRefused where no scheduler answers.
     """
 
     def __init__(self, folder: RunFolder, assets: Assets | None, address: str) -> None:

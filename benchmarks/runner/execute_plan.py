@@ -2,24 +2,82 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from typing import TYPE_CHECKING
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.external.roll_out_option import MODULE, RollOutFileError
-from benchmarks.plan.plan import Plan
-from benchmarks.process.errors import one_line
-from benchmarks.results.row import Row
+from benchmarks.isolated_process import one_line
+from benchmarks.plan.plan import STATES, Plan, runs
+from benchmarks.results.row import DECLARED, Row
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.console import named, remarks, summary
+from benchmarks.runner.cache import Cache, Cached
 from benchmarks.runner.executor import Executor
-from benchmarks.runner.loop import Runner
-from benchmarks.runner.rows import rows_of
+from benchmarks.runner.loop import LEFT_OUT, Runner
+from benchmarks.runner.rows import MOST_NAMED, SPREAD, first_of, rows_of
 from benchmarks.runner.run_json import RunLog, now
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.tasks.task import RunStopped
+from benchmarks.runner.task import Outcome, RunRefused, RunStopped
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
+
+ABLATIONS = "--methods 'simulation,skinning,snug,snug-no-*'"
+
+
+def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str = "") -> str:
+    """Return the answer, the text of page one if there is one, and one line of counts and times."""
+    last = []
+    for suite in dict.fromkeys(row.suite for row in rows):
+        statuses = Counter(row.status for row in rows if row.suite == suite)
+        last.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in statuses.items()))
+    times: Counter[str] = Counter()
+    for stage in stages:
+        times[stage["name"]] += stage["seconds"]
+    longest = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in times.most_common(MOST_NAMED))
+    last += [f"time: {times.total():.0f} s ({longest})"] if times else []
+    return "\n".join(filter(None, [answer, "; ".join(last)]))
+
+
+def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> list[str]:
+    """Return remarks for whoever reads the numbers, a line each. outdated: task -> what has changed since."""
+    rows, lines = list(rows), []
+    if reused:
+        lines.append(f"{reused} results taken from earlier runs in this folder")
+    lines += named([f"{label}: {remark}" for label, remark in outdated.items()], "outdated in run.json")
+    spreads = {f"{row.scene} x {row.method}": row.value or 0.0 for row in rows if row.metric == "cost/spread"}
+    wide = {cell: percent for cell, percent in spreads.items() if percent > 100.0 * SPREAD}
+    if wide:
+        cells = [f"{cell} ({wide[cell]:.0f} %)" for cell in sorted(wide, key=lambda cell: -wide[cell])]
+        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {first_of(cells)}")
+    declared = dict.fromkeys(row.method for row in rows if row.declared)
+    if declared:
+        lines.append(f"run time {DECLARED}: {', '.join(declared)}")
+    pretrained = {row.method: row.pretrained for row in rows if row.pretrained}
+    if pretrained:
+        differences = {remark.partition("; ")[2] for remark in pretrained.values()}
+        same = differences.pop() if len(differences) == 1 else "the reasons of their rows say what differs"
+        lines.append(f"pretrained, not trained here: {', '.join(pretrained)}; {same}")
+    methods = {row.method for row in rows}
+    if {"snug", "untrained"} <= methods and not any(name.startswith("snug-no-") for name in methods):
+        lines.append(f"not run here, SNUG with one energy of its loss left out: {ABLATIONS}")
+    return lines
+
+
+def named(lines: Sequence[str], where: str, most: int = MOST_NAMED) -> list[str]:
+    """Return the first lines, and one that says how many more there are.
+
+    >>> named(["a", "b", "c", "d", "e"], "in results.csv")
+    ['a', 'b', 'c', 'and 2 more in results.csv']
+    """
+    more = len(lines) - most
+    return [*lines[:most], *([f"and {more} more {where}"] if more > 0 else [])]
+
 
 MOST_FAILURES = 8  # that the end of a run names; its files have all
 
@@ -71,12 +129,11 @@ def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executo
     """Return the executor of the plan's tasks. Raises RunStopped where its cluster is gone."""
     if not plan.scheduler:
         return Executor(folder, assets, plan.workers)
-    from benchmarks.process.cluster_address import ClusterError
     from benchmarks.runner.cluster import Cluster  # loads dask
 
     try:
         return Executor(folder, assets, plan.workers, Cluster(folder, assets, plan.scheduler))
-    except ClusterError as error:
+    except RunRefused as error:
         raise RunStopped(str(error)) from None
 
 
@@ -128,3 +185,92 @@ def make_report(log: RunLog) -> str | None:
     for problem in built.problems:
         print(f"report: left out: {problem}", file=sys.stderr)
     return built.answer
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Hold a folder, made where it is not there. Raises RunRefused where another run, or a file, has it.
+
+    A folder made here that stayed empty, because the request was refused, is removed.
+    The lock lies on the folder itself and leaves no file. The system releases it with the process, however
+    that ended. Where the system or its file system has no such locks nothing is held, and that is said.
+    """
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise RunRefused(f"--out {folder}: there is a file in the way; name another folder") from None
+    except OSError as error:
+        raise RunRefused(f"--out {folder}: cannot be made ({error.strerror}); name another folder") from None
+    with ExitStack() as closing:
+        try:
+            import fcntl
+
+            hold = os.open(folder, os.O_RDONLY)
+            closing.callback(os.close, hold)
+            fcntl.flock(hold, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise RunRefused(
+                f"--out {folder}: another run is going on there; wait for its end or name another folder"
+            ) from None
+        except (ImportError, OSError):
+            print(f"{folder}: cannot be locked here; let no other run use it", file=sys.stderr)
+        try:
+            yield
+        finally:
+            if made:
+                with suppress(OSError):  # not empty
+                    folder.rmdir()
+
+
+def describe(plan: Plan) -> str:
+    """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
+    only = STATES if plan.fresh else plan.only
+    runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=only))
+    lines, wanted, cached = _head(plan), list[Cached](), 0
+    stage = ""
+    for task, entry, outcome in runner.preview():
+        if task.stage != stage:
+            stage = task.stage
+            lines.append(stage)
+        lines.append(f"  {task.title}: {_verdict(entry, outcome)}")
+        if outcome is None:
+            wanted.append(entry)
+        cached += outcome is not None and outcome is entry.outcome
+    known = [entry.outcome.seconds for entry in wanted if entry.outcome and entry.outcome.seconds]
+    times = f", about {sum(known):.0f} s for the {len(known)} whose time is known" if known else ""
+    return "\n".join([*lines, f"{len(wanted)} tasks to run{times}; {cached} cached"])
+
+
+def _head(plan: Plan) -> list[str]:
+    skipped = sum(not runs(cell) for cell in plan.cells)
+    lines = [
+        f"preset {plan.preset.name}: {plan.preset.description}",
+        f"folder {plan.folder}",
+        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
+        f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
+        *([f"body {plan.inputs.body.path}"] if plan.inputs.body else []),
+        *map(partial(_size, plan), plan.garments),
+    ]
+    learning = {net.garment for net in plan.networks if net.training and net.training.simulated}
+    for garment in dict.fromkeys(network.garment for network in plan.networks):
+        how = "simulated for networks that learn from it" if garment in learning else "not simulated"
+        how = f"networks of {plan.trained}" if plan.trained else how
+        lines.append(f"training motions {', '.join(plan.motions.train)} ({how})")
+    return [*lines, f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"]
+
+
+def _size(plan: Plan, garment: str) -> str:
+    if (user_garment := plan.inputs.garment) and garment == user_garment.name:
+        return f"{garment} of {user_garment.file.path}"
+    return f"{garment} of about {plan.preset.garment_vertices} vertices"
+
+
+def _verdict(entry: Cached, outcome: Outcome | None) -> str:
+    why = f" ({entry.state}{': ' * bool(entry.why)}{entry.why})"
+    if outcome is None:
+        took = f", {entry.outcome.seconds:.1f} s last time" if entry.outcome and entry.outcome.seconds else ""
+        return f"run{why}{took}"
+    if outcome is entry.outcome:
+        return "cached" + (why if entry.state != "finished" else "")
+    return f"left out{why}" if outcome.reason == LEFT_OUT else f"skip ({outcome.reason})"

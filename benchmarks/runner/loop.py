@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from benchmarks.plan.plan import TaskId
 from benchmarks.runner.cache import Cache, Cached
 from benchmarks.runner.executor import Batch, Executor
-from benchmarks.tasks.task import Outcome, Task, failure
+from benchmarks.runner.task import Outcome, Task, failure
 
 if TYPE_CHECKING:
     from typing import Never

@@ -12,9 +12,8 @@ from benchmarks.metrics import find_metric
 from benchmarks.plan.plan import Cell, Plan, TaskId, protocol_of, protocol_of_case
 from benchmarks.results.protocol import OWN, is_member, spread
 from benchmarks.results.row import DECLARED, PRETRAINED, Row
-from benchmarks.tasks.pretrained_network import NAME
-from benchmarks.tasks.task import Outcome, Task
-from benchmarks.tasks.training import TrainNetwork
+from benchmarks.runner.networks import NAME, TrainNetwork
+from benchmarks.runner.task import Outcome, Task
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark

@@ -11,10 +11,10 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
-from benchmarks.fingerprint.digest import digest, digest_of_file
 from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs
+from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results import frame_energies
 from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import OF_TRAINING, Row, with_provenance

@@ -6,37 +6,141 @@ Loads nothing heavy: a dry run makes the same tasks as a run.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cached_property
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.fingerprint.dependencies import find_module
-from benchmarks.fingerprint.digest import digest
+from benchmarks import provenance
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.metrics import names_of
 from benchmarks.plan.plan import Cell, Network, Plan, flat, network_of, runs
-from benchmarks.runner import task_inputs
+from benchmarks.provenance import digest, digest_of_file, find_module
 from benchmarks.runner.cache import dependencies
-from benchmarks.runner.task_inputs import TaskInputs, code_behind, declared, users_code
+from benchmarks.runner.case import RunCase
+from benchmarks.runner.cells import BatchCell, RepeatCell, RunCell, RunUntimedCell
+from benchmarks.runner.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
+from benchmarks.runner.measurements import MeasureCell
+from benchmarks.runner.networks import LONGEST, TakeNetwork, TrainNetwork, take_network, without_machine
+from benchmarks.runner.task import Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
-from benchmarks.tasks.case import RunCase
-from benchmarks.tasks.cell_task import BatchCell, RepeatCell, RunCell, RunUntimedCell
-from benchmarks.tasks.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
-from benchmarks.tasks.metric_task import MeasureCell
-from benchmarks.tasks.pretrained_network import TakeNetwork, take_network, without_machine
-from benchmarks.tasks.task import Task
-from benchmarks.tasks.training import LONGEST, TrainNetwork
 from benchmarks.training import Simulated
 from snug.motion.recorded.table import CLIPS
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
+SIMULATOR = "reference_sim"
+DRESSING = ("snug/data", "snug/body", "snug/motion", "snug/garments", "benchmarks/assets")
+MIXING = ("snug/training/augmentation", "snug/recipes")  # that are mixed from motions, to be simulated
+NETWORKS = ("snug", "benchmarks/assets")
+SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py", "benchmarks/fabrics")
+RUNS = (
+    SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
+    "benchmarks/isolated_process.py", "benchmarks/runner/cells.py",
+)  # fmt: skip
+SOLVERS = ("benchmarks/methods/solvers", "benchmarks/engines")
+METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "snug")
+CASES = ("benchmarks/runner/case.py", "benchmarks/validation", "benchmarks/assets", *SOLVERS, *METRICS, *RUNS)
+TRAINING = ("benchmarks/runner/networks.py", SIMULATOR, *NETWORKS)
+USERS_OWN = ("benchmarks/methods", *METRICS, *RUNS)  # what a user's file may import
+
+
+class TaskInputs:
+    """Inputs of the tasks of one plan: by machine, body, garment, motion, scene and method."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan, self.preset = plan, plan.preset
+
+    def machine(self, device: str = "cpu") -> dict[str, Any]:
+        """Return the machine, as times of another are not reused. device: of a training; else cpu."""
+        facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
+        names = ("processor", "python", "accelerator")  # one thread works, however many cores there are
+        return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
+
+    @cached_property
+    def _hardware(self) -> dict[str, Any]:
+        return provenance.hardware(self.plan.device)
+
+    def of_scene(self, scene: Scene, *code: str) -> dict[str, Any]:
+        """Return inputs and code of a task that builds the scene; its metrics are no part of them."""
+        declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
+        del declaration["metrics"], declaration["counterpart"]
+        inputs = self.machine() | {"scene": declaration}
+        code = (*code, *RUNS, *code_behind(scene))
+        if not scene.dressed:
+            return {"inputs": inputs, "code": code}
+        inputs |= self.of_body(scene.garment) | {"motion": self.motion(scene.motion)}
+        if scene.motion not in self.plan.motions.train:  # those have a length of their own
+            inputs["frames"] = self.preset.frames
+        if scene.part == "clip":
+            inputs["clip_frames"] = self.preset.clip_frames
+        return {"inputs": inputs, "code": (*code, *DRESSING)}
+
+    def of_body(self, garment: str) -> dict[str, Any]:
+        """Return the inputs that the assets are made from."""
+        names = ("garment_vertices", "train_frames")
+        sizes = {name: getattr(self.preset, name) for name in names} | {"garment": garment}
+        digests: dict[str, str] = {}
+        if user_body := self.plan.inputs.body:
+            digests["body"] = user_body.digest
+        if (user_garment := self.plan.inputs.garment) and garment == user_garment.name:
+            digests["own garment"] = user_garment.digest
+        return {"assets": sizes} | digests
+
+    def motion(self, name: str) -> str:
+        """Return the name of a motion, with the digest of its content where it is of a file.
+
+        The code that makes an embedded one counts by itself.
+        """
+        files = self.plan.inputs.motions
+        return f"{name} {digest(files[name])}" if name in files else name
+
+    def simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:
+        """Return inputs and code of a task that builds the scene, with those of the method."""
+        return {
+            "inputs": of_scene["inputs"] | {"method": declared(entry)},
+            "code": (*of_scene["code"], *code_behind(entry)),
+        }
+
+
+def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
+    """Return what a scene, a method or a case declares, without descriptions; of files their content."""
+    fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
+    kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
+    values = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+    if isinstance(entry, MethodEntry | Scene):
+        values["files"] = {path: digest_of_file(Path(path)) for path in values["files"]}
+    return values
+
+
+def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
+    """Return the code of a scene or a method: the folder of its module, and what files of a user depend on.
+
+    Raises DeclarationError where its module is missing.
+    """
+    file = find_module(entry.module)
+    code = users_code(file, entry.declared_in)
+    if not code:
+        folder = Path(file).parent
+        code = (file if folder.name == "benchmarks" else folder.as_posix(),)
+    if isinstance(entry, MethodEntry):
+        code = (*code, *SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
+    return code
+
+
+def users_code(*homes: str) -> tuple[str, ...]:
+    """Return those that are files of users, by absolute paths, and what of ours such a file may import."""
+    own = tuple(home for home in homes if Path(home).is_absolute())
+    return (*own, *USERS_OWN) if own else ()
+
+
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
-TASKS = "benchmarks/tasks"
+TASKS = "benchmarks/runner"
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -114,7 +218,7 @@ class Schedule:
             label=_label(f"{garment}, {sort} clips of {len(motions)} motions, part {part}", entry),
             scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=simulated.swinging,
             units=sum(map(self._frames, motions)),
-            **of_scene | {"inputs": inputs, "code": (*of_scene["code"], *task_inputs.CLIPS)},
+            **of_scene | {"inputs": inputs, "code": (*of_scene["code"], *MIXING)},
         )  # fmt: skip
 
     def obtained(self, network: Network) -> TrainNetwork | TakeNetwork:
@@ -151,7 +255,7 @@ class Schedule:
         clips = tuple(task.id for task in truth if isinstance(task, SimulateClips))
         task = TrainNetwork(
             name=network.task_id[1], label=network.label,
-            inputs=inputs, code=(*task_inputs.TRAINING, *users_code(network.declared_in)),
+            inputs=inputs, code=(*TRAINING, *users_code(network.declared_in)),
             reads=(*simulated.values(), *clips), units=max(steps, 1), training=network.name, chosen=chosen,
             home=network.declared_in, seed=network.seed, garment=network.garment, steps=steps,
             motions=motions, held_out=held_out, simulated=simulated, clips=clips, device=self.plan.device,
@@ -206,7 +310,7 @@ class Schedule:
         least = self._least(cell)
         return kind(
             name=name, label=cell.label, cell=cell, inputs={"least": least},
-            code=task_inputs.RUNS, needs=(cell.task_id,),
+            code=RUNS, needs=(cell.task_id,),
             process=cell.name, deadline=self.preset.cell_seconds, least=least, **fields,
         )  # fmt: skip
 
@@ -242,7 +346,7 @@ class Schedule:
                 reads = (*reads, counterpart.task_id)
         names = names_of(scene.metrics)
         of_scene = self.inputs.of_scene(
-            scene, f"{TASKS}/metric_task.py", *task_inputs.METRICS, *users_code(*plan.metrics)
+            scene, f"{TASKS}/measurements.py", *METRICS, *users_code(*plan.metrics)
         )
         inputs = {
             "suites": sorted(cell.suites),
@@ -275,7 +379,7 @@ class Schedule:
         return RunCase(
             name=case.name, label=case.name, case=case, deadline=case.seconds, process=case.process,
             inputs=self.inputs.machine() | {"declared": declared(case)},
-            code=(find_module(case.module), *task_inputs.CASES),
+            code=(find_module(case.module), *CASES),
         )  # fmt: skip
 
     # --- facts of the plan ---------------------------------------------------------------------------------

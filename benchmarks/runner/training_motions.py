@@ -13,11 +13,11 @@ from benchmarks.plan.plan import DEFAULT_ONLY, Network, Plan
 from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
+from benchmarks.runner.execute_plan import held
 from benchmarks.runner.executor import Executor
-from benchmarks.runner.lock import held
+from benchmarks.runner.ground_truth import SimulateMotion
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule
-from benchmarks.tasks.ground_truth import SimulateMotion
 from reference_sim.trajectory import Trajectory
 from snug.training.simulated_data import write_data_set
 

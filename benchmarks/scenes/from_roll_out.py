@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.external.roll_out_files import read_rest_mesh, read_roll_out
 from benchmarks.external.roll_out_option import RollOutFileError, RollOutOption
 from benchmarks.external.scene_fit import LONGEST_STRETCH, mean_stretch
-from benchmarks.fingerprint.digest import digest
+from benchmarks.provenance import digest
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.energies.bend_hinge import BendHinge

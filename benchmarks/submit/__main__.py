@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
-from benchmarks.process.timing import one_thread
+from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 
 PROGRAM = "benchmarks.submit"

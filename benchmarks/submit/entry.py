@@ -12,12 +12,12 @@ from typing import Any
 
 from benchmarks.external.roll_out_files import first_not_finite, read_roll_out
 from benchmarks.external.roll_out_option import PLACE, FileConventions, RollOutFileError, RollOutOption
-from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import Plan
 from benchmarks.plan.study import read_study
 from benchmarks.presets import find_preset
+from benchmarks.provenance import digest_of_file
 from benchmarks.results.protocol import NUMBER
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder

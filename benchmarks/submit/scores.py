@@ -10,9 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.metrics import find_metric
-from benchmarks.provenance import processor_name
+from benchmarks.provenance import digest_of_file, processor_name
 from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import USABLE, Row
 from benchmarks.results.run_folder import RunFolder

@@ -35,7 +35,7 @@ from pathlib import Path
 
 from benchmarks.methods.catalogue.networks import network
 from benchmarks.presets import find_preset
-from benchmarks.tasks import training
+from benchmarks.runner import networks as training
 from benchmarks.training import Training
 from snug.recipes.recipe import DEFAULT
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.assets.assets import embedded_motions
 from benchmarks.performance.microbenchmarks import dressed_body
-from benchmarks.process.timing import one_thread
+from benchmarks.timing import one_thread
 from snug.motion.library import TRAIN
 from snug.networks.roll_out import prepare_frames
 from snug.recipes.named import RECIPE_OF_KIND

@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks.assets.assets import open_assets
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.presets import find_preset
-from benchmarks.process.timing import one_thread
 from benchmarks.scenes import of_garment
 from benchmarks.scenes.self_contact import with_self_contact
+from benchmarks.timing import one_thread
 from snug.motion.library import make_motion
 
 

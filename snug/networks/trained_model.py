@@ -49,7 +49,7 @@ class TrainedModel:
         fps: frame rate of the training motions [1/s]; 0 where it is not known.
         triangles: digest of the garment's triangles, see digest_of_triangles; empty where it is not known.
         origin: what is known of its training: data, commit, versions, processor, and digests of all that it
-            depends on, see benchmarks.tasks.training; empty where nobody noted it.
+            depends on, see benchmarks.runner.networks; empty where nobody noted it.
 
     Example:
         >>> from snug.recipes.recipe import DEFAULT

@@ -148,7 +148,7 @@ def _sampling() -> dict[str, Any]:
 
 
 def _reference() -> dict[str, Any]:
-    from benchmarks.tasks import ground_truth
+    from benchmarks.runner import ground_truth
     from snug.recipes.recipe import DEFAULT
 
     return {

@@ -18,9 +18,9 @@ from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.make_plan import check_garment_name
 from benchmarks.plan.plan import Cell
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.tasks.cell_task import BatchCell, RunCell
-from benchmarks.tasks.ground_truth import SettleStart
-from benchmarks.tasks.task import Context
+from benchmarks.runner.cells import BatchCell, RunCell
+from benchmarks.runner.ground_truth import SettleStart
+from benchmarks.runner.task import Context
 from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring

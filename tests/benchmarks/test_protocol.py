@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.fingerprint.digest import digest
 from benchmarks.metric import Metric
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import protocol_of, protocol_of_case
 from benchmarks.presets import find_preset
+from benchmarks.provenance import digest
 from benchmarks.results import protocol as recorded
 from benchmarks.results.protocol import DIGESTS, NUMBER, OWN, one_protocol
 from benchmarks.scenes import SCENES

@@ -12,15 +12,15 @@ import pytest
 
 from benchmarks import run, score
 from benchmarks.external.scene_files import write_obj
-from benchmarks.fingerprint.digest import digest
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan.plan import Cell
 from benchmarks.plan.study import StudyError
 from benchmarks.presets import find_preset
+from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.measurements import measured
 from benchmarks.runner.schedule import Schedule
-from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from tests.benchmarks.plan.planned import planned, study_with
 from tests.benchmarks.runner.tasks_by_hand import (

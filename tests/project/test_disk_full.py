@@ -19,7 +19,7 @@ import pytest
 import torch
 
 from benchmarks import run
-from benchmarks.process.isolated_process import start_loading
+from benchmarks.isolated_process import start_loading
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from reference_sim import Trajectory

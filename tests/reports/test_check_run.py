@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.provenance import digest_of_file
 from benchmarks.results.run_folder import RunFolder
 from reports import build, check
 from tests.reports.report_folder import row, run_folder

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build

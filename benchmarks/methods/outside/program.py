@@ -19,9 +19,9 @@ import numpy as np
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_option import FileConventions
 from benchmarks.external.scene_files import facts_of, write_scene_files
+from benchmarks.isolated_process import WorkerDied
 from benchmarks.method import MethodEntry
 from benchmarks.methods.outside.stored_roll_out import Stored
-from benchmarks.process.isolated_process import WorkerDied
 from benchmarks.scene import BuiltScene
 from reference_sim.files.array_file import read_arrays
 from reference_sim.trajectory import Trajectory

@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks.external.roll_out_files import first_not_finite, read_roll_out
 from benchmarks.external.roll_out_option import MODULE, FileConventions, RollOutFileError, RollOutOption
 from benchmarks.external.scene_fit import fit_to_scene
-from benchmarks.fingerprint.digest import digest
 from benchmarks.method import Method, MethodEntry
+from benchmarks.provenance import digest
 from benchmarks.scene import BuiltScene
 from reference_sim.trajectory import Trajectory
 

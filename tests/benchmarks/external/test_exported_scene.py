@@ -21,8 +21,8 @@ from benchmarks.methods.outside.stored_roll_out import entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.energies.energy import energy_series
 from benchmarks.metrics.surface.curvature import curvature_series
+from benchmarks.runner.measurements import measured
 from benchmarks.scene import Dressed
-from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from snug.motion.files import read_motion

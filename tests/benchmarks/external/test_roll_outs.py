@@ -20,10 +20,10 @@ from benchmarks.external.scene_fit import MIRRORS, _check_sides
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.process.timing import Reading
+from benchmarks.runner.cells import judge
+from benchmarks.runner.measurements import measured
 from benchmarks.scenes.from_roll_out import declared
-from benchmarks.tasks.cell_task import judge
-from benchmarks.tasks.metric_task import measured
+from benchmarks.timing import Reading
 from reference_sim import Trajectory
 from reference_sim.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
 from reference_sim.trajectory import TrajectoryError

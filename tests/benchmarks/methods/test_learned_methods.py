@@ -81,9 +81,9 @@ CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
 
 
 def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr("benchmarks.tasks.training.CHECKPOINT_MINUTES", 1e-9)
-    monkeypatch.setattr("benchmarks.tasks.training.LOG_EVERY", 4)
-    monkeypatch.setattr("benchmarks.tasks.training.PREPARATION", 0.03)  # s, half of the expected time
+    monkeypatch.setattr("benchmarks.runner.networks.CHECKPOINT_MINUTES", 1e-9)
+    monkeypatch.setattr("benchmarks.runner.networks.LOG_EVERY", 4)
+    monkeypatch.setattr("benchmarks.runner.networks.PREPARATION", 0.03)  # s, half of the expected time
     dressed, motion = tube_dress(), swaying(30)
     assets = assets_of(dressed, motion)
 

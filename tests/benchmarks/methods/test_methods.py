@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks import timing
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.method import Method
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
@@ -17,23 +18,22 @@ from benchmarks.metrics.motion.dynamics import shares_quasi_static
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Cell
 from benchmarks.presets import find_preset
-from benchmarks.process import timing
 from benchmarks.results import frame_energies
 from benchmarks.results.protocol import LEAST_MEMBERS, is_member
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
+from benchmarks.runner.cells import build_scene
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.measurements import measured
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
-from benchmarks.tasks.cell_task import build_scene
-from benchmarks.tasks.metric_task import measured
 from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
 from snug.recipes.named import RECIPES
 from snug.training.losses.physics_loss import static_terms
 from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, small_scene
-from tests.benchmarks.tasks.test_cell_tasks import plan_of
+from tests.benchmarks.runner.test_cell_tasks import plan_of
 
 SIZES = {"frames": 16, "settle_frames": 4, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01
@@ -351,7 +351,7 @@ def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_
 
 
 def test_curves_of_a_roll_out_that_was_lost_end_where_it_did(tmp_path):
-    from benchmarks.tasks.metric_task import write_curves
+    from benchmarks.runner.measurements import write_curves
 
     write_curves(tmp_path / "lost.npz", {"energy/total": np.ones(3)}, 5)
     curves = read_arrays(tmp_path / "lost.npz")

@@ -15,9 +15,9 @@ from benchmarks.metrics.motion.conservation import law_series
 from benchmarks.plan.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.runner.rows import rows_of_cell
+from benchmarks.runner.task import Outcome
 from benchmarks.scene import Dressed
 from benchmarks.scenes import find_scene
-from benchmarks.tasks.task import Outcome
 from reference_sim import Trajectory, simulate
 
 SMOKE = find_preset("smoke")

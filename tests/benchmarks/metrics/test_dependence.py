@@ -11,10 +11,10 @@ from benchmarks.assets.assets import Assets
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.presets import Dependence, find_preset
+from benchmarks.runner.measurements import measured
 from benchmarks.scenes import dependence as module
 from benchmarks.scenes import find_scene
 from benchmarks.scenes.variations import DRAPES
-from benchmarks.tasks.metric_task import measured
 from snug.body.parametric_body import Body
 from tests.benchmarks.plan.planned import planned
 

@@ -16,8 +16,8 @@ from benchmarks.metrics.surface import curvature
 from benchmarks.metrics.surface import penetration_and_distances as geometry
 from benchmarks.results.protocol import MEMBERS, is_member
 from benchmarks.results.row import Row
+from benchmarks.runner.measurements import compared, measured
 from benchmarks.runner.rows import with_uncertainty
-from benchmarks.tasks.metric_task import compared, measured
 from reference_sim import Trajectory
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 

@@ -14,14 +14,14 @@ from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Cell, Network
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.measurements import _training_poses
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.tasks.metric_task import _training_poses
-from benchmarks.tasks.task import Context, Task
+from benchmarks.runner.task import Context, Task
 from benchmarks.training import Simulated, Training
 from snug.motion.library import make_motion
 from snug.recipes.recipe import DEFAULT, TERMS
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
-from tests.benchmarks.tasks.test_cell_tasks import plan_of
+from tests.benchmarks.runner.test_cell_tasks import plan_of
 
 MOTIONS = Motions(train=("walk",), test=("kick",))
 
@@ -34,7 +34,7 @@ def test_the_key_of_a_training_is_that_of_all_it_depends_on(tmp_path, monkeypatc
     plan = plan_of(tmp_path, motions=MOTIONS)
     before = network(plan).key
     assert before and network(plan).key == before
-    monkeypatch.setattr("benchmarks.fingerprint.dependencies._version", lambda package: "another")
+    monkeypatch.setattr("benchmarks.provenance._version", lambda package: "another")
     assert network(plan).key != before
 
 

@@ -11,7 +11,6 @@ import pytest
 
 from benchmarks import metric, run
 from benchmarks.declarations import DeclarationError
-from benchmarks.fingerprint.digest import digest
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.methods.outside.program import program
@@ -19,16 +18,15 @@ from benchmarks.plan import user_files
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Cell, Plan
+from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.schedule import Schedule
-from benchmarks.runner.task_inputs import declared
+from benchmarks.runner.measurements import measured
+from benchmarks.runner.schedule import Schedule, declared
 from benchmarks.scenes import of_garment
-from benchmarks.tasks.metric_task import measured
 from benchmarks.training import Training
 from benchmarks.validation.registry import CASES
 from reference_sim import Trajectory
 from snug.recipes.recipe import DEFAULT, RecipeError
-from tests.benchmarks.fingerprint.test_dependencies import forget
 from tests.benchmarks.plan.outside_files import (
     HELPER,
     METHOD,
@@ -40,6 +38,7 @@ from tests.benchmarks.plan.outside_files import (
     TINY,
     as_before,
 )
+from tests.benchmarks.test_provenance import forget
 
 _as_before = pytest.fixture(autouse=True)(as_before)
 

@@ -16,14 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.fingerprint.digest import digest_of_file
 from benchmarks.plan.plan import DEFAULT_ONLY
+from benchmarks.provenance import digest_of_file
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.cluster import Cluster
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
-from benchmarks.tasks.task import Outcome, Task
+from benchmarks.runner.task import Outcome, Task
 from tests.benchmarks.runner.tasks_by_hand import Bar
 
 ROOT = Path(__file__).resolve().parents[3]

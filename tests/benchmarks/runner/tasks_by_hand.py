@@ -13,10 +13,10 @@ from benchmarks.assets.assets import Assets
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.networks import TrainNetwork
+from benchmarks.runner.task import Context, failure
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
-from benchmarks.tasks.task import Context, failure
-from benchmarks.tasks.training import TrainNetwork
 
 
 def small_scene(name: str, *, cells: int = 6, frames: int = 10) -> BuiltScene:

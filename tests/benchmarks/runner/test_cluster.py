@@ -12,11 +12,11 @@ import pytest
 from benchmarks import run
 from benchmarks.plan.make_plan import check_machines
 from benchmarks.plan.study import StudyError
-from benchmarks.process import cluster_address as scheduler
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as runner_side
+from benchmarks.runner import cluster as scheduler
 from benchmarks.runner import execute_plan as execution
-from benchmarks.tasks.task import RunStopped
+from benchmarks.runner.task import RunRefused, RunStopped
 from snug.networks.tensor_file import read_tensors
 from tests.benchmarks.plan.planned import study_with
 from tests.benchmarks.runner.cluster_by_hand import (
@@ -183,10 +183,10 @@ def test_another_server_than_a_scheduler_is_refused_in_one_line(
 
 def test_where_nobody_answers_and_without_dask_the_remedy_is_said(monkeypatch):
     monkeypatch.setattr(scheduler, "FIRST", 0.3)
-    with pytest.raises(scheduler.ClusterError, match=r"no scheduler of dask .*; start one by"):
+    with pytest.raises(RunRefused, match=r"no scheduler of dask .*; start one by"):
         scheduler.check_scheduler("tcp://127.0.0.1:1")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(scheduler.ClusterError, match="pip install"):
+    with pytest.raises(RunRefused, match="pip install"):
         scheduler.check_scheduler("tcp://127.0.0.1:1")
 
 
@@ -194,7 +194,7 @@ def test_a_worker_is_no_scheduler(two):
     with distributed.Client(two.address) as client:
         client.wait_for_workers(1, timeout=30.0)
         worker = next(iter(client.nthreads()))
-    with pytest.raises(scheduler.ClusterError, match=r"\(Worker\); start one"):
+    with pytest.raises(RunRefused, match=r"\(Worker\); start one"):
         scheduler.check_scheduler(worker)
 
 

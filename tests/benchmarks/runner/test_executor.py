@@ -10,9 +10,9 @@ import time
 import pytest
 
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner import task_process
+from benchmarks.runner import executor
 from benchmarks.runner.executor import Executor
-from benchmarks.tasks.task import Outcome, RunStopped, Task
+from benchmarks.runner.task import Outcome, RunStopped, Task
 from tests.benchmarks.runner.tasks_by_hand import Bar
 from tests.project.own_memory import needs_proc, own_memory
 
@@ -48,7 +48,7 @@ class Add(Task):
 
     def run(self, context, needed):
         if self.how == "die telling":
-            task_process._context.tell.__self__._wlock.acquire()  # as in the midst of a report
+            executor._context.tell.__self__._wlock.acquire()  # as in the midst of a report
             os.kill(os.getpid(), signal.SIGKILL)
         if self.how == "hang":
             signal.pause()

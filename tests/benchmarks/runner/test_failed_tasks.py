@@ -19,9 +19,9 @@ from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.tasks.task import Outcome, Task
+from benchmarks.runner.task import Outcome, Task
 from tests.benchmarks.runner.tasks_by_hand import InProcess
-from tests.benchmarks.tasks.test_cell_tasks import outcome_of, plan_of
+from tests.benchmarks.runner.test_cell_tasks import outcome_of, plan_of
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,17 +10,17 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.fingerprint.digest import digest_of_file
+from benchmarks.provenance import digest_of_file
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner import task_process
+from benchmarks.runner import executor
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.tasks.task import Context, Outcome, RunStopped
+from benchmarks.runner.task import Context, Outcome, RunStopped
 from tests.benchmarks.runner.tasks_by_hand import InProcess
+from tests.benchmarks.runner.test_cell_tasks import TINY, plan_of
 from tests.benchmarks.runner.test_failed_tasks import task
-from tests.benchmarks.tasks.test_cell_tasks import TINY, plan_of
 
 QUICK = dataclasses.replace(TINY, least_seconds=0.0)
 METHODS = ("simulation", "newton-1")
@@ -144,15 +144,15 @@ def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it
     folder = RunFolder(tmp_path)
     first, second = task("first"), task("second", needs=(("network", "first"),))
     cache = Cache(folder)
-    monkeypatch.setattr(task_process, "_context", Context(folder), raising=False)
-    monkeypatch.setattr(task_process, "_verified", set())
-    entry = cache.keep(first, task_process.perform(first, {}), {})
+    monkeypatch.setattr(executor, "_context", Context(folder), raising=False)
+    monkeypatch.setattr(executor, "_verified", set())
+    entry = cache.keep(first, executor.perform(first, {}), {})
     assert isinstance(entry.outcome, Outcome)
     needed = {first.id: entry.outcome}
-    assert task_process.perform(second, needed).status == "ok"
+    assert executor.perform(second, needed).status == "ok"
     (tmp_path / "first.txt").write_text("worst")
-    assert task_process.perform(second, needed).status == "ok"  # compared once in each process
-    task_process._verified.clear()
+    assert executor.perform(second, needed).status == "ok"  # compared once in each process
+    executor._verified.clear()
     with pytest.raises(RunStopped, match=r"^first\.txt is damaged since this run wrote it"):
-        task_process.perform(second, needed)
+        executor.perform(second, needed)
     assert cache.find(first, {}).state == "missing"

@@ -12,19 +12,18 @@ from benchmarks import provenance
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Cell
-from benchmarks.process.timing import Reading
 from benchmarks.results.row import Row
-from benchmarks.runner.console import remarks, summary
-from benchmarks.runner.execute_plan import accepted
+from benchmarks.runner.cells import judge
+from benchmarks.runner.execute_plan import accepted, remarks, summary
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import tasks_of
+from benchmarks.runner.task import Outcome
 from benchmarks.scenes import SCENES
-from benchmarks.tasks.cell_task import judge
-from benchmarks.tasks.task import Outcome
+from benchmarks.timing import Reading
 from reference_sim import Trajectory
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
-from tests.benchmarks.tasks.test_cell_tasks import plan_of
+from tests.benchmarks.runner.test_cell_tasks import plan_of
 
 SHEET = SCENES[0]
 

@@ -18,22 +18,22 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner, _batches
+from benchmarks.runner.networks import TrainNetwork
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.runner.task import Outcome
 from benchmarks.scenes import of_garment
-from benchmarks.tasks.task import Outcome
-from benchmarks.tasks.training import TrainNetwork
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.misbehaving import interrupt_at
-from tests.benchmarks.tasks.test_cell_tasks import TINY, found_of, plan_of
+from tests.benchmarks.runner.test_cell_tasks import TINY, found_of, plan_of
 
 ROOT = Path(__file__).resolve().parents[3]
 WORDS = ["smoke:speed", "--scenes", "free_fall"]
 HOLDING = """
 import sys, time
 from pathlib import Path
-from benchmarks.runner.lock import held
+from benchmarks.runner.execute_plan import held
 with held(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)

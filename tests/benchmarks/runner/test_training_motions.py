@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks import export
-from benchmarks.runner import training_motions
-from benchmarks.tasks import ground_truth
+from benchmarks.runner import ground_truth, training_motions
 from reference_sim.trajectory import Trajectory
 from snug.motion.library import TRAIN
 from snug.networks.dressed_body import DressedBody

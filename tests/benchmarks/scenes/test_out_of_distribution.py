@@ -17,12 +17,12 @@ from benchmarks.metrics.motion import extrapolation
 from benchmarks.plan.plan import Cell, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
+from benchmarks.runner.measurements import measured
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.schedule import tasks_of
+from benchmarks.runner.task import Context, Outcome
 from benchmarks.scenes import find_scene, out_of_distribution
 from benchmarks.scenes.variations import ORDINARY, OUT_OF_DISTRIBUTION
-from benchmarks.tasks.metric_task import measured
-from benchmarks.tasks.task import Context, Outcome
 from reference_sim import Trajectory
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT, joint_positions, rotation_matrices

@@ -24,9 +24,9 @@ from typing import Any, NamedTuple
 
 from benchmarks.external.roll_out_files import read_roll_out
 from benchmarks.external.roll_out_option import RollOutFileError
-from benchmarks.process.memory import peak_memory
 from benchmarks.results.row import ResultsError, read_json
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.timing import peak_memory
 from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays

@@ -18,7 +18,7 @@ from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.tables import make_tables, number_texts
 from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.outcomes import merged
-from tests.benchmarks.tasks.test_cell_tasks import plan_of
+from tests.benchmarks.runner.test_cell_tasks import plan_of
 from tests.reports.report_folder import SCENES, all_rows, row, run_of, skipped
 
 

@@ -10,7 +10,7 @@ from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.tasks.ground_truth import SimulateQuasiStatic
+from benchmarks.runner.ground_truth import SimulateQuasiStatic
 from reference_sim import Trajectory
 from snug.garments.garment import GarmentError
 from snug.garments.templates import find_template

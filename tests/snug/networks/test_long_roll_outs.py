@@ -13,12 +13,12 @@ from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts, skinned
 from benchmarks.metrics.motion import long_roll_out as metric
 from benchmarks.presets import PRESETS
-from benchmarks.process.timing import Reading
 from benchmarks.results.run_folder import model_path
+from benchmarks.runner.cells import judge
 from benchmarks.scenes import find_scene, long_motion
 from benchmarks.scenes.long_motion import ENDS, EVERY, FRAMES, LOOP_BLEND
 from benchmarks.scenes.variations import there_and_back
-from benchmarks.tasks.cell_task import judge
+from benchmarks.timing import Reading
 from reference_sim import Trajectory
 from snug.motion.library import make_motion
 from snug.networks.roll_out import roll_out

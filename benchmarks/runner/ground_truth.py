@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.method import MethodEntry
 from benchmarks.plan.plan import TaskId, flat
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cells import build_scene
+from benchmarks.runner.task import Context, Outcome, Task
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.tasks.cell_task import build_scene
-from benchmarks.tasks.task import Context, Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.plan.plan import TaskId
 from benchmarks.results.row import Row
-from benchmarks.tasks.task import Context, Outcome, Task
+from benchmarks.runner.task import Context, Outcome, Task
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case

@@ -17,20 +17,24 @@ from benchmarks.plan.plan import Cell, Network, Plan
 from benchmarks.plan.study import Study, StudyError
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.console import remarks
+from benchmarks.runner.execute_plan import remarks
+from benchmarks.runner.networks import (
+    TakeNetwork,
+    TrainNetwork,
+    put_into_package,
+    take_network,
+    without_machine,
+)
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import described
-from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.runner.task_inputs import TRAINING
-from benchmarks.tasks.pretrained_network import TakeNetwork, put_into_package, take_network, without_machine
-from benchmarks.tasks.task import Outcome
-from benchmarks.tasks.training import TrainNetwork
+from benchmarks.runner.schedule import TRAINING, Schedule, tasks_of
+from benchmarks.runner.task import Outcome
 from benchmarks.training import Training
 from snug import trained
 from snug.networks.trained_model import TrainedModel
 from snug.recipes.named import PBNS
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene
-from tests.benchmarks.tasks.test_cell_tasks import TINY, plan_of
+from tests.benchmarks.runner.test_cell_tasks import TINY, plan_of
 from tests.snug.training.dressing import swaying, tube_dress
 
 WALK = dataclasses.replace(swaying(16), name="walk")

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from benchmarks.process.timing import MOST, clocked
+from benchmarks.timing import MOST, clocked
 
 
 def positions_of(made):
@@ -130,7 +130,7 @@ def test_a_process_that_goes_on_is_found():
 
 def test_more_than_one_thread_at_work_is_found(monkeypatch):
     # Two threads use processor time twice as fast as time goes by, on a machine with a core for each.
-    monkeypatch.setattr("benchmarks.process.timing.time.process_time", lambda: 2.0 * time.perf_counter())
+    monkeypatch.setattr("benchmarks.timing.time.process_time", lambda: 2.0 * time.perf_counter())
 
     def run():
         time.sleep(0.2)

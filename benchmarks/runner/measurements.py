@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.declarations import load
+from benchmarks.isolated_process import one_line
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
 from benchmarks.plan.plan import Cell, TaskId
-from benchmarks.process.errors import one_line
 from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.tasks.cell_task import build_scene
-from benchmarks.tasks.task import Context, Outcome, Task
+from benchmarks.runner.cells import build_scene
+from benchmarks.runner.task import Context, Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:
-    from benchmarks.tasks.training import TrainNetwork
+    from benchmarks.runner.networks import TrainNetwork
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,17 +12,17 @@ from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Cell, Network
+from benchmarks.runner import ground_truth
+from benchmarks.runner.ground_truth import SimulateClips, SimulateQuasiStatic
+from benchmarks.runner.networks import LONGEST, TrainNetwork
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.tasks import ground_truth
-from benchmarks.tasks.ground_truth import SimulateClips, SimulateQuasiStatic
-from benchmarks.tasks.training import LONGEST, TrainNetwork
 from benchmarks.training import Simulated
 from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
 from snug.recipes.recipe import DEFAULT
 from snug.training.augmentation.mixed_clips import CLIP_FRAMES, augment, make_shared_clips
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, training
-from tests.benchmarks.tasks.test_cell_tasks import plan_of
+from tests.benchmarks.runner.test_cell_tasks import plan_of
 from tests.snug.training.dressing import swaying, tube_dress
 
 MOTION = swaying(90)

@@ -10,7 +10,7 @@ from contextlib import closing
 
 import pytest
 
-from benchmarks.process.isolated_process import LOADED_BY_ALL, IsolatedProcess, WorkerDied
+from benchmarks.isolated_process import LOADED_BY_ALL, IsolatedProcess, WorkerDied
 
 
 def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks import provenance
 from benchmarks.declarations import DeclarationError
-from benchmarks.fingerprint import dependencies
-from benchmarks.fingerprint.dependencies import _files_of, find_module, imported_beside, software
-from benchmarks.fingerprint.digest import digest
-from benchmarks.runner import task_inputs
+from benchmarks.provenance import _files_of, digest, find_module, imported_beside, software
+from benchmarks.runner import schedule
 from tests.project.test_layers import LAYERS, imports
 
 FILES = {
@@ -37,7 +36,7 @@ def project(tmp_path, monkeypatch):
         (tmp_path / path).write_text(text)
         forget()
 
-    monkeypatch.setattr(dependencies, "ROOT", tmp_path)
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
     for path, text in FILES.items():
         write(path, text)
     yield write
@@ -46,7 +45,7 @@ def project(tmp_path, monkeypatch):
 
 def forget() -> None:
     for name in ("_content", "_read"):
-        getattr(dependencies, name).cache_clear()
+        getattr(provenance, name).cache_clear()
 
 
 # --- the project's own code --------------------------------------------------------------------------------
@@ -138,7 +137,7 @@ def test_a_file_in_a_package_counts_with_the_package_and_one_installed_without_w
     (home.parent / "helper.py").write_text("CHANGED = True\n")
     forget()
     assert software(solver) != before
-    monkeypatch.setattr(dependencies, "_distributions", lambda: {"deep": ["deep"]})
+    monkeypatch.setattr(provenance, "_distributions", lambda: {"deep": ["deep"]})
     forget()
     before = software(solver)
     (home.parent / "helper.py").write_text("CHANGED = False\n")
@@ -154,19 +153,19 @@ def test_a_file_in_a_package_counts_with_the_package_and_one_installed_without_w
 # What tasks import and what decides no result: names, files and their formats, origin, sizes that are inputs.
 CARRYING = (
     "benchmarks/plan/plan.py", "benchmarks/declarations.py", "benchmarks/fingerprint",
-    "benchmarks/presets.py", "benchmarks/provenance.py", "benchmarks/results", "benchmarks/tasks/task.py",
-    "benchmarks/training.py", "snug/trained", *dependencies.NO_RESULT,
+    "benchmarks/presets.py", "benchmarks/provenance.py", "benchmarks/results", "benchmarks/runner/task.py",
+    "benchmarks/training.py", "snug/trained", *provenance.NO_RESULT,
 )  # fmt: skip
 TASKS = {
-    "simulation": ("benchmarks/tasks/ground_truth.py", *task_inputs.RUNS, *task_inputs.SOLVERS,
-                   *task_inputs.NETWORKS),
-    "network": ("benchmarks/methods", *task_inputs.RUNS, *task_inputs.SOLVERS, *task_inputs.NETWORKS),
-    "training": task_inputs.TRAINING,
-    "metrics": ("benchmarks/tasks/metric_task.py", *task_inputs.METRICS, *task_inputs.RUNS,
-                *task_inputs.DRESSING),
-    "case": task_inputs.CASES,
+    "simulation": ("benchmarks/runner/ground_truth.py", *schedule.RUNS, *schedule.SOLVERS,
+                   *schedule.NETWORKS),
+    "network": ("benchmarks/methods", *schedule.RUNS, *schedule.SOLVERS, *schedule.NETWORKS),
+    "training": schedule.TRAINING,
+    "metrics": ("benchmarks/runner/measurements.py", *schedule.METRICS, *schedule.RUNS,
+                *schedule.DRESSING),
+    "case": schedule.CASES,
 }  # fmt: skip
-SETTLED = ("benchmarks/tasks/ground_truth.py", *task_inputs.RUNS, *task_inputs.DRESSING)
+SETTLED = ("benchmarks/runner/ground_truth.py", *schedule.RUNS, *schedule.DRESSING)
 
 
 def file_behind(name: str) -> str:
@@ -177,14 +176,14 @@ def file_behind(name: str) -> str:
         return find_module(name.rpartition(".")[0])
 
 
-@pytest.mark.parametrize("place", dependencies.NO_RESULT)
+@pytest.mark.parametrize("place", provenance.NO_RESULT)
 def test_what_decides_no_result_is_there(place):
-    assert (dependencies.ROOT / place).exists()
+    assert (provenance.ROOT / place).exists()
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_what_a_task_declares_holds_all_that_it_imports(task):
-    root = dependencies.ROOT
+    root = provenance.ROOT
     declared = {file.relative_to(root).as_posix() for place in TASKS[task] for file in _files_of(place)}
     missing = set()
     for path in sorted(name for name in declared if name.endswith(".py")):
@@ -215,7 +214,7 @@ def test_what_a_task_declares_holds_all_that_it_imports(task):
 def test_a_change_makes_stale_what_it_may_move(path, stale):
     places = TASKS | {"settled": SETTLED}
     files = {task: {f for place in code for f in _files_of(place)} for task, code in places.items()}
-    assert {task for task in files if dependencies.ROOT / path in files[task]} == stale
+    assert {task for task in files if provenance.ROOT / path in files[task]} == stale
 
 
 def test_digests_tell_values_apart():

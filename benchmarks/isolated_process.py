@@ -18,14 +18,22 @@ from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.process.errors import one_line
-
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
+
+def one_line(error: BaseException) -> str:
+    r"""Return class and message of an error in one line.
+
+    >>> one_line(ValueError("too\nlong"))
+    'ValueError: too long'
+    """
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
 PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
 # What every worker loads. Nothing that a scene may do without: not torch, not what a body is asked with.
-LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.tasks.cell_task")
+LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
 # What every task of a scene with a body loads: torch skins the garment.
 LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")
 

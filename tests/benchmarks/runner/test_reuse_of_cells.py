@@ -7,11 +7,11 @@ import dataclasses
 import pytest
 
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.dry_run import describe
+from benchmarks.runner.execute_plan import describe
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.rows import clock_costs, rows_of
-from benchmarks.tasks.task import Outcome
-from tests.benchmarks.tasks.test_cell_tasks import (
+from benchmarks.runner.task import Outcome
+from tests.benchmarks.runner.test_cell_tasks import (
     TINY,
     finish,
     found_of,

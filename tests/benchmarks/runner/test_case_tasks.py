@@ -6,12 +6,12 @@ import dataclasses
 import time
 
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.dry_run import describe
+from benchmarks.runner.execute_plan import describe
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS
-from tests.benchmarks.tasks.test_cell_tasks import finish, plan_of
+from tests.benchmarks.runner.test_cell_tasks import finish, plan_of
 
 warm = 0.0  # in the process: how often it was warmed up
 

@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 
 from benchmarks.method import Method
 from benchmarks.plan.plan import Cell, TaskId
-from benchmarks.process.memory import peak_memory
-from benchmarks.process.timing import Reading, clocked
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.task import Context, Outcome, Task, failure
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.tasks.task import Context, Outcome, Task, failure
+from benchmarks.timing import Reading, clocked, peak_memory
 
 if TYPE_CHECKING:
     import numpy as np

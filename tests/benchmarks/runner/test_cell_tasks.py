@@ -21,13 +21,13 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
+from benchmarks.runner.cells import CellProcess
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scenes import SCENES as DECLARED
-from benchmarks.tasks.cell_task import CellProcess
-from benchmarks.tasks.task import Context, Outcome, failure
 from tests.benchmarks.runner.misbehaving import HANGING_CHILD
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -268,7 +268,7 @@ def test_torch_says_in_a_plain_error_that_there_is_no_room():
 HANGING = """
 import time
 from contextlib import closing
-from benchmarks.process.isolated_process import IsolatedProcess
+from benchmarks.isolated_process import IsolatedProcess
 if __name__ == "__main__":
     with closing(IsolatedProcess()) as process:
         process.call(print, "begun", seconds=60)

@@ -10,9 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from benchmarks.isolated_process import WorkerDied, one_line
 from benchmarks.plan.plan import TaskId
-from benchmarks.process.errors import one_line
-from benchmarks.process.isolated_process import WorkerDied
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets
@@ -78,7 +77,7 @@ class Task:
         name: unique among the tasks of its kind; part of file names.
         label: for messages.
         inputs: plain values that the outcome depends on.
-        code: folders and files whose content the outcome depends on, see benchmarks.fingerprint.dependencies.
+        code: folders and files whose content the outcome depends on, see benchmarks.provenance.
         needs: tasks without whose success it cannot be run; their outcomes count as inputs.
         reads: tasks whose outcomes it uses where they succeeded; they count as inputs too.
         units: of progress.
@@ -146,6 +145,10 @@ class Task:
     def rows(self, outcome: Outcome) -> list[Row]:
         """Return the rows of an outcome, skips aside; unit, commit and remark are filled in later."""
         return []
+
+
+class RunRefused(ValueError):
+    """The run cannot begin: its folder is another run's, or there is no such cluster; one line says why."""
 
 
 class RunStopped(RuntimeError):

@@ -1,1 +1,0 @@
-"""Fingerprints of values, source code, packages and data files: what makes a stored result stale."""

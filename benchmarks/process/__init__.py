@@ -1,1 +1,0 @@
-"""Processes: work that may hang or crash is done in one of its own."""
