@@ -19,11 +19,11 @@ import numpy as np
 
 from benchmarks.assets.inputs import FEWEST_FRAMES
 from benchmarks.declarations import raised_at
-from benchmarks.isolated_process import one_line
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.plan import TaskId
 from benchmarks.provenance import digest
 from benchmarks.runner.cells import CellTask
+from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.task import Context, Outcome
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim import Potential, Trajectory

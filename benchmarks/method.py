@@ -19,6 +19,17 @@ if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
 
 
+class WorkerDied(RuntimeError):
+    """The work did not come back; the message says why.
+
+    status: the word of a result row, "timeout", "out-of-memory" or "failed".
+    """
+
+    def __init__(self, message: str, status: str = "failed") -> None:
+        super().__init__(message)
+        self.status = status
+
+
 class Method:
     """Interface of a method; one object serves one cell. Derive from it, or write the same names.
 

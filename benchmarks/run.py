@@ -63,7 +63,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         if dry_run:
             print_text(describe(plan))
             return 0
-        from benchmarks.isolated_process import LOADED_BY_DRESSED, start_loading
+        from benchmarks.runner.isolated_process import LOADED_BY_DRESSED, start_loading
         from reference_sim.progress import announce_compilation
 
         if plan.scheduler:

@@ -6,6 +6,7 @@ modules of ours and the heavy ones that it has loaded are in the result.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
 from collections.abc import Mapping
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.method import Method
 from benchmarks.plan.plan import Cell, TaskId
+from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task import Context, Outcome, Task, failure
 from benchmarks.scene import BuiltScene, Scene
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from benchmarks.assets.assets import Assets
+    from benchmarks.validation.case import Case
     from reference_sim import Trajectory
 
 # Status of a trajectory -> status of a result row. A solver stopped on purpose is ok.
@@ -327,3 +330,32 @@ def loaded() -> list[str]:
     """Modules of ours, and the heavy packages, that this process has loaded."""
     ours = {name for name in sys.modules if name.split(".")[0] in OURS}
     return sorted(ours | {name for name in HEAVY if name in sys.modules})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunCase(Task):
+    """The row of one case."""
+
+    kind = "case"
+    stage = "validation"
+    unit_seconds = 0.2
+    case: Case
+
+    def warm_up(self) -> None:
+        """Compile what the case needs."""
+        self.case.warm_up()
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Run the case; its row is the result."""
+        row = self.case.run()
+        context.tell(self.units)
+        return Outcome(row.status, row.reason, failed=row.status != "ok", result=dataclasses.asdict(row))
+
+    def rows(self, outcome: Outcome) -> list[Row]:
+        """Return the row of the case, also of one that died or hung.
+
+        A hang and a crash are failures of the solver: only one that ends by itself may call it a timeout.
+        """
+        if outcome.result:
+            return [Row(**outcome.result)]
+        return [self.case.row(status="failed", reason=outcome.reason)]

@@ -24,11 +24,11 @@ from typing import TYPE_CHECKING
 
 from benchmarks import provenance
 from benchmarks.assets.assets import Assets
-from benchmarks.isolated_process import one_line
 from benchmarks.provenance import damaged, digest_of_file, software
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import CellTask
 from benchmarks.runner.executor import Needed, TaskProcess, begin_tasks
+from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.task import Context, Outcome, RunRefused, RunStopped, Task, failure
 from benchmarks.timing import one_thread
 

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.external.roll_out_option import MODULE, RollOutFileError
-from benchmarks.isolated_process import one_line
 from benchmarks.plan.plan import STATES, Plan, runs
 from benchmarks.results.row import DECLARED, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache, Cached
 from benchmarks.runner.executor import Executor
+from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.loop import LEFT_OUT, Runner
 from benchmarks.runner.rows import MOST_NAMED, SPREAD, first_of, rows_of
 from benchmarks.runner.run_json import RunLog, now

@@ -18,10 +18,10 @@ from multiprocessing.queues import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
 
 from benchmarks.assets.assets import Assets
-from benchmarks.isolated_process import IsolatedProcess, WorkerDied, new_processes
 from benchmarks.plan.plan import TaskId
 from benchmarks.provenance import damaged
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.isolated_process import IsolatedProcess, WorkerDied, new_processes
 from benchmarks.runner.task import Context, Outcome, RunStopped, Task, failure, tell_nobody
 from benchmarks.timing import give_back
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.declarations import load
-from benchmarks.isolated_process import one_line
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
 from benchmarks.plan.plan import Cell, TaskId
@@ -21,6 +20,7 @@ from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import build_scene
+from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.task import Context, Outcome, Task
 from reference_sim.files.atomic_files import replacing
 

@@ -20,8 +20,7 @@ from benchmarks.metrics import names_of
 from benchmarks.plan.plan import Cell, Network, Plan, flat, network_of, runs
 from benchmarks.provenance import digest, digest_of_file, find_module
 from benchmarks.runner.cache import dependencies
-from benchmarks.runner.case import RunCase
-from benchmarks.runner.cells import BatchCell, RepeatCell, RunCell, RunUntimedCell
+from benchmarks.runner.cells import BatchCell, RepeatCell, RunCase, RunCell, RunUntimedCell
 from benchmarks.runner.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
 from benchmarks.runner.measurements import MeasureCell
 from benchmarks.runner.networks import LONGEST, TakeNetwork, TrainNetwork, take_network, without_machine
@@ -41,11 +40,18 @@ NETWORKS = ("snug", "benchmarks/assets")
 SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py", "benchmarks/fabrics")
 RUNS = (
     SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
-    "benchmarks/isolated_process.py", "benchmarks/runner/cells.py",
+    "benchmarks/runner/isolated_process.py", "benchmarks/runner/cells.py",
 )  # fmt: skip
 SOLVERS = ("benchmarks/methods/solvers", "benchmarks/engines")
 METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "snug")
-CASES = ("benchmarks/runner/case.py", "benchmarks/validation", "benchmarks/assets", *SOLVERS, *METRICS, *RUNS)
+CASES = (
+    "benchmarks/runner/cells.py",
+    "benchmarks/validation",
+    "benchmarks/assets",
+    *SOLVERS,
+    *METRICS,
+    *RUNS,
+)
 TRAINING = ("benchmarks/runner/networks.py", SIMULATOR, *NETWORKS)
 USERS_OWN = ("benchmarks/methods", *METRICS, *RUNS)  # what a user's file may import
 

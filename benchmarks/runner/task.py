@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from benchmarks.isolated_process import WorkerDied, one_line
 from benchmarks.plan.plan import TaskId
+from benchmarks.runner.isolated_process import WorkerDied, one_line
 
 if TYPE_CHECKING:
     from benchmarks.assets.assets import Assets

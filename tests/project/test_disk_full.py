@@ -19,9 +19,9 @@ import pytest
 import torch
 
 from benchmarks import run
-from benchmarks.isolated_process import start_loading
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
+from benchmarks.runner.isolated_process import start_loading
 from reference_sim import Trajectory
 from reference_sim import simulate_command as command
 from reference_sim.files.array_file import write_array

@@ -19,8 +19,7 @@ import numpy as np
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_option import FileConventions
 from benchmarks.external.scene_files import facts_of, write_scene_files
-from benchmarks.isolated_process import WorkerDied
-from benchmarks.method import MethodEntry
+from benchmarks.method import MethodEntry, WorkerDied
 from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.scene import BuiltScene
 from reference_sim.files.array_file import read_arrays

@@ -268,7 +268,7 @@ def test_torch_says_in_a_plain_error_that_there_is_no_room():
 HANGING = """
 import time
 from contextlib import closing
-from benchmarks.isolated_process import IsolatedProcess
+from benchmarks.runner.isolated_process import IsolatedProcess
 if __name__ == "__main__":
     with closing(IsolatedProcess()) as process:
         process.call(print, "begun", seconds=60)

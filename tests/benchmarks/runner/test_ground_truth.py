@@ -8,20 +8,24 @@ from functools import partial
 import numpy as np
 import pytest
 
+from benchmarks import export
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Cell, Network
-from benchmarks.runner import ground_truth
+from benchmarks.runner import ground_truth, training_motions
 from benchmarks.runner.ground_truth import SimulateClips, SimulateQuasiStatic
 from benchmarks.runner.networks import LONGEST, TrainNetwork
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.training import Simulated
 from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
+from snug.motion.library import TRAIN
+from snug.networks.dressed_body import DressedBody
 from snug.recipes.recipe import DEFAULT
 from snug.training.augmentation.mixed_clips import CLIP_FRAMES, augment, make_shared_clips
-from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene, training
+from snug.training.simulated_data import DataSet
+from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, context, dressed_scene, training
 from tests.benchmarks.runner.test_cell_tasks import plan_of
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -217,3 +221,28 @@ def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monke
     assert result["steps"] == 2 * (2 + 25) and result["validation"]["best_step"] == 4
     assert result["validation"]["motions"] == ["held"] and result["frames"] == 30
     assert result["left_out"] == []
+
+
+def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path, monkeypatch, capsys):
+    done: list[str] = []
+
+    def draped(scene, entry, folder):  # in place of a simulation: the garment skinned to the body
+        if not done:
+            done.append("broken")
+            raise RuntimeError("no room")
+        done.append(scene.dressed.motion.name)
+        worn = scene.dressed
+        positions = DressedBody(worn.body, worn.garment).skinned(worn.motion)
+        return Trajectory(positions, worn.garment.faces, np.arange(len(positions)) / 30)
+
+    monkeypatch.setattr(ground_truth, "simulated", draped)
+    monkeypatch.setattr(training_motions, "Executor", lambda run, assets, workers: InProcess(run, assets))
+    out = tmp_path / "motions.h5"
+    arguments = ["tshirt/training-motions", "--set", "sizes=smoke", "-o", str(out)]
+    assert export.main(arguments) == 2
+    assert "failed: RuntimeError: no room" in capsys.readouterr().err and not out.exists()
+    assert export.main(arguments) == 0  # what was finished is not simulated again
+    motions = [motion.name for motion in DataSet.read(out).motions]
+    assert sorted(done) == sorted([*motions, "broken"]) and set(motions) <= set(TRAIN)
+    assert f"{len(motions)} training motions of tshirt in {out}" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["motions.h5"]

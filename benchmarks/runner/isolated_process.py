@@ -18,6 +18,8 @@ from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.method import WorkerDied
+
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
@@ -36,17 +38,6 @@ PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
 # What every task of a scene with a body loads: torch skins the garment.
 LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")
-
-
-class WorkerDied(RuntimeError):
-    """The work did not come back; the message says why.
-
-    status: the word of a result row, "timeout", "out-of-memory" or "failed".
-    """
-
-    def __init__(self, message: str, status: str = "failed") -> None:
-        super().__init__(message)
-        self.status = status
 
 
 def new_processes() -> SpawnContext | ForkServerContext:
