@@ -105,6 +105,11 @@ class Metric:
         if self.of not in NUMBERS_OF:
             raise ValueError(f"metric '{self.name}': of='{self.of}': use one of {', '.join(NUMBERS_OF)}")
 
+    @property
+    def heading(self) -> str:
+        """Title, and unit where it has one, for a column or an axis."""
+        return f"{self.title} [{self.unit}]" if self.unit != "1" else self.title
+
 
 class Kept:
     """Memory of what metric modules computed of an object: kept(make) is make(object), computed once."""

@@ -8,13 +8,19 @@ Of a run without trajectories, pictures of roll-outs that lie in figures/ stay a
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
+
+if TYPE_CHECKING:
+    from reports.run.finished_run import Run
+
+SHOWN = 4  # names in a line
 
 
 @dataclass(frozen=True)
@@ -23,7 +29,7 @@ class Built:
 
     Attributes:
         pdf: path of the PDF.
-        problems: a sentence for each file that could not be read.
+        problems: a sentence for each file that could not be read, and for each gap in the rows.
         answer: page one in few lines of text, empty for a run that has none.
     """
 
@@ -54,12 +60,27 @@ def build_report(run_dir: str | Path) -> Built:
     folder = RunFolder(run_dir)
     run = read_run_with_trainings(folder)
     tables = make_tables(run)
-    write_tables(folder.tables, run, tables)
+    write_tables(folder.tables, tables.values())
     if folder.trajectories.is_dir():  # else pictures of roll-outs that are gone stay
         remove_figures(folder.figures, FIGURES)
     report = Report(run, tables, draw_figures(run, folder.figures, FIGURES))
     write_page(folder, report)
-    return Built(write_pdf(folder, report), run.problems, answer(run, tables))
+    return Built(write_pdf(folder, report), [*run.problems, *gaps(run)], answer(run, tables))
+
+
+def gaps(run: Run) -> Iterator[str]:
+    """Name what rows lack that numbers need: unit, machine, reason of a bad end; times of two machines."""
+    rows = run.frame
+    bad = rows[rows["status"] != "ok"]
+    times = rows[rows["unit"].isin(("s", "ms")) & rows["value"].notna()]
+    for column, asked in (("unit", rows), ("hardware", rows), ("reason", bad)):
+        if len(none := asked[asked[column] == ""]):
+            scenes = ", ".join(dict.fromkeys(none["scene"][:SHOWN]))
+            yield f"results.csv: {len(none)} rows have no {column}, the first of {scenes}"
+    if len(machines := sorted(set(times["hardware"]) - {""})) > 1:
+        yield f"results.csv: times are of several machines: {', '.join(machines)}"
+    if run.changed:
+        yield f"not as the run wrote them: {', '.join(run.changed[:SHOWN])}"
 
 
 @command("reports.build", goes_on="the same command begins again", bad_input=(ResultsError,))
@@ -68,14 +89,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="python -m reports.build",
         description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run.",
-        epilog="Exit status: 0 when all is made, 1 when some file of the run could not be read (the report "
-        "names it), 2 when RUN_DIR is no run folder.",
+        epilog="Exit status: 0 when all is made, 1 when a file of the run could not be read (the report "
+        "names it), was edited, or rows lack unit, machine or reason, 2 when RUN_DIR is no run folder.",
     )
     parser.add_argument("run_dir", metavar="RUN_DIR", help="folder with run.json and results.csv")
     options = parser.parse_args(arguments)
     built = build_report(options.run_dir)
     for problem in built.problems:
-        print(f"reports.build: left out: {problem}", file=sys.stderr)
+        print(f"reports.build: {problem}", file=sys.stderr)
     if built.answer:
         print(built.answer)
     print(built.pdf)

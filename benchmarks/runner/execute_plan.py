@@ -183,7 +183,7 @@ def make_report(log: RunLog) -> str | None:
         print(f"no report ({line}); the results are in {log.folder.path}", file=sys.stderr)
         return None
     for problem in built.problems:
-        print(f"report: left out: {problem}", file=sys.stderr)
+        print(f"report: {problem}", file=sys.stderr)
     return built.answer
 
 

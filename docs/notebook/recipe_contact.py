@@ -4,7 +4,8 @@
         --test-motions 07_02,01_01_a,02_07_a,push_recovery,07_01,06_05 \
         --methods simulation,skinning,docs/notebook/recipe_contact.py -o DIR
 
-DIR/tables/relative_excess_by_motion.csv has the numbers of training.md#the-contact-of-the-papers-recipe.
+`reports.statistics.relative_excess.Excess.by_motion` of that run gives the numbers of
+training.md#the-contact-of-the-papers-recipe.
 Everything but contact is the reference's: terms, start, time step and tolerance. Contact is that of the
 recipe, whole or with one or two constants replaced by the reference's. The run measures these simulations as
 it measures every method: by the contact of the scene.

@@ -16,7 +16,6 @@ from reports.figures.error_against_time import error_of_page_one, errors_of_scen
 from reports.figures.fabric.textile_errors import textile_errors
 from reports.figures.figure import Figure
 from reports.figures.hem import hem
-from reports.figures.histograms import histograms
 from reports.figures.known_answers import known_answers
 from reports.figures.training_curves import training_curves
 from reports.pictures.colour_maps import colour_maps
@@ -55,7 +54,6 @@ BLOCKS: tuple[Block, ...] = (
     Figure("failures", failures),
     Heading("Behind the means"),
     Figure("dots", dots),
-    Figure("histograms", histograms),
     Heading("Dynamics"),
     TableBlock("dynamics"),
     Figure("hem", hem, ("hem_*",)),

@@ -1,4 +1,4 @@
-"""Headline sentences of page one: how near, how it moves, at what cost, how certain, and of other suites."""
+"""Headline sentences of page one: how near, how it moves, at what cost, how certain."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from functools import lru_cache
 import pandas as pd
 
 from reports.blocks.excess_sentences import on_other_bodies, relative_excesses
-from reports.blocks.suite_sentences import engines, textile_tests
 from reports.run.finished_run import Run
 from reports.statistics import paper_claims
 from reports.statistics.break_even import NETWORK, compared_scenes, reference_scenes
@@ -47,7 +46,6 @@ def topics(run: Run) -> list[tuple[str, list[str]]]:
         "How near": relative_excesses(run, worn), "How it moves": _moves(run, worn),
         "At what cost": _cost(run, timed, compared), "How certain": _trust(run, beside, worn),
         "On other bodies": on_other_bodies(run),
-        "Textile tests": [textile_tests(run)], "Engines": [engines(run)],
     }  # fmt: skip
     finished = {
         topic: [unbroken(_ended(text)) for text in texts if text] for topic, texts in sentences.items()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from reports.run.finished_run import Metric
+from benchmarks.metric import Metric
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.number_texts import number, with_spread
@@ -41,8 +41,8 @@ class Change:
 def tolerance_of(metric: Metric) -> float:
     """Return the share of a number up to which another one counts as equal.
 
-    >>> tolerance_of(Metric("energy/strain")), tolerance_of(Metric("cost/frame", of="machine"))
-    (0.02, 0.15)
+    >>> tolerance_of(Metric(name="energy/strain", unit="J", title="Strain", definition=""))
+    0.02
     """
     if metric.of == "machine":
         return TIME_TOLERANCE

@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEVEL, one_protocol
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import OF_SCENES
@@ -28,7 +29,7 @@ from reports.comparison.change import (
 )
 from reports.comparison.gone import CELL, endings, gone
 from reports.comparison.scenes import changed_scenes
-from reports.run.finished_run import Metric, Run
+from reports.run.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means
 from reports.statistics.pareto import REPEATS, TIME, WHOLE

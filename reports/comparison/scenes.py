@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEVEL
 from reports.comparison.change import FLOOR, SPREADS, Change, side, size_of_values, tolerance_of
-from reports.run.finished_run import Metric
 
 ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter
 

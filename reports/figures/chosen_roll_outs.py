@@ -11,7 +11,8 @@ import pandas as pd
 
 from reference_sim.trajectory import Trajectory
 from reports.figures.method_styles import leading
-from reports.run.finished_run import STEP, Run, shown_seeds
+from reports.run.finished_run import Run, shown_seeds
+from reports.run.roll_outs import STEP
 from reports.statistics.page_one_methods import leads
 from reports.statistics.pareto import compared_cells
 

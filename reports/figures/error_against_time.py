@@ -7,11 +7,12 @@ from functools import lru_cache
 
 import pandas as pd
 
+from benchmarks.metric import Metric
 from reports.figures.figure import Drawing
 from reports.figures.plane.curves import SOLVERS, families, of_page_one
 from reports.figures.plane.points import draw_points, write_labels
 from reports.figures.plotting import LABELLED, file_name, fit, new_panels, wrapped
-from reports.run.finished_run import Metric, Run
+from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.pareto import (
     ERRORS,

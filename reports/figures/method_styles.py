@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from reports.run.finished_run import Method, Run
+from reports.run.finished_run import ReportedMethod, Run
 
 Line = str | tuple[float, tuple[float, ...]]  # matplotlib's: a name, or an offset and the dashes [points]
 
@@ -82,7 +82,7 @@ _SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
 _SPARE_MARKERS = ("h", "8", "d", "v", "p")
 
 
-def family_style(run: Run, method: Method) -> Style:
+def family_style(run: Run, method: ReportedMethod) -> Style:
     """Return the style of a method's family; an unknown one has a spare colour that depends on its name.
 
     A method that starts from another has the colour of that one, whether it ran or not; an ablation has the

@@ -37,5 +37,5 @@ def _draw_garment(run: Run, name: str, garment: str, histories: Sequence[History
             log_axis(axes, "y")
     shown = leading(run, {history.method for history in histories})
     fit(figure, [style(run, method) for method in shown])
-    caption = f"{garment}: training loss against wall time; one curve per model and seed. "
-    return Drawing(figure, name, caption + "Numbers: tables/training_curves.csv.")
+    caption = f"{garment}: training loss against wall time; one curve per model and seed."
+    return Drawing(figure, name, caption)

@@ -14,7 +14,8 @@ from reference_sim.obstacle import Obstacle
 from reference_sim.trajectory import Trajectory
 from reports.page.packed_arrays import Pack
 from reports.page.roll_out_choice import groups
-from reports.run.finished_run import STEP, Run
+from reports.run.finished_run import Run
+from reports.run.roll_outs import STEP
 from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
 
 SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one

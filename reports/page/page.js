@@ -292,16 +292,9 @@ function listen() {
   redraw();
 }
 
-// Tables of means first, then those with a row of each scene or motion.
 function listTables() {
   const select = byId('table');
-  const groups = { 'Means': [], 'Each scene or motion': [] };
-  content.tables.forEach((table, k) => {
-    groups[/_by_(scene|motion)$/.test(table.name) ? 'Each scene or motion' : 'Means'].push([String(k), table.caption]);
-  });
-  select.replaceChildren(...Object.entries(groups).filter(([, pairs]) => pairs.length).map(([label, pairs]) => element(
-    'optgroup', { label }, ...pairs.map(([value, text]) => element('option', { value }, text)),
-  )));
+  select.replaceChildren(...content.tables.map((table, k) => element('option', { value: String(k) }, table.caption)));
   for (const button of document.querySelectorAll('[data-copy]')) {
     button.addEventListener('click', async () => {
       await copyText(tableText(content.tables[Number(select.value)], button.dataset.copy));

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports.figures.chosen_roll_outs import SceneRollOuts
-from reports.run.finished_run import STEP
+from reports.run.roll_outs import STEP
 from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
 
 if TYPE_CHECKING:

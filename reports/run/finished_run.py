@@ -5,49 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
+from benchmarks.metric import Metric
 from benchmarks.results.protocol import is_member
 from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row
+from reports.run.roll_outs import RollOuts
 from reports.run.training_histories import History
 
-if TYPE_CHECKING:
-    from reference_sim.trajectory import Trajectory
-
-STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster
 SUITES = ("garments", "speed", "validation", "extremes", "shapes")  # that have tables of their own
 
 
 @dataclass(frozen=True)
-class Metric:
-    """A metric as run.json declares it, see benchmarks.metric.Metric.
-
-    title and definition: head of its column and a sentence on it; table: the one that has the column.
-    arbitrary_zero: its zero is a choice, so only differences mean something. of: what it is a number of, an
-    answer, a method or the machine.
-    """
-
-    name: str
-    unit: str = ""
-    title: str = ""
-    definition: str = ""
-    table: str = ""
-    lower_is_better: bool | None = None
-    arbitrary_zero: bool = False
-    of: str = "answer"
-
-    @property
-    def heading(self) -> str:
-        """Title, and unit where it has one, for a column or an axis."""
-        return f"{self.title} [{self.unit}]" if self.unit not in ("", "1") else self.title
-
-
-@dataclass(frozen=True)
-class Method:
+class ReportedMethod:
     """A method as its rows declare it, see benchmarks.results.row.Row; label: its name for people."""
 
     name: str
@@ -56,22 +29,6 @@ class Method:
     family: str = ""
     level: float | None = None
     base: str = ""
-
-
-class NoRollOuts:
-    """Stored roll-outs of a run that kept none; reports.run.reading.RollOuts reads those of a folder."""
-
-    def cloth(self, scene: str, method: str, seed: int) -> Trajectory | None:
-        """Return a method's roll-out of the scene, None where there is none to be read."""
-        return None
-
-    def body(self, scene: str) -> Trajectory | None:
-        """Return the moving body of the scene, None where there is none to be read."""
-        return None
-
-    def rest_areas(self, scene: str) -> np.ndarray | None:
-        """Return areas (F,) [m^2] at rest of the faces of the scene's garment, None where unknown."""
-        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +46,12 @@ class Run:
     config: Mapping[str, Any]
     frame: pd.DataFrame
     metrics: Mapping[str, Metric]
-    methods: Mapping[str, Method]
+    methods: Mapping[str, ReportedMethod]
     changed: Sequence[str] = ()
     protocol: str = ""
     frame_energies: pd.DataFrame = field(default_factory=pd.DataFrame)
     histories: Sequence[History] = ()
-    roll_outs: NoRollOuts = field(default_factory=NoRollOuts)
+    roll_outs: RollOuts = field(default_factory=RollOuts)
     problems: list[str] = field(default_factory=list)
     _cells: dict[tuple[str, ...], pd.DataFrame] = field(default_factory=dict, init=False)
 
@@ -215,18 +172,19 @@ def make_run(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[s
 def _metric(name: str, unit: str, declared: Mapping[str, Any]) -> Metric:
     lower = declared.get("lower_is_better")
     return Metric(
-        name, unit, str(declared.get("title") or name), str(declared.get("definition") or ""),
-        str(declared.get("table") or ""), None if lower is None else bool(lower),
-        bool(declared.get("arbitrary_zero")), str(declared.get("of") or "answer"),
+        name=name, unit=unit or "1", title=str(declared.get("title") or name),
+        definition=str(declared.get("definition") or ""), table=str(declared.get("table") or ""),
+        lower_is_better=None if lower is None else bool(lower),
+        arbitrary_zero=bool(declared.get("arbitrary_zero")), of=str(declared.get("of") or "answer"),
     )  # fmt: skip
 
 
-def _methods(frame: pd.DataFrame, declared: Mapping[str, Any]) -> dict[str, Method]:
+def _methods(frame: pd.DataFrame, declared: Mapping[str, Any]) -> dict[str, ReportedMethod]:
     """Return the methods in the order of run.json, those that it does not know behind."""
     columns = ["method", "role", "family", "level", "base"]
     rows = frame[frame["method"] != ""][columns].drop_duplicates("method")
     by_name = {
-        name: Method(
+        name: ReportedMethod(
             name, str((declared.get(name) or {}).get("label") or name), role, family or name,
             None if pd.isna(level) else level, base,
         )

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from benchmarks.results import frame_energies
 from benchmarks.results.protocol import one_protocol
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder, model_path
-from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
-from reference_sim.trajectory import Trajectory, TrajectoryError
-from reports.run.finished_run import NoRollOuts, Run, make_run
+from reports.run.finished_run import Run, make_run
+from reports.run.roll_outs import RollOuts, without_folder
 from reports.run.training_histories import History, read_history
 
 
@@ -67,51 +65,7 @@ def _read_histories(folder: RunFolder, run: Run) -> list[History]:
             try:
                 history = read_history(path, method)
             except ValueError as error:
-                run.problems.append(_without_folder(folder, error))
+                run.problems.append(without_folder(folder, error))
             else:
                 histories += [replace(history, garment=str(garment), seed=int(seed))] if history else []
     return histories
-
-
-@dataclass(frozen=True)
-class RollOuts(NoRollOuts):
-    """Stored roll-outs of a run's folder; one that cannot be read adds a sentence to `problems`."""
-
-    folder: RunFolder
-    problems: list[str]
-
-    def cloth(self, scene: str, method: str, seed: int) -> Trajectory | None:
-        """Return a method's roll-out of the scene, None where there is none to be read."""
-        return self.read(self.folder.trajectory_path(scene, method, seed))
-
-    def body(self, scene: str) -> Trajectory | None:
-        """Return the moving body of the scene, None where there is none to be read."""
-        return self.read(self.folder.trajectory_path(scene, "body"))
-
-    def rest_areas(self, scene: str) -> np.ndarray | None:
-        """Return areas (F,) [m^2] at rest of the faces of the scene's garment, None where unknown."""
-        try:
-            return read_array(self.folder.rest_areas_path(scene))
-        except ArrayFileError:
-            return None
-
-    def read(self, path: Path) -> Trajectory | None:
-        """Return the trajectory in a file with the curves that lie beside it, None without one."""
-        try:
-            if not path.is_file():
-                return None
-            trajectory = Trajectory.load(path)
-            if (curves := path.with_suffix(".npz")).is_file():
-                trajectory = replace(trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves))
-            if trajectory.frames:
-                return trajectory
-            problem = f"{path.relative_to(self.folder.path)}: holds no whole frame"
-        except (TrajectoryError, ValueError, OSError) as error:
-            problem = _without_folder(self.folder, error)
-        if problem not in self.problems:  # the page reads again what was drawn
-            self.problems.append(problem)
-        return None
-
-
-def _without_folder(folder: RunFolder, error: Exception) -> str:
-    return str(error).replace(f"{folder.path}/", "")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from reports.run.finished_run import Metric
+from benchmarks.metric import Metric
 from reports.statistics.means_and_spreads import Mean
 
 HALF = 50.0  # [%]
@@ -15,7 +15,8 @@ FRAME = ["scene", "seed", "seconds"]
 
 def share_of_frames(term: str) -> Metric:
     """Declare the metric of the rows that `with_shares` adds."""
-    return Metric(f"frames/{term}", "%", f"Frames with more {term}", lower_is_better=True)
+    title = f"Frames with more {term}"
+    return Metric(name=f"frames/{term}", unit="%", title=title, definition="", lower_is_better=True)
 
 
 def half_of(mean: Mean) -> Mean:

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
+from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import BEFORE_FRAMES
-from reports.run.finished_run import Metric, Run
+from reports.run.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect, recording_of
 from reports.statistics.frame_shares import HALF, half_of, share_of_frames, with_shares
 from reports.statistics.means_and_spreads import pair
@@ -33,7 +34,10 @@ from reports.statistics.verdicts import (
 
 HOLDS, FAILS = "holds", "does not hold"  # or TIED, or OPEN
 # The sum of BEFORE_FRAMES.
-BEFORE = Metric("cost/before", "s", "Data, setup and training", lower_is_better=True, of="machine")
+BEFORE = Metric(
+    name="cost/before", unit="s", title="Data, setup and training", definition="their sum",
+    lower_is_better=True, of="machine",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -254,7 +258,8 @@ def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
         if far.error is None and far.motions > 1:  # all or none of the frames in every motion
             far = replace(far, error=0.0, covers="motions")
         return Comparison(metric, one, other, far)
-    metric = BEFORE if claim.metric == BEFORE.name else run.metrics.get(claim.metric, Metric(claim.metric))
+    unknown = Metric(name=claim.metric, unit="1", title=claim.metric, definition="")
+    metric = BEFORE if claim.metric == BEFORE.name else run.metrics.get(claim.metric, unknown)
     return compare_methods(run, frame, metric, claim.lower, claim.higher)
 
 

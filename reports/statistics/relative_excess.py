@@ -19,8 +19,9 @@ from operator import itemgetter
 import numpy as np
 import pandas as pd
 
+from benchmarks.metric import Metric
 from benchmarks.results.protocol import SOFTENING
-from reports.run.finished_run import Metric, Run
+from reports.run.finished_run import Run
 from reports.statistics.effects import (
     EXCESS,
     Effect,
@@ -35,8 +36,9 @@ from reports.statistics.means_and_spreads import Mean, pair
 TOTAL = "energy/total"
 SKINNING = "skinning"  # the method that has 100 %
 RELATIVE_EXCESS = Metric(
-    "relative_excess/total", "%", "Relative excess",
-    "excess of the total energy over the reference's as a share of skinning's excess", lower_is_better=True,
+    name="relative_excess/total", unit="%", title="Relative excess",
+    definition="excess of the total energy over the reference's as a share of skinning's excess",
+    lower_is_better=True,
 )  # fmt: skip
 
 
@@ -51,8 +53,9 @@ def relative_metric(metric: str) -> Metric:
     term = metric.partition("/")[2]
     definition = f"{term} above the reference's as a share of skinning's excess of total energy"
     return Metric(
-        f"relative_excess/{term}", "%", f"Relative excess of {term}", definition, lower_is_better=True
-    )
+        name=f"relative_excess/{term}", unit="%", title=f"Relative excess of {term}", definition=definition,
+        lower_is_better=True,
+    )  # fmt: skip
 
 
 def with_relative_excess(

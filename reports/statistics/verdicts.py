@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEAST_MOTIONS, LEVEL
-from reports.run.finished_run import Metric, Run
+from reports.run.finished_run import Run
 from reports.statistics.effects import EXCESS, RANGE, Effect, cost_effect, effect
 from reports.statistics.means_and_spreads import Mean, pair
 from reports.statistics.relative_excess import compared_excess, relative_metric

@@ -1,17 +1,16 @@
-"""Tables of a run, for CSV, PDF, page and LaTeX.
+"""Tables of a run, for CSV, PDF and page.
 
 TABLES lists them in order; each entry makes its tables of a run. A new table of means is one Pivot here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from reports.run.finished_run import Run
 from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import shapes
-from reports.tables.dictionary import dictionary
 from reports.tables.engines.audit import engine_audit, engine_laws
 from reports.tables.fabric.textile_tests import (
     fabric_bands,
@@ -22,23 +21,20 @@ from reports.tables.findings import (
     errors_in_spreads,
     findings,
     relative_excess,
-    relative_excess_by_motion,
 )
-from reports.tables.latex import write_latex
 from reports.tables.outcomes import endings, extremes, unfinished, validation
 from reports.tables.page_one_table import overview
 from reports.tables.paper_values import paper_table_1
 from reports.tables.pivot import metric_tables
-from reports.tables.speed import SPEED, crossings, error_rivals, reference_uncertainty
+from reports.tables.speed import crossings, error_rivals, reference_uncertainty
 from reports.tables.table import Table
-from reports.tables.trainings import training_curves, trainings
+from reports.tables.trainings import trainings
 
 TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     metric_tables,
     overview,
     paper_table_1,
     relative_excess,
-    relative_excess_by_motion,
     errors_in_spreads,
     findings,
     ablations,
@@ -46,7 +42,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     crossings,
     error_rivals,
     reference_uncertainty,
-    SPEED,
     shapes,
     fabric_order,
     fabric_drape,
@@ -58,7 +53,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     endings,
     unfinished,
     trainings,
-    training_curves,
 )
 
 
@@ -67,11 +61,10 @@ def make_tables(run: Run) -> dict[str, Table]:
     return {table.name: table for make in TABLES for table in make(run)}
 
 
-def write_tables(folder: Path, run: Run, tables: Mapping[str, Table]) -> None:
-    """Write CSV files, LaTeX and the dictionary of results.csv, in place of those of an earlier report."""
-    for pattern in ("*.csv", "*.tex"):
+def write_tables(folder: Path, tables: Iterable[Table]) -> None:
+    """Write a CSV file of each table, in place of those of an earlier report."""
+    for pattern in ("*.csv", "*.tex"):  # earlier versions wrote LaTeX too
         for path in folder.glob(pattern):
             path.unlink()
-    for table in (*tables.values(), dictionary(run)):
+    for table in tables:
         table.write_csv(folder)
-    write_latex(run, tables, folder)

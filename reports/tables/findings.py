@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from reports.run.finished_run import Metric, Run
+from benchmarks.metric import Metric
+from reports.run.finished_run import Run
 from reports.statistics.paper_claims import judged
 from reports.statistics.relative_excess import SKINNING, Excess, excess_of, with_relative_excess
 from reports.statistics.spreads import AT_REFERENCE, in_spreads
 from reports.statistics.verdicts import measure_of, standing, untested
-from reports.tables.table import GARMENT, METHOD, SCENE, Cell, Column, Table, table
+from reports.tables.table import GARMENT, METHOD, Cell, Column, Table, table
 
 CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero "
@@ -83,19 +84,6 @@ def relative_excess(run: Run) -> list[Table]:
         "typical of the library's recordings, and of other motions. Pooled: ratio of the sums over motions."
     )
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
-
-
-def relative_excess_by_motion(run: Run) -> list[Table]:
-    """Tabulate the relative excess of each method in each motion, the mean over seeds."""
-    lines: list[tuple[Cell, ...]] = [
-        (scene, method, share)
-        for _, method, excess in _measured(run)
-        for scene, share in excess.by_motion.items()
-    ]
-    lines = sorted(lines, key=lambda line: list(dict.fromkeys(line[0] for line in lines)).index(line[0]))
-    columns = (SCENE, METHOD, Column("relative_excess", "Relative excess", "%"))
-    caption = "Relative excess by motion, mean over seeds."
-    return table("relative_excess_by_motion", columns, lines, caption, grouped_by=("scene",))
 
 
 def _measured(run: Run) -> list[tuple[str, str, Excess]]:

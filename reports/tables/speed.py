@@ -1,10 +1,8 @@
-"""Tables on run time: points of the plots, break-even of trainings, rivals, the reference's uncertainty."""
+"""Tables on run time: break-even of trainings, rivals, the reference's uncertainty."""
 
 from __future__ import annotations
 
 import itertools
-
-import pandas as pd
 
 from reports.run.finished_run import Run
 from reports.statistics.break_even import (
@@ -17,10 +15,7 @@ from reports.statistics.break_even import (
 )
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.pareto import (
-    ERRORS,
     SMALLER_STEPS,
-    TIME,
-    WHOLE,
     beaten_by,
     fastest,
     indistinct,
@@ -28,28 +23,11 @@ from reports.statistics.pareto import (
     truncated,
 )
 from reports.statistics.relative_excess import excess_of
-from reports.tables.pivot import Pivot
 from reports.tables.table import GARMENT, Cell, Column, Table, metric_column, table
 
 RIVAL_ERRORS = ("gap/energy", "curvature/error")
 UNCERTAIN = ("curvature/error", "distance/rms")
 OF_STEPS = ("energy/strain", "dynamics/amplitude")  # what the time step changes
-
-
-def _cells_of_speed(run: Run) -> pd.DataFrame:
-    cells = run.cells("speed", "garments")
-    return cells[cells["scene"].isin(run.suite("speed")["scene"])]
-
-
-SPEED = Pivot(
-    "speed",
-    "Run time of a frame and errors, scene by scene: the points of the plots.",
-    metrics=(TIME, WHOLE, *ERRORS),
-    of_table="speed",
-    select=_cells_of_speed,
-    grouped_by=("scene",),
-    required=TIME,
-)
 
 
 def crossings(run: Run) -> list[Table]:

@@ -10,9 +10,9 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.metric import Metric
 from benchmarks.results.row import cell_text
 from reference_sim.files.atomic_files import replacing
-from reports.run.finished_run import Metric
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.number_texts import CSV_DASH, csv_number

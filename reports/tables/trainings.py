@@ -1,4 +1,4 @@
-"""Tables of trainings: how each ended, and every point of its curve."""
+"""Table of trainings: how each ended."""
 
 from __future__ import annotations
 
@@ -52,16 +52,3 @@ def _over_seeds(values: Sequence[float | None]) -> Mean | float | None:
         return float(numbers[0])
     spread = float(numbers.std(ddof=1)) if len(numbers) > 1 else None
     return Mean(float(numbers.mean()), spread, len(numbers), len(values), cells=known) if known else None
-
-
-def training_curves(run: Run) -> list[Table]:
-    """List every logged point of every training; they are too many for a page."""
-    texts = [Column(name, name, text=True) for name in ("garment", "method")]
-    numbers = [Column(name, name, unit) for name, unit in (("seed", ""), ("step", ""), ("seconds", "s"))]
-    columns = (*texts, *numbers, Column("loss", "loss"), Column("validation", "validation"))
-    lines: list[tuple[Cell, ...]] = [
-        (h.garment, h.method, h.seed, int(row["step"]), row["seconds"], row["loss"], row.get("validation"))
-        for h in run.histories
-        for row in h.rows
-    ]
-    return table("training_curves", columns, lines)

@@ -12,7 +12,6 @@ from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
-from reports.text.metric_families import family_rows
 from snug.recipes.named import RECIPES
 
 Rows = list[tuple[str, ...]]
@@ -128,8 +127,9 @@ def _setting(value: object) -> str:
 
 
 def metric_rows() -> Rows:
-    """Return a heading and a row of each declared metric or family of metrics: name, unit, definition."""
-    return [("Metric", "Unit", "Definition"), *family_rows(declared().values())]
+    """Return a heading and a row of each declared metric: name, unit, definition."""
+    rows = ((f"`{metric.name}`", metric.unit, metric.definition) for metric in declared().values())
+    return [("Metric", "Unit", "Definition"), *rows]
 
 
 def size_rows() -> Rows:

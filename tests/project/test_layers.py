@@ -21,6 +21,7 @@ ALLOWED = {
     "reports": (
         "reports",
         "benchmarks.results",
+        "benchmarks.metric.Metric",
         "benchmarks.metrics.surface.curvature",
         "reference_sim.command_line",
         "reference_sim.trajectory",

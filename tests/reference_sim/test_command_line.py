@@ -15,7 +15,7 @@ from reference_sim.command_line import command
 COMMANDS = (
     "snug.check", "snug.train", "benchmarks.check",
     "benchmarks.export", "benchmarks.run", "benchmarks.score",
-    "reports.build", "reports.check", "reports.compare",
+    "reports.build", "reports.compare",
     "reports.film",
 )  # fmt: skip
 

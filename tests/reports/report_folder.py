@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
 from reports.blocks.block import Report
-from reports.run.finished_run import NoRollOuts, Run, make_run
+from reports.run.finished_run import Run, make_run
+from reports.run.roll_outs import RollOuts
 from reports.tables import make_tables
 from snug.training.kinds import find_kind
 
@@ -89,7 +91,7 @@ def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *
         "pairing_group": entry.get("pairing_group", method if network else ""),
         "garment": garment if motion else "", "motion": motion, "part": "whole" if motion else "",
     }  # fmt: skip
-    more = {"suite": "garments", "unit": "J", **declared, **more}
+    more = {"suite": "garments", "unit": "J", "hardware": "here", **declared, **more}
     return Row(scene=scene, method=method, seed=seed, metric=metric, value=value, **more)
 
 
@@ -144,13 +146,13 @@ def report_of(rows: Sequence[Row], **more) -> Report:
     return Report(run, make_tables(run), {})
 
 
-class Stored(NoRollOuts):
+@dataclass(frozen=True)
+class Stored(RollOuts):
     """The same roll-out for every method of every scene."""
 
-    def __init__(self, cloth: Trajectory) -> None:
-        self.stored = cloth
+    stored: Trajectory | None = None
 
-    def cloth(self, scene: str, method: str, seed: int) -> Trajectory:
+    def cloth(self, scene: str, method: str, seed: int) -> Trajectory | None:
         return self.stored
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ from tests.reports.report_folder import (
     declaration,
     row,
     run_folder,
+    run_of,
     sheet,
     write_mesh,
     write_model,
@@ -79,21 +81,12 @@ def test_table_1_is_the_mean_over_scenes(made):
         assert float(lines[method]["energy/total [J]"]) == pytest.approx(1.5 * factor, rel=1e-8)
 
 
-def test_what_is_not_declared_is_a_dash_and_zero_stays_zero(made):
-    lines = read_csv(made.tables / "energies_by_scene.csv")
-    sheet_line = next(x for x in lines if x["scene"] == "hanging_sheet" and x["method"] == "newton-1")
-    assert sheet_line["energy/strain [J]"] == "0"
-    assert sheet_line["energy/collision [J]"] == sheet_line["energy/total [J]"] == "-"
-    fall = next(x for x in lines if x["scene"] == "free_fall")
-    assert fall["energy/strain [J]"] == "-" and fall["energy/gravity [J]"] == "-0.5"
-
-
 def test_every_file_of_the_report_is_there(made):
     names = {path.name for path in made.tables.iterdir()}
-    wanted = ("energies", "energies_by_scene", "curvature", "cost", "validation", "extremes", "unfinished")
+    wanted = ("energies", "curvature", "cost", "validation", "extremes", "unfinished")
     assert {f"{name}.csv" for name in wanted} <= names
     pictures = {path.name for path in made.figures.iterdir()}
-    for stem in ("energy_series_tshirt-walk", "error_against_time", "training", "dots", "histograms"):
+    for stem in ("energy_series_tshirt-walk", "error_against_time", "training", "dots"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
     assert {"lead.png", "frames_tshirt-walk.png", "strip_tshirt-walk.png", "failures.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
@@ -118,10 +111,8 @@ def test_pictures_of_roll_outs_that_are_gone_stay_in_the_report(made, tmp_path):
     shutil.rmtree(published.trajectories)
     build.build_report(published.path)
     pictures = draw_figures(read_run(published), published.figures, FIGURES)
-    kept = {
-        picture.path.name: picture for name in ("lead", "hem", "histograms") for picture in pictures[name]
-    }
-    assert list(kept) == ["lead.png", "histograms.svg"] and "walk at" in kept["lead.png"].caption
+    kept = {picture.path.name: picture for name in ("lead", "hem", "dots") for picture in pictures[name]}
+    assert list(kept) == ["lead.png", "dots.svg"] and "walk at" in kept["lead.png"].caption
     assert b"/Subtype/Image" in published.report_path.read_bytes()
 
 
@@ -254,3 +245,17 @@ def test_histories_come_from_the_models_headers(made, tmp_path):
         write_model(tmp_path / kind, kind)
     taught = [training.read_history(tmp_path / kind, kind) for kind in ("supervised", "tailornet", "dynamic")]
     assert len({history.panel for history in taught}) == 3
+
+
+GAPS = {
+    "rows have no unit": {"unit": ""}, "rows have no hardware": {"hardware": ""},
+    "rows have no reason": {"status": "stalled"}, "times are of several machines": {"hardware": "another"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("says", GAPS)
+def test_a_gap_in_the_rows_is_named(says):
+    times = [row(method=method, metric="cost/frame", unit="ms") for method in ("snug", "pbns")]
+    assert list(build.gaps(run_of(times))) == []
+    (gap,) = build.gaps(run_of([times[0], replace(times[1], **GAPS[says])]))
+    assert says in gap

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from reports.figures.method_styles import Style, family_style, style
 from reports.figures.plotting import power_text
-from reports.run.finished_run import Method, Run
+from reports.run.finished_run import ReportedMethod, Run
 from reports.statistics.pareto import Point, front
 
 SOLVERS = Style("Solvers stopped early", "#A3324B", "X")
@@ -68,11 +68,13 @@ def of_page_one(run: Run, points: Iterable[Point]) -> list[Curve]:
     return curves
 
 
-def _solver(method: Method) -> bool:
+def _solver(method: ReportedMethod) -> bool:
     return method.level is not None and method.role in ("solver", *STARTED)
 
 
-def _grouped(run: Run, points: Iterable[Point], key: Callable[[Method], str]) -> Iterator[list[Point]]:
+def _grouped(
+    run: Run, points: Iterable[Point], key: Callable[[ReportedMethod], str]
+) -> Iterator[list[Point]]:
     """Yield the points of methods that share a key, in the order of their first."""
     groups: dict[str, list[Point]] = {}
     for point in points:

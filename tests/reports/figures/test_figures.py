@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.figures import hem, histograms, known_answers, method_styles
+from reports.figures import hem, known_answers, method_styles
 from reports.figures.chosen_roll_outs import SceneRollOuts
 from reports.figures.dots import dots
 from reports.figures.plotting import file_name, printable
@@ -178,15 +178,6 @@ def test_names_in_any_letters_give_files_that_the_report_finds():
         == "tshirt-U-8DF3U-8DC3-clip"
         == file_name(printable("tshirt/跳跃@clip"))
     )
-
-
-def test_histograms_hold_every_vertex_once():
-    cloth, faces = sheet(0.1)
-    run = run_of([row(method="simulation")])
-    areas = np.full(len(faces), 0.5 * (0.4 / 3) * (0.5 / 3))
-    figure = histograms.draw_histograms(run, {"simulation": mesh(cloth, faces, {})}, areas)
-    shares = [line.get_ydata() for axes in figure.axes for line in axes.get_lines()]
-    assert len(shares) == 2 and all(np.isclose(bins[bins > histograms.RARE].sum(), 100.0) for bins in shares)
 
 
 def test_checks_are_drawn_by_their_tolerances_in_order():

@@ -17,7 +17,8 @@ from reference_sim import Trajectory
 from reports.blocks import FIGURES
 from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH
-from reports.run.finished_run import NoRollOuts, Run
+from reports.run.finished_run import Run
+from reports.run.roll_outs import RollOuts
 from reports.run.training_histories import History
 from tests.reports.report_folder import mesh, row, run_of, sheet
 
@@ -41,7 +42,7 @@ FRAMES = 40
 PHOTOGRAPHS = 5  # figures of cloth: lead, frames, strip, map, failures
 
 
-class Kept(NoRollOuts):
+class Kept(RollOuts):
     """A roll-out for every method of every scene, with all curves that figures read."""
 
     def cloth(self, scene: str, method: str, seed: int) -> Trajectory:

@@ -95,7 +95,6 @@
     }
     HTMLAnchorElement.prototype.click = function saved() { found.picture = [this.download, this.href.slice(0, 22), this.href.length > 3000]; };
     byId('picture').click();
-    found.groups = [...byId('table').querySelectorAll('optgroup')].map((group) => group.label);
     found.address = decodeURIComponent(location.hash);
     await set('scene', byId('scene').options[byId('scene').options.length - 1].value);
     found.scene = byId('scene').value;

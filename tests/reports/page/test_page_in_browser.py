@@ -68,7 +68,6 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert lines["latex"][0] == "\\begin{tabular}{lrrr}" and len(lines["latex"]) == count + 5
     assert lines["latex"][2].startswith("Method & Relative excess [\\%] & ")
     assert state["picture"] == ["tshirt-walk@clip-4.png", "data:image/png;base64,", True]
-    assert state["groups"] == ["Means", "Each scene or motion"]
     assert (
         state["address"].startswith(f"#scene={CLIPS[0]}&methods=simulation,")
         and "colour=curvature" in state["address"]

@@ -92,7 +92,7 @@ def test_a_failure_is_shown_at_its_worst_frame():
     cloth, faces = sheet(0.1)
     strain = {"energy/strain": np.array([0.0, 9.0, 1.0, 1.0, 1.0])}
     assert list(failures(run)) == []
-    stored = replace(run, roll_outs=Stored(mesh(cloth, faces, strain)))
+    stored = replace(run, roll_outs=Stored(stored=mesh(cloth, faces, strain)))
     (drawing,) = failures(stored)
     assert drawing.name == "failures" and worst_failures(stored)[0].frame == 1
 

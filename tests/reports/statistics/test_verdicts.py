@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from reports.run.finished_run import Metric
+from benchmarks.metric import Metric
 from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
 from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, holm, standing, untested
 from tests.reports.report_folder import row, run_of
@@ -66,7 +66,9 @@ def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
     ]
     run = run_of(rows)
     time, size = (
-        compare_methods(run, run.frame, Metric(name, of=of), "snug", "pbns").effect
+        compare_methods(
+            run, run.frame, Metric(name=name, unit="1", title=name, definition="", of=of), "snug", "pbns"
+        ).effect
         for name, of in (("cost/frame", "machine"), ("cost/memory", "method"))
     )
     assert (standing(time, None), untested(time)) == (OPEN, ": no range")

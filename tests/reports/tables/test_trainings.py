@@ -1,17 +1,15 @@
-"""Tables of how trainings ended, and of their curves."""
+"""Table of how trainings ended."""
 
 from __future__ import annotations
 
-import csv
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from reports.run.reading import read_run_with_trainings
 from reports.run.training_histories import History
-from reports.tables.trainings import training_curves, trainings
-from tests.reports.report_folder import row, run_folder, run_of, write_model
+from reports.tables.trainings import trainings
+from tests.reports.report_folder import row, run_of
 
 
 def history(seed: int, end: float, count=50, best_step=float("nan")):
@@ -37,21 +35,3 @@ def test_how_trainings_ended_is_a_mean_over_seeds():
     assert np.isnan(history(0, 3.0, count=45).decrease)  # nine losses at its end are no ten
     (made,) = trainings(replace(run_of([row()]), histories=[history(0, 3.0, count=9)]))
     assert "decrease" not in [column.name for column in made.columns]  # too few were logged
-
-
-def test_curves_of_every_network_are_kept_with_their_value_on_held_out_motions(tmp_path):
-    folder = run_folder(
-        tmp_path, [row("tshirt/walk", m, seed=s) for m in ("snug", "supervised") for s in (0, 1)]
-    )
-    write_model(folder.models / "snug-seed0.safetensors", "snug")
-    write_model(folder.models / "supervised-seed1.safetensors", "supervised", validation=3.0)
-    run = read_run_with_trainings(folder)
-    assert [(h.garment, h.method, h.seed) for h in run.histories] == [
-        ("tshirt", "snug", 0), ("tshirt", "supervised", 1),
-    ]  # fmt: skip
-    (made,) = training_curves(run)
-    lines = list(csv.DictReader(made.write_csv(tmp_path).read_text().splitlines()))
-    assert [line["step"] for line in lines] == ["1", "2", "4"] * 2
-    assert [line["loss"] for line in lines[:3]] == ["2", "1", "0.5"]
-    assert {line["validation"] for line in lines[:3]}.isdisjoint({"3"})
-    assert {line["validation"] for line in lines[3:]} == {"3"}

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from benchmarks.metric import Metric
 from benchmarks.results.row import Row
-from reports.run.finished_run import Metric, make_run
+from reports.run.finished_run import make_run
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.table import METHOD, Column, Table, metric_column
@@ -52,7 +53,9 @@ def test_lines_are_as_wide_as_each_other_and_a_bar_in_a_cell_is_escaped():
 
 
 def test_an_amplitude_of_rounding_alone_is_printed_as_zero():
-    amplitude = metric_column(Metric("dynamics/amplitude", "1", "Hem amplitude"))
+    amplitude = metric_column(
+        Metric(name="dynamics/amplitude", unit="1", title="Hem amplitude", definition="")
+    )
     means = (
         Mean(2.15e-6, None, seeds=1, asked=0),
         Mean(-3e-6, None, seeds=1, asked=0),
