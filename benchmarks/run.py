@@ -64,7 +64,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
             print_text(describe(plan))
             return 0
         from benchmarks.runner.isolated_process import LOADED_BY_DRESSED, start_loading
-        from reference_sim.progress import announce_compilation
+        from reference_sim.command_line import announce_compilation
 
         if plan.scheduler:
             from benchmarks.runner.cluster import check_scheduler  # loads dask

@@ -12,10 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.contact.closest_point import Closest, FaceSearch, Listed
-from reference_sim.geometry.surface import carry, faces_around, plane_normals
+from reference_sim.geometry.closest_point import Closest, FaceSearch, Listed
+from reference_sim.geometry.surface import carry, faces_around, plane_normals, winding_numbers
 from reference_sim.geometry.topology import check_closed
-from reference_sim.geometry.winding_number import winding_numbers
 
 DEFAULT_REGION = 0.20  # [m]
 

@@ -35,7 +35,7 @@ EXAMPLES = """examples:
   python -m reference_sim.simulate skirt.obj --pins top --self-contact --material silk.toml -o skirt.vtkhdf
 
 The output is in metres with y up, whatever the input was in. ParaView opens it as it is; for Blender see
-reference_sim.point_cache.write_point_cache.
+reference_sim.trajectory.write_point_cache.
 Exit status: 0 all frames converged, 1 some frame did not, 2 bad input (nothing is written)."""
 REPLACED = {  # former option -> what serves in its place
     f"--{option}": remedy
@@ -123,7 +123,7 @@ def _count(text: str) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with these arguments; return the exit status."""
     options = make_parser().parse_args(arguments)
-    from reference_sim.progress import announce_compilation
+    from reference_sim.command_line import announce_compilation
 
     announce_compilation()
     return simulate_files(options)

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
+from reference_sim.command_line import progress_bar
 from reference_sim.energies.energy import Energy
-from reference_sim.minimise.result import Result, severity
-from reference_sim.progress import progress_bar
+from reference_sim.minimise.descent import Result, severity
 from reference_sim.time_step import FirstGuess, State, TimeStepper
 from reference_sim.trajectory import Trajectory
 

@@ -12,9 +12,9 @@ import numpy as np
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.energies.inertia import Inertia
-from reference_sim.minimise.result import Result
+from reference_sim.minimise.descent import Result
+from reference_sim.minimise.minimisers import StepMinimiser
 from reference_sim.potential import Potential
-from reference_sim.step_minimiser import StepMinimiser
 
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle

@@ -213,7 +213,7 @@ def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
 
 def write_point_caches(path: Path, selected: SelectedRollOuts) -> None:
     """Write the vertices of each method, and of the body, as NAME_METHOD.pc2 with an .obj beside it."""
-    from reference_sim.point_cache import write_point_cache
+    from reference_sim.trajectory import write_point_cache
 
     for name, mesh in (selected.cloths | ({"body": selected.body} if selected.body else {})).items():
         write_point_cache(path.with_stem(f"{path.stem}_{name.replace('/', '-')}"), mesh)

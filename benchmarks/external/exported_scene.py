@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.external.scene_files import FileList, facts_of, write_scene_files
 from reference_sim.files.atomic_files import new_folder
-from reference_sim.point_cache import write_point_cache
+from reference_sim.trajectory import write_point_cache
 
 if TYPE_CHECKING:
     from benchmarks.method import Method

@@ -191,7 +191,7 @@ def _pickle(path: str) -> dict[str, Any]:
 
 
 def _point_cache(path: str) -> dict[str, Any]:
-    from reference_sim.point_cache import read_point_cache
+    from reference_sim.trajectory import read_point_cache
 
     mesh = Path(path).with_suffix(".obj")
     positions = read_point_cache(path)

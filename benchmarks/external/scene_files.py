@@ -10,7 +10,7 @@ import numpy as np
 
 from reference_sim import Trajectory
 from reference_sim.material import GRAVITY
-from reference_sim.point_cache import write_point_cache
+from reference_sim.trajectory import write_point_cache
 
 if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene, Dressed

@@ -18,11 +18,11 @@ import numpy as np
 from benchmarks.assets.assets import embedded_motions
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from reference_sim.cloth import Cloth
-from reference_sim.contact.closest_point import FaceSearch
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK
+from reference_sim.geometry.closest_point import FaceSearch
 from reference_sim.material import Material
 from reference_sim.obstacle import DEFAULT_REGION
 from reference_sim.time_step import State, TimeStepper

@@ -253,7 +253,7 @@ def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
 
 
 def _bar(tasks: Sequence[Task], total: float, workers: int) -> tqdm[Never]:
-    from reference_sim.progress import progress_bar
+    from reference_sim.command_line import progress_bar
 
     shown = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
     return progress_bar(total=total, desc=_titles(tasks), bar_format=shown, expected_rate=workers)

@@ -7,7 +7,8 @@ import torch
 
 from reference_sim import Cloth
 from reference_sim.energies import Energy
-from reference_sim.kernels.float32_layout import (
+from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.lanes import (
     FAST,
     LANES_FLOAT32,
     TINY,
@@ -16,7 +17,6 @@ from reference_sim.kernels.float32_layout import (
     lay_out,
     set_edges,
 )
-from reference_sim.kernels.kernel_cache import njit
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")

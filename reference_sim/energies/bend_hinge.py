@@ -18,13 +18,13 @@ import numpy as np
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge_kernels import batch, constraint, lanes, vertex_block
 from reference_sim.energies.energy import Energy
-from reference_sim.kernels.float64_lanes import LANES_FLOAT64, add_blocks, arctan2
 from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.lanes import LANES_FLOAT64, add_blocks, arctan2
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from reference_sim.kernels.float64_lanes import BlockPlaces
+    from reference_sim.kernels.lanes import BlockPlaces
 
 SCALINGS = ("length_area", "none")
 BLOCKS = 39  # rows of lanes before those of the blocks, in _hessian

@@ -1,6 +1,6 @@
 """Kernels of hinges for solvers and training: training batches, float32 lanes, sweeps.
 
-See kernels.float32_layout and kernels.fast_kernels for the layouts.
+See kernels.lanes and kernels.fast_kernels for the layouts.
 """
 
 from __future__ import annotations
@@ -17,19 +17,20 @@ from reference_sim.kernels.fast_kernels import (
     VertexBlocks,
     batch_kernel,
 )
-from reference_sim.kernels.float32_layout import (
+from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.lanes import (
     FAST,
     HALF,
     ONE,
     TINY,
     Float32Lanes,
+    add_lanes,
+    copy_lanes,
     empty_state,
     lay_out,
     set_edges,
 )
-from reference_sim.kernels.float32_layout import LANES_FLOAT32 as L
-from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.vector_rows import add_lanes, copy_lanes
+from reference_sim.kernels.lanes import LANES_FLOAT32 as L
 
 if TYPE_CHECKING:
     from reference_sim.energies.bend_hinge import BendHinge

@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.contact.collisions import NO_OBSTACLE, Collisions
 from reference_sim.energies.energy import Energy, Step, demand_positive
+from reference_sim.geometry.collisions import NO_OBSTACLE, Collisions
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

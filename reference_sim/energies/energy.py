@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from reference_sim.cloth import Cloth
-    from reference_sim.kernels.float64_lanes import BlockPlaces
+    from reference_sim.kernels.lanes import BlockPlaces
     from reference_sim.obstacle import Obstacle
 
 

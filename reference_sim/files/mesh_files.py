@@ -53,7 +53,7 @@ def read_mesh(path: str | Path) -> Surface:
             a vertex that is not finite; the message names the file.
 
     >>> import tempfile
-    >>> from reference_sim.point_cache import write_obj
+    >>> from reference_sim.trajectory import write_obj
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_obj(Path(folder, "a.obj"), np.eye(3), np.array([[0, 1, 2]]))
     ...     read_mesh(f"{folder}/a.obj").faces
@@ -143,7 +143,7 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
         MeshError: as `read_mesh`; no files; vertices or faces that do not correspond to the first file's.
 
     >>> import tempfile
-    >>> from reference_sim.point_cache import write_obj
+    >>> from reference_sim.trajectory import write_obj
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     for frame in range(2):
     ...         write_obj(Path(folder, f"{frame}.obj"), np.eye(3) + frame, np.array([[0, 1, 2]]))

@@ -11,7 +11,7 @@ Training on a CPU evaluates one mesh in some fifty configurations, so each eleme
 TRAINING_LANES of them at once, in float32: the innermost loop has a fixed length and no branch, and the
 compiler turns it into vector instructions. Vertices (N, T, V, 3) of N windows of T frames lie in memory as C
 blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows, then the second
-ones, and so on (snug.kernels.lanes). tests/snug/training/test_device.py holds these kernels to the
+ones, and so on (snug.kernels.skinning). tests/snug/training/test_device.py holds these kernels to the
 definitions.
 """
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 USES = {
     "vertex_inertia": "(V,) [N/m] of a pull towards term.x_hat: early-stopped L-BFGS, block descent, XPBD",
     "vertex_weights": "(V,) [N] of a constant pull along -y: early-stopped L-BFGS, block descent, XPBD",
-    "float32_lanes": "kernels.float32_layout.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS",
+    "float32_lanes": "kernels.lanes.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS",
     "vertex_block": "VertexBlocks: vertex block descent",
     "constraint": "Constraints: XPBD",
     "training_batch": "BatchKernel: the loss of trainings on a CPU",

@@ -16,13 +16,16 @@ from typing import Any
 import numpy as np
 
 from reference_sim.kernels.fast_kernels import StepTerms, step_terms
-from reference_sim.kernels.float32_layout import FAST, HALF, SCRATCH, Float32Lanes, to_blocks
-from reference_sim.kernels.kernel_argument import call_each, kernel_argument
-from reference_sim.kernels.kernel_cache import njit
-from reference_sim.minimise.descent import SUFFICIENT_DECREASE, mean_weight
-from reference_sim.minimise.lbfgs_history import LEAST_CURVATURE
-from reference_sim.minimise.result import TOLERANCE, Result
-from reference_sim.minimise.scalar_factor import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit
+from reference_sim.kernels.lanes import FAST, HALF, SCRATCH, Float32Lanes, to_blocks
+from reference_sim.minimise.cholesky import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.minimise.descent import (
+    LEAST_CURVATURE,
+    SUFFICIENT_DECREASE,
+    TOLERANCE,
+    Result,
+    mean_weight,
+)
 from reference_sim.potential import Potential
 
 HALVINGS = 12  # of a step before its direction is given up

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference_sim.cholesky import analyse
-from reference_sim.minimise.descent import Descent, Observer, mean_weight
-from reference_sim.minimise.lbfgs_history import dot
-from reference_sim.minimise.result import Stop
+from reference_sim.minimise.cholesky import analyse
+from reference_sim.minimise.descent import Descent, Observer, Stop, dot, mean_weight
 from reference_sim.potential import Potential
 
 REFERENCE_DT = 1 / 30  # [s], in shifts by M/dt^2 of a potential without inertia

@@ -19,12 +19,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.cholesky import analyse
 from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
-from reference_sim.minimise.descent import NOT_FINITE, Descent, Observer, iterate
-from reference_sim.minimise.lbfgs_history import LBFGSHistory
+from reference_sim.minimise.cholesky import analyse
+from reference_sim.minimise.descent import (
+    NOT_FINITE,
+    TOLERANCE,
+    Descent,
+    LBFGSHistory,
+    Observer,
+    Result,
+    Stop,
+    check_tolerance,
+    iterate,
+)
 from reference_sim.minimise.newton import Newton
-from reference_sim.minimise.result import TOLERANCE, Result, Stop, check_tolerance
 from reference_sim.potential import Potential
 
 if TYPE_CHECKING:

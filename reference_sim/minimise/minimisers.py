@@ -1,15 +1,23 @@
-"""Minimisers by name: same call, same type of result."""
+"""Minimisers by name, and the minimisation of one time step.
+
+A step of most potentials is one call of their minimiser, from the first guess. A barrier, which nothing may
+pass, must be approached along a free way; a term that joins late is left out until the cloth comes near
+itself.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from reference_sim.minimise.descent import Result, severity
 from reference_sim.minimise.lbfgs import LBFGS
 from reference_sim.minimise.newton import Newton
-from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 
 
@@ -90,3 +98,162 @@ def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **opt
         [-0.1, -0.1]
     """
     return make_minimiser(potential, method, **options).minimise(x0)
+
+
+MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
+LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
+APPROACH_SHARE = 0.8  # of the way to the next touch: closer, a barrier grows stiff
+# Minimiser of a step whose terms join late, as L-BFGS ends by it too, and options that it shares.
+ENDING = {"method": "newton", "reuse": True, "start_projected": True}
+LIMITS = ("tolerance", "max_iterations", "timeout")
+
+
+class StepMinimiser:
+    """Minimiser of the potential of a step, from where the step starts and a first guess of its end.
+
+    Args:
+        potential: of the step, inertia included; frozen by its user before each step.
+        obstacle: whether the scene has one, which a barrier may stop on its way.
+        options: of the minimiser, see `simulate`.
+
+    Attributes:
+        options: as given, with the method by default: "newton" with a term whose pairs change, else "lbfgs",
+            whose preconditioner knows nothing of pairs that come and go.
+        opening_method: of the minimisation without the terms that join late; "" where none does.
+        obstacle_stopped: whether a barrier stopped the obstacle on its way in the last step.
+
+    Raises:
+        ValueError: a tolerance that is no number above 0, an unknown method, or a function as method beside a
+            term that joins late.
+    """
+
+    def __init__(self, potential: Potential, *, obstacle: bool, **options: Any) -> None:
+        self.potential = potential
+        method = "newton" if any(energy.dynamic for energy in potential.energies) else "lbfgs"
+        self.options = {"method": method} | options
+        self._late = [energy for energy in potential.energies if energy.joins_late]
+        early = Potential([energy for energy in potential.energies if not energy.joins_late])
+        self._obstacle_may_stop, self.obstacle_stopped = obstacle and early.impassable, False
+        self.opening_method, self._ending = "", self.options
+        self._opening: Minimiser | None = None
+        if self._late and not early.impassable:
+            if callable(self.options["method"]):
+                raise ValueError(
+                    "simulate: Newton's method, not a function, ends steps that "
+                    f"{self._late[0].name!r} joins: choose method 'lbfgs' or 'newton', or leave the term out"
+                )
+            self.opening_method = options.get("method", "lbfgs")
+            self._opening = make_minimiser(early, **options | {"method": self.opening_method})
+            self._ending = ENDING | {name: options[name] for name in LIMITS if name in options}
+        self._minimiser = make_minimiser(potential, **self._ending)
+
+    def start_again(self) -> None:
+        """Let the next run give the bits of a first one: minimisers forget what they have learned.
+
+        A minimiser without `start_again` is made anew.
+        """
+        self.__dict__.pop("_rough_minimiser", None)
+        if isinstance(self._opening, Restartable):
+            self._opening.start_again()
+        if isinstance(self._minimiser, Restartable):
+            self._minimiser.start_again()
+        else:
+            self._minimiser = make_minimiser(self.potential, **self._ending)
+
+    def minimise(self, x: np.ndarray, guess: np.ndarray) -> Result:
+        """Minimise the step that starts at x (V, 3) [m], from `guess` (V, 3) [m] or from as near as x comes.
+
+        Counts and seconds of the result are those of all its minimisations together.
+        """
+        self.obstacle_stopped = False
+        if not np.isfinite(guess).all():
+            return self.minimise_from(guess)  # it reports the divergence
+        return self._open(x, guess) if self._opening else self._approach(x, guess)
+
+    def minimise_from(self, x: np.ndarray) -> Result:
+        """Minimise from x (V, 3) [m], which no barrier keeps pins and obstacle from."""
+        return self._minimiser.minimise(x)
+
+    def _open(self, x: np.ndarray, guess: np.ndarray) -> Result:
+        """Minimise without the terms that join late, and with them only where they have something to say.
+
+        The minimum without them is the answer if the way there is free and they are zero around it. If not,
+        the minimisation with them starts on the way there: from `guess` on if that can be reached, else from
+        x on. Cloth meets itself late on such a way, for a guess moves it with the body.
+        """
+        assert self._opening is not None
+        potential, opened = self.potential, self._opening.minimise(guess)
+        y = opened.positions if np.isfinite(opened.positions).all() else guess
+        free = potential.ccd_fraction(x, y, 0.0) == 1
+        terms = potential.terms(y)
+        if free and opened.status == "converged" and not any(terms[term.name] for term in self._late):
+            return replace(opened, terms=terms)
+        if not free and potential.ccd_fraction(x, guess, 0.0) == 1:
+            x = guess
+        return _after(opened, self._approach(x, y))
+
+    def _approach(self, x: np.ndarray, guess: np.ndarray) -> Result:
+        """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
+
+        With such a term (a barrier) x, pins and obstacle move together from the start of the step to the
+        guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
+        minimisation gains distance, and all move on. So the last minimisation starts without an intersection,
+        pins and obstacle at the end of their way. Without such a term it starts at the guess.
+
+        The rough minimisations share one timeout, and the last one has its own.
+        """
+        potential, pins = self.potential, self.potential.cloth.pins
+        motion, goal, progress = guess - x, guess, 0.0
+        reached, begun, late = [0.0], time.perf_counter(), False
+        rough: list[Result] = []
+        while len(reached) <= MAX_APPROACHES and not late:
+            shares: list[float] = []
+            for free_too in (True, False):
+                if not free_too:
+                    goal = x.copy()
+                    goal[pins] = guess[pins]
+                share = potential.ccd_fraction(x, goal, progress)
+                if share == 1:
+                    potential.set_progress(1.0)
+                    return _after(*rough, self.minimise_from(goal))
+                if share >= max(shares, default=0.0):
+                    part = APPROACH_SHARE * share
+                    x, progress = x + part * (goal - x), progress + part * (1 - progress)
+                shares.append(share)
+            potential.set_progress(progress)
+            rough.append(self._rough_minimiser.minimise(x))
+            x = rough[-1].positions
+            goal = x + (1 - progress) * motion
+            goal[pins] = guess[pins]
+            reached.append(progress)
+            late = time.perf_counter() - begun > self.options.get("timeout", float("inf"))
+            if progress - reached[max(len(reached) - 4, 0)] < LEAST_APPROACH and len(reached) > 3:
+                break
+        self.obstacle_stopped = self._obstacle_may_stop
+        result = _after(*rough, self.minimise_from(x))
+        if result.status == "diverged":
+            return result
+        status = max("stalled", "timeout" if late else result.status, key=severity)
+        problem = "no way without intersection" if status == "stalled" else "gave up after the timeout"
+        reason = f"{problem}: pins and obstacle came {progress:.1%} of theirs"
+        return replace(result, status=status, reason=reason)
+
+    @cached_property
+    def _rough_minimiser(self) -> Minimiser:
+        """Minimiser of few iterations, which gains distance half-way."""
+        options: dict[str, Any] = self._ending | {"max_iterations": 8, "tolerance": 1e-2}
+        return make_minimiser(self.potential, **options)
+
+
+def _after(*results: Result) -> Result:
+    """Return the last result with the counts and seconds of all."""
+    seconds: dict[str, float] = {}
+    for result in results:
+        for part, spent in result.seconds.items():
+            seconds[part] = seconds.get(part, 0.0) + spent
+    return replace(
+        results[-1],
+        iterations=sum(result.iterations for result in results),
+        factorisations=sum(result.factorisations for result in results),
+        seconds=seconds,
+    )

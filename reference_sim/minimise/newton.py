@@ -26,15 +26,19 @@ import numpy as np
 
 from reference_sim.minimise.descent import (
     NOT_FINITE,
+    TOLERANCE,
     Descent,
+    LBFGSHistory,
     Observer,
+    Result,
+    Stop,
     approximate_wolfe,
+    check_tolerance,
+    dot,
     iterate,
     sufficient_decrease,
 )
 from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian, convergence_check
-from reference_sim.minimise.lbfgs_history import LBFGSHistory, dot
-from reference_sim.minimise.result import TOLERANCE, Result, Stop, check_tolerance
 from reference_sim.potential import Potential
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)

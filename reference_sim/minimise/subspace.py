@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from reference_sim.minimise.descent import Descent
+from reference_sim.minimise.descent import Descent, Result
 from reference_sim.minimise.factorised import FactorisedHessian
 from reference_sim.minimise.newton import Newton, NewtonRun
-from reference_sim.minimise.result import Result
 from reference_sim.potential import Potential
 
 SINGULAR = 1e-9  # of the largest singular value: smaller ones are those of columns that others express

@@ -9,8 +9,8 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_sim.contact.closest_point import FaceSearch
 from reference_sim.files.array_file import ArrayFileError, read_arrays
+from reference_sim.geometry.closest_point import FaceSearch
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
 from snug.garments.garment import SKIRT_SMOOTHING, GarmentError, smooth_weights

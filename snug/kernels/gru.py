@@ -23,7 +23,7 @@ from torch import Tensor, nn
 
 from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.vector_rows import copy_lanes
+from reference_sim.kernels.lanes import copy_lanes
 
 # No assumption on NaN or infinity: the guard of training must see them.
 FAST = {"contract", "nsz"}
@@ -215,7 +215,7 @@ def _cell_back(
 class FastLinear(torch.autograd.Function):
     """apply(x (N, T, k), weight (m, k), bias (m,)) -> (N, T, m): nn.Linear by `product`.
 
-    Its result lies in memory as (m, T, N), see snug.kernels.lanes.
+    Its result lies in memory as (m, T, N), see snug.kernels.skinning.
     """
 
     @staticmethod

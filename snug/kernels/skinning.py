@@ -1,8 +1,13 @@
-"""Skinning of many frames of one garment in closed form, for training on a CPU.
+"""Skinning of many frames of one garment in closed form, for training on a CPU, and their layout in memory.
 
 Few joints move a vertex, so each adds its share alone; blending the transforms of all joints takes ten times
-as long. The loops run over frames that lie side by side (snug.kernels.lanes).
-tests/snug/body/test_skinning.py compares values and gradients with `snug.body.skinning.skin`.
+as long. tests/snug/body/test_skinning.py compares values and gradients with `snug.body.skinning.skin`.
+
+The loops run over frames that lie side by side. Vertices (N, T, V, 3) of N windows of T frames lie in memory
+as C blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows, then the
+second ones, and so on. Skinning writes this layout and the kernels of the energies and of contact take it as
+it is. For TRAINING_LANES windows, as training has, the tensor is a view of it, for most other numbers a copy.
+Its shape is (N, T, V, 3) in any case, so terms without a kernel work on it too.
 """
 
 from __future__ import annotations
@@ -15,8 +20,28 @@ from torch import Tensor, nn
 
 from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.vector_rows import copy_lanes
-from snug.kernels.lanes import from_lanes, to_lanes
+from reference_sim.kernels.lanes import copy_lanes
+
+
+def to_lanes(x: Tensor) -> np.ndarray:
+    """Lay out (N, T, ...) as (C, ..., TRAINING_LANES); lanes beyond the last frame repeat it.
+
+    C = ceil(T N / TRAINING_LANES).
+    """
+    x = x.detach().transpose(0, 1)
+    if x.shape[1] % TRAINING_LANES:
+        rows = x.flatten(0, 1)
+        x = torch.cat([rows, rows[-1:].expand(-len(rows) % TRAINING_LANES, *rows.shape[1:])])[None]
+    return x.unflatten(1, (-1, TRAINING_LANES)).movedim(2, -1).flatten(0, 1).contiguous().numpy()
+
+
+def from_lanes(lanes: np.ndarray, windows: int, frames: int) -> Tensor:
+    """Return (C, ..., TRAINING_LANES) as (N, T, ...), the inverse of `to_lanes`."""
+    apart = windows % TRAINING_LANES == 0  # then no block holds frames of two times
+    x = torch.from_numpy(lanes).unflatten(0, (frames if apart else 1, -1)).movedim(-1, 2).flatten(1, 2)
+    if not apart:
+        x = x[0, : frames * windows].unflatten(0, (frames, windows))
+    return x.transpose(0, 1)
 
 
 class FastSkin(torch.autograd.Function):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from reference_sim.progress import progress_bar
+from reference_sim.command_line import progress_bar
 from snug.networks.tensor_file import TensorFileError, select_tensors
 from snug.networks.trained_model import TrainedModel, digest_of_triangles
 from snug.training.checkpoint import Checkpoint, describe_run

@@ -26,7 +26,7 @@ from reference_sim import Trajectory
 from reference_sim import simulate_command as command
 from reference_sim.files.array_file import write_array
 from reference_sim.files.atomic_files import disk_full, new_folder, replacing
-from reference_sim.point_cache import write_obj
+from reference_sim.trajectory import write_obj
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.training import checkpoint as checkpoints
 from snug.training.checkpoint import Checkpoint

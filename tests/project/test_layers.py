@@ -26,7 +26,6 @@ ALLOWED = {
         "reference_sim.command_line",
         "reference_sim.trajectory",
         "reference_sim.files.array_file",
-        "reference_sim.point_cache",
         "reference_sim.files.atomic_files",
         "reference_sim.geometry.surface",
         "reference_sim.geometry.topology",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim.energies import Energy
-from reference_sim.kernels.float64_lanes import BlockPlaces
+from reference_sim.kernels.lanes import BlockPlaces
 
 
 def blocks_of(energy: Energy, x: np.ndarray, convexity: float = 0.0) -> np.ndarray:

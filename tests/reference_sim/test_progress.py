@@ -2,7 +2,7 @@
 
 import io
 
-from reference_sim.progress import BELIEVED_SHARE, LEAST, announce_compilation, progress_bar
+from reference_sim.command_line import BELIEVED_SHARE, LEAST, announce_compilation, progress_bar
 
 
 def _time_left(*, done, seconds, **options):

@@ -16,6 +16,7 @@ import pytest
 import torch
 
 from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, minimise, simulate
+from reference_sim.command_line import progress_bar
 from reference_sim.energies import (
     BendHinge,
     ContactBarrier,
@@ -26,7 +27,6 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.minimise.newton import Newton
-from reference_sim.progress import progress_bar
 from reference_sim.simulate_command import summarise
 from tests.reference_sim.meshes import box, grid, random_rotation, sphere
 

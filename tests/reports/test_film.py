@@ -12,7 +12,7 @@ from PIL import Image
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
-from reference_sim.point_cache import read_point_cache
+from reference_sim.trajectory import read_point_cache
 from reports import film
 from reports.pictures.render import camera_axes
 from reports.run.selected_roll_outs import SelectedRollOuts

@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE
-from reference_sim.kernels.kernel_argument import call_each
-from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.kernel_cache import call_each, njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reference_sim.minimise.descent import Descent, iterate
-from reference_sim.minimise.result import Result, Stop
+from reference_sim.minimise.descent import Descent, Result, Stop, iterate
 from reference_sim.potential import Potential
 
 RUNAWAY_DISTANCE = 100.0  # [m] from the guess: nowhere

@@ -27,8 +27,8 @@ from benchmarks.methods.minimisers.kernels import sweep_constraints
 from benchmarks.methods.minimisers.sweeps import SweepRun, SweepSolver
 from benchmarks.methods.solvers.simulation import Simulation
 from reference_sim.kernels.fast_kernels import step_terms
-from reference_sim.kernels.kernel_argument import kernel_argument, with_types_resolved
-from reference_sim.minimise.result import Stop
+from reference_sim.kernels.kernel_cache import kernel_argument, with_types_resolved
+from reference_sim.minimise.descent import Stop
 from reference_sim.potential import Potential
 
 

@@ -52,7 +52,6 @@ def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[n
 
     There the winding number of the surface around a point a little off the vertex, along its normal, is one.
     """
-    from reference_sim.geometry.surface import vertex_normals  # loads numba
-    from reference_sim.geometry.winding_number import winding_numbers
+    from reference_sim.geometry.surface import vertex_normals, winding_numbers  # loads numba
 
     return winding_numbers(x, faces, x + OFFSET * vertex_normals(x, faces)) > 0

@@ -4,7 +4,7 @@ The loss needs, for each contact sample x of each frame, a plane (closest body p
 that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
 anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
 carry it to a plane in no time. Near the skin it walks to where its sample is now, whenever the energy is
-taken (reference_sim.contact.anchor_walk), and a few frames of each batch are searched anew from the current
+taken (snug.kernels.contact), and a few frames of each batch are searched anew from the current
 prediction, with the simulator's own search and its rule of regions. All positions are float32, relative to
 the pelvis. With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
 coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
@@ -17,12 +17,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from reference_sim.contact.anchor_walk import WALK_SLACK, triangle_adjacency
-from reference_sim.contact.closest_point import FaceSearch, Listed
 from reference_sim.energies import ContactPenalty
+from reference_sim.geometry.closest_point import FaceSearch, Listed
 from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
-from snug.kernels.contact import PARTS, byte_normals, contact_energy
+from snug.kernels.contact import PARTS, WALK_SLACK, byte_normals, contact_energy, triangle_adjacency
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
@@ -38,7 +37,7 @@ class Patch:
         centroids: (Q, 3) [m] in the T-pose.
         sample_rest: (S, 3) [m], contact samples of the garment.
         region: largest distance [m] in the T-pose from a sample to a face it may touch.
-        adjacency: (Q, 3), see reference_sim.contact.anchor_walk.triangle_adjacency.
+        adjacency: (Q, 3), see snug.kernels.contact.triangle_adjacency.
         tree: to search the faces with.
         samples: lists of the faces that they may meet.
     """
@@ -163,7 +162,7 @@ class ContactCache:
 
         Args:
             contact: the contact term.
-            x: (C, V, 3, TRAINING_LANES) float32 [m], see snug.kernels.lanes.
+            x: (C, V, 3, TRAINING_LANES) float32 [m], see snug.kernels.skinning.
             gradients: like x [N].
             frames: (N, T).
             rows: (N, T), the row of each frame in the two arrays that follow.

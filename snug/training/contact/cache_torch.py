@@ -12,8 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from reference_sim.contact.anchor_walk import CROSSINGS, WALK_SLACK
 from reference_sim.geometry.surface import faces_around
+from snug.kernels.contact import CROSSINGS, WALK_SLACK
 from snug.training.contact.cache import PARTS, ContactCache, Patch
 from snug.training.device import CudaGraph, compiled
 
@@ -81,7 +81,7 @@ class TensorContactCache:
         self, samples: Tensor, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor, *,
         reach: float,
     ) -> None:  # fmt: skip
-        """Move anchors of frames (N,) as reference_sim.contact.anchor_walk.walk_to_foot does.
+        """Move anchors of frames (N,) as snug.kernels.contact.walk_to_foot does.
 
         Anchors of samples (N, S, 3) less than `reach` and SLACK above their planes walk. positions, normals:
         see `planes`.

@@ -1,6 +1,6 @@
 """Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
 
-Anchors walk with their samples in every step (reference_sim.contact.anchor_walk). The middle frames of a few
+Anchors walk with their samples in every step (snug.kernels.contact). The middle frames of a few
 windows in a step are searched, for skin that no walk would reach. Their anchors are propagated to the frames
 around them that show almost the same pose. Propagated farther, an anchor from where the thigh was elsewhere
 claims a contact that is none, or misses a thigh that stands in the hem.

@@ -47,7 +47,7 @@ from reference_sim.kernels.fast_kernels import (
     has_kernel,
     warn_slow_path,
 )
-from snug.kernels.lanes import from_lanes, to_lanes
+from snug.kernels.skinning import from_lanes, to_lanes
 from snug.recipes.energies import find_energy
 from snug.recipes.recipe import TERMS, Recipe
 from snug.training.device import CPU, compiled

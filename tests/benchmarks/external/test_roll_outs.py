@@ -25,8 +25,13 @@ from benchmarks.runner.measurements import measured
 from benchmarks.scenes.from_roll_out import declared
 from benchmarks.timing import Reading
 from reference_sim import Trajectory
-from reference_sim.point_cache import HEADER_SIZE, SIGNATURE, read_point_cache, write_point_cache
-from reference_sim.trajectory import TrajectoryError
+from reference_sim.trajectory import (
+    HEADER_SIZE,
+    SIGNATURE,
+    TrajectoryError,
+    read_point_cache,
+    write_point_cache,
+)
 from tests.benchmarks.runner.tasks_by_hand import small_scene, thirds
 
 SCENE = small_scene("hanging_sheet", cells=6, frames=8)

@@ -16,7 +16,7 @@ from benchmarks.scene import BuiltScene
 from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim import Cloth, Material, potential, simulate
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reference_sim.minimise import factorised, lbfgs, scalar_factor
+from reference_sim.minimise import cholesky, factorised, lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid
@@ -27,7 +27,7 @@ SOLVERS = (
 )  # fmt: skip
 SET_UP = (  # what analyses a pattern
     (potential, "nested_dissection"),
-    (scalar_factor, "nested_dissection"),
+    (cholesky, "nested_dissection"),
     (factorised, "analyse"),
     (lbfgs, "analyse"),
 )

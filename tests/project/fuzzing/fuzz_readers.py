@@ -32,7 +32,7 @@ from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.files.mesh_files import read_mesh
 from reference_sim.files.pickle_file import read_pickled_arrays
-from reference_sim.point_cache import read_point_cache
+from reference_sim.trajectory import read_point_cache
 from snug.body.parametric_body import Body
 from snug.body.skeleton import BodyError
 from snug.body.smpl_files import read_body

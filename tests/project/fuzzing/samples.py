@@ -14,7 +14,7 @@ import scipy.sparse
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
-from reference_sim.point_cache import write_obj, write_point_cache
+from reference_sim.trajectory import write_obj, write_point_cache
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
 from snug.networks.architectures import make_network

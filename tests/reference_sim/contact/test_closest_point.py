@@ -11,10 +11,9 @@ import pytest
 from benchmarks.assets.assets import embedded_motions, open_assets
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
-from reference_sim.contact.closest_point import FaceSearch
-from reference_sim.contact.leaf_bounds import LANES
+from reference_sim.geometry.closest_point import FaceSearch
+from reference_sim.geometry.leaf_bounds import LANES, closest_on_triangle
 from reference_sim.geometry.surface import vertex_normals
-from reference_sim.geometry.triangle import closest_on_triangle
 from reference_sim.kernels.kernel_cache import njit
 from tests.reference_sim.meshes import grid, random_rotation, sphere
 

@@ -19,8 +19,8 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.material import GRAVITY
+from reference_sim.minimise.descent import Result
 from reference_sim.minimise.newton import Newton
-from reference_sim.minimise.result import Result
 from reference_sim.time_step import State, TimeStepper
 from tests.reference_sim.energies.barriers import cuts, folded, sheet, still
 from tests.reference_sim.meshes import box, grid, patch, sphere

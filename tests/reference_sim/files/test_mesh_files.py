@@ -12,7 +12,7 @@ import pyvista as pv
 from reference_sim import Trajectory
 from reference_sim.cloth import MeshError
 from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
-from reference_sim.point_cache import write_point_cache
+from reference_sim.trajectory import write_point_cache
 from tests.reference_sim.meshes import grid, sphere
 
 

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 
-from reference_sim.geometry.winding_number import winding_numbers
+from reference_sim.geometry.surface import winding_numbers
 from snug import Body
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])

@@ -34,7 +34,7 @@ FILES = {
 # A kernel that is an argument: its caller does not import it.
 FILES["given.py"] = (
     "import numpy as np, sys\nfrom reference_sim.kernels.kernel_cache import njit\n"
-    "from reference_sim.kernels.kernel_argument import call_each, kernel_argument\n"
+    "from reference_sim.kernels.kernel_cache import call_each, kernel_argument\n"
     "@njit(cache=True)\ndef sums(terms, x):\n    out = np.zeros(len(terms) + 1)\n"
     "    call_each(terms, out, x)\n    return out.sum()\n"
 )
@@ -63,7 +63,7 @@ CALL = (
 FORKING = """
 import json, os, sys, traceback
 import numba
-import reference_sim.kernels.kernel_argument
+import reference_sim.kernels.kernel_cache
 for line in sys.stdin:
     code, path, environment = json.loads(line)
     read, write = os.pipe()

@@ -17,11 +17,11 @@ from benchmarks.scenes.out_of_distribution import faster
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import compiled_lbfgs, lbfgs
+from reference_sim.minimise.cholesky import WIDTH, ScalarPattern, factorise, solve
 from reference_sim.minimise.compiled_lbfgs import ELEMENTS, CompiledLBFGS, evaluate
+from reference_sim.minimise.descent import Result
 from reference_sim.minimise.lbfgs import LBFGS
 from reference_sim.minimise.newton import Newton
-from reference_sim.minimise.result import Result
-from reference_sim.minimise.scalar_factor import WIDTH, ScalarPattern, factorise, solve
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion
 from tests.benchmarks.runner.tasks_by_hand import small_scene

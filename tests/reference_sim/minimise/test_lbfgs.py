@@ -10,7 +10,7 @@ import pytest
 from reference_sim import Cloth, Potential, minimise
 from reference_sim.energies import BendHinge, Gravity, Inertia, StretchStVK
 from reference_sim.minimise import lbfgs
-from reference_sim.minimise.lbfgs_history import LBFGSHistory
+from reference_sim.minimise.descent import LBFGSHistory
 from reference_sim.minimise.minimisers import make_minimiser
 from tests.reference_sim.meshes import grid
 from tests.reference_sim.minimise.minima import assert_minimum, hanging

@@ -8,9 +8,9 @@ import torch
 
 from reference_sim import GRAVITY, Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
+from reference_sim.minimise.descent import STATUSES
 from reference_sim.minimise.minimisers import MINIMISERS, make_minimiser
 from reference_sim.minimise.newton import NewtonRun
-from reference_sim.minimise.result import STATUSES
 from tests.reference_sim.meshes import patch, random_rotation
 from tests.reference_sim.minimise.minima import (
     FACES,

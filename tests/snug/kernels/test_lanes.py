@@ -8,8 +8,8 @@ import torch
 from numba import njit
 
 from reference_sim.kernels.fast_kernels import TRAINING_LANES
-from reference_sim.kernels.vector_rows import add_lanes, copy_lanes, mixed_rows
-from snug.kernels.lanes import from_lanes, to_lanes
+from reference_sim.kernels.lanes import add_lanes, copy_lanes, mixed_rows
+from snug.kernels.skinning import from_lanes, to_lanes
 
 
 @pytest.mark.parametrize(("windows", "frames"), [(16, 3), (32, 2), (1, 5), (5, 4), (21, 1)])

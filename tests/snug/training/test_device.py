@@ -12,7 +12,7 @@ from torch.overrides import TorchFunctionMode
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.kernels.fast_kernels import fast_kernel
 from snug.body.skinning import skin
-from snug.kernels.lanes import from_lanes, to_lanes
+from snug.kernels.skinning import from_lanes, to_lanes
 from snug.recipes.named import PAPER
 from snug.recipes.recipe import DEFAULT
 from snug.training.contact.cache import PARTS, ContactCache, Patch

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from reference_sim.contact.anchor_walk import triangle_adjacency
 from snug.body.skeleton import JOINT
 from snug.body.skinning import skin
+from snug.kernels.contact import triangle_adjacency
 from snug.recipes.recipe import DEFAULT
 from snug.training.augmentation.mixed_clips import augment
 from snug.training.contact.body_patches import MARKED

@@ -11,7 +11,7 @@ import torch
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.energies.bend_hinge import dihedral_angles
 from snug.body.skinning import skin
-from snug.kernels.lanes import from_lanes, to_lanes
+from snug.kernels.skinning import from_lanes, to_lanes
 from snug.recipes.named import PAPER, PBNS_SPRINGS, RECIPES
 from snug.recipes.recipe import DEFAULT, Recipe
 from snug.training.contact.cache import EXACT, PARTS, ContactCache, Patch, quantise

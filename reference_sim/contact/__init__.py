@@ -1,1 +1,0 @@
-"""Search for contact: closest faces of a moving mesh, and pairs of primitives that are close."""

@@ -1,0 +1,280 @@
+"""Layouts of kernels that work on several elements side by side, for loops that become vector instructions.
+
+Float64: a kernel beside its definition copies corners and constants of LANES_FLOAT64 elements into one array
+u of known size, row after row, works them out in a loop of fixed length without a branch, and hands the
+results out one by one. Within one array the compiler knows that nothing overlaps.
+
+Float32: the state of early-stopped L-BFGS is u (3V,), the displacement [m] from a point x_0 that float64 has.
+Differences of positions are taken there once a step, and each element keeps its own; so round-off is that of
+a displacement of millimetres and not of a body metres away. Elements come in blocks of LANES_FLOAT32, the
+last one filled up with elements of no stiffness; arrays of a block lie one quantity after the other.
+tests/reference_sim/minimise/test_compiled.py holds values and gradients to the definitions.
+
+Rows: numba writes a short loop of known length out number by number, and what was stored in single numbers
+cannot be loaded as a vector before all of it has reached the cache. So rows are moved in vector registers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isqrt, prod
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from reference_sim.kernels.fast_kernels import TRAINING_LANES as L
+from reference_sim.kernels.kernel_cache import njit
+
+LANES_FLOAT64 = 8
+
+_STEEP = np.tan(np.pi / 8)
+# arctan(t) = t + t z p(z) for z = t^2 up to tan(pi/8)^2: through 13 Chebyshev points, at most 5e-17 off.
+_P0, _P1, _P2, _P3, _P4, _P5 = (
+    -0.33333333333333324206, 0.19999999999997013892, -0.14285714285329708164,
+    0.11111111085322108759, -0.09090908059031191027, 0.07692281099937743250,
+)  # fmt: skip
+_P6, _P7, _P8, _P9, _P10, _P11 = (
+    -0.06666205259976526188, 0.05876834004614160666, -0.05217312574061591002,
+    0.04499500728984032009, -0.03338782450121195152, 0.01511376509660092467,
+)  # fmt: skip
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def arctan2(y, x):
+    """Return the angle without a branch, within 2e-16; (0, 0) gives NaN."""
+    along, across = abs(x), abs(y)
+    low, high = min(along, across), max(along, across)
+    steep = low > _STEEP * high
+    t = ((low - high) if steep else low) / ((low + high) if steep else high)
+    z = t * t  # at most tan(pi/8)^2
+    high = _P6 + z * (_P7 + z * (_P8 + z * (_P9 + z * (_P10 + z * _P11))))
+    low = _P0 + z * (_P1 + z * (_P2 + z * (_P3 + z * (_P4 + z * _P5))))
+    square = z * z
+    a = t + t * z * (low + square * square * square * high)
+    a = a + 0.25 * np.pi if steep else a
+    a = 0.5 * np.pi - a if across > along else a
+    a = np.pi - a if x < 0.0 else a
+    return -a if y < 0.0 else a
+
+
+@njit(cache=True)
+def add_blocks(u, row, n, e, corners, slots, base, stride, data):
+    """Add the 3 x 3 blocks of element e in lane n of u to the values of a matrix, see `BlockPlaces`.
+
+    Of its corners x corners blocks, u holds those on and below the diagonal, row after row, from `row` on.
+    """
+    for a in range(corners):
+        for b in range(a + 1):
+            slot = slots[e, a * corners + b]
+            if slot >= 0:
+                at, step = base[slot], stride[slot]
+                for j in range(3):
+                    for i in range(3):
+                        data[at + j * step + i] += u[(row + 3 * i + j) * LANES_FLOAT64 + n]
+            slot = slots[e, b * corners + a]
+            if slot >= 0 and a != b:
+                at, step = base[slot], stride[slot]
+                for j in range(3):
+                    for i in range(3):
+                        data[at + j * step + i] += u[(row + 3 * j + i) * LANES_FLOAT64 + n]
+            row += 9
+
+
+@dataclass(frozen=True)
+class BlockPlaces:
+    """Places of the blocks of elements with k corners in an array of values.
+
+    Attributes:
+        slots: (N, k k) number of each element's block of corners a, b at a k + b; -1 where it is not stored.
+        base, stride: by number; entry (i, j) of a block belongs at base + j stride + i.
+        size: of a block, 3 or 1.
+    """
+
+    slots: np.ndarray
+    base: np.ndarray
+    stride: np.ndarray
+    size: int
+
+    def add(self, elements: np.ndarray, blocks: np.ndarray, data: np.ndarray) -> None:
+        """Add the matrices (n, size k, size k) of some elements (n,)."""
+        corners = isqrt(self.slots.shape[1])
+        expected = (len(elements), self.size * corners, self.size * corners)
+        if blocks.shape != expected:
+            raise ValueError(f"matrices of elements have shape {blocks.shape}: expected {expected}")
+        _add(elements, blocks, self.slots, corners, self.size, self.base, self.stride, data)
+
+
+@njit(cache=True)
+def _add(elements, blocks, slots, corners, size, base, stride, data):
+    for n in range(elements.shape[0]):
+        e = elements[n]
+        for a in range(corners):
+            for b in range(corners):
+                slot = slots[e, a * corners + b]
+                if slot >= 0:
+                    for j in range(size):
+                        at = base[slot] + j * stride[slot]
+                        for i in range(size):
+                            data[at + i] += blocks[n, size * a + i, size * b + j]
+
+
+LANES_FLOAT32 = 16
+SCRATCH = 24 * LANES_FLOAT32  # numbers that a kernel may use for its own
+FAST = {"nnan", "nsz", "reassoc", "contract", "arcp"}
+TINY = np.float32(1e-30)
+HALF, ONE, TWO, THREE = np.float32(0.5), np.float32(1.0), np.float32(2.0), np.float32(3.0)
+
+
+@dataclass(frozen=True)
+class Float32Lanes:
+    """A term as `CompiledLBFGS` takes it: what the function for "float32_lanes" returns.
+
+    Attributes:
+        gradient: compiled function (data, u, gradient, scratch) -> energy [J] at u (3V,) [m], which adds to
+            gradient (3V,) [N]; u, gradient and scratch (SCRATCH,) are float32.
+        freeze: function of x_0 (V, 3) [m], called once a step; returns `data`, a tuple of arrays and numbers.
+        stiffness: compiled function ((*data, places), values), which adds to the values of the preconditioner
+            a scalar stiffness [N/m] that differs from step to step; None where there is none.
+        stencils: (S, k) vertices that `stiffness` couples; places (B, k k LANES_FLOAT32) are theirs, -1 where
+            nothing is stored.
+    """
+
+    gradient: Any
+    freeze: Callable[[np.ndarray], tuple[Any, ...]]
+    stiffness: Any = None
+    stencils: np.ndarray | None = None
+
+
+def to_blocks(values: np.ndarray) -> np.ndarray:
+    """Lay numbers (N, k) of N elements out in blocks (B, k LANES_FLOAT32), filled up with zeros."""
+    count, width = values.shape
+    padded = np.zeros((-(-count // LANES_FLOAT32) * LANES_FLOAT32, width), values.dtype)
+    padded[:count] = values
+    return np.ascontiguousarray(padded.reshape(-1, LANES_FLOAT32, width).transpose(0, 2, 1)).reshape(
+        -1, width * LANES_FLOAT32
+    )
+
+
+def lay_out(stencils: np.ndarray, *constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return 3 times the vertices of stencils (N, k), and constants (N,) or (N, ...), both in blocks."""
+    columns = np.concatenate([c.reshape(len(c), prod(c.shape[1:])) for c in constants], axis=1)
+    # Unsigned, for a signed index is first asked whether it counts from the end.
+    return to_blocks(3 * stencils.astype(np.uint32)), to_blocks(columns.astype(np.float32))
+
+
+def empty_state(vertices: np.ndarray, quantities: int) -> np.ndarray:
+    """Return room for so many float32 quantities of each element of these blocks."""
+    return np.zeros((len(vertices), quantities * LANES_FLOAT32), np.float32)
+
+
+@njit(cache=True)
+def set_edges(x, vertices, columns, out):
+    """Write the edges x_(k+1) - x_0, k < columns, of each element into out.
+
+    They are taken from x (V, 3) float64 [m]. With L for LANES_FLOAT32: vertices (B, k L), 3 times the vertex;
+    out (B, 3 columns L) float32.
+    """
+    for b in range(len(vertices)):
+        for g in range(LANES_FLOAT32):
+            first = vertices[b, g] // 3
+            for k in range(columns):
+                other = vertices[b, (k + 1) * LANES_FLOAT32 + g] // 3
+                for i in range(3):
+                    out[b, (3 * k + i) * LANES_FLOAT32 + g] = np.float32(x[other, i] - x[first, i])
+
+
+WIDE = ir.IntType(64)
+WIDTH = 16  # numbers of a row that `bits_at_most` compares
+_intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
+
+
+@_intrinsic
+def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
+    """Copy row i of source to row j of target: rows of TRAINING_LANES numbers in flat float32 arrays."""
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        source_row = _place(context, builder, signature.args[:2], args[:2], L, L)
+        target_row = _place(context, builder, signature.args[2:], args[2:], L, L)
+        builder.store(builder.load(source_row, align=4), target_row, align=4)
+        return context.get_dummy_value()
+
+    return types.void(source, i, target, j), built
+
+
+@_intrinsic
+def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
+    """Add row i of source to row j of target, which may also be one of float64."""
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], L, L), align=4)
+        place = _place(context, builder, signature.args[2:], args[2:], L, L)
+        if signature.args[2].dtype == types.float64:
+            numbers = builder.fpext(numbers, place.type.pointee)
+        builder.store(builder.fadd(builder.load(place, align=4), numbers), place, align=4)
+        return context.get_dummy_value()
+
+    return types.void(source, i, target, j), built
+
+
+@_intrinsic
+def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
+    """Return u rows[i] + v rows[j] + w rows[k], three numbers.
+
+    Rows of three lie in a flat float32 array, with one number more after the last: a row is loaded as four.
+    """
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        four, total = ir.VectorType(ir.FloatType(), 4), None
+        for row, weight, kind in zip(args[1:4], args[4:], signature.args[1:4]):
+            place = _place(context, builder, (rows, kind), (args[0], row), 3, 4)
+            numbers = builder.load(place, align=4)
+            spread = ir.Constant(four, ir.Undefined)
+            for lane in range(4):
+                spread = builder.insert_element(spread, weight, ir.IntType(32)(lane))
+            term = builder.fmul(spread, numbers, flags=("contract",))
+            total = term if total is None else builder.fadd(total, term, flags=("contract",))
+        parts = [builder.extract_element(total, ir.IntType(32)(n)) for n in range(3)]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+    return types.UniTuple(types.float32, 3)(rows, i, j, k, u, v, w), built
+
+
+@_intrinsic
+def bits_at_most(_: Any, rows: Any, i: Any, limit: Any) -> Any:
+    """Return an integer with a bit for each number of row i that is not above the limit.
+
+    rows: of WIDTH numbers in a flat float32 array.
+    """
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = _place(context, builder, signature.args[:2], args[:2], WIDTH, WIDTH)
+        numbers = builder.load(place, align=4)
+        limits = ir.Constant(numbers.type, ir.Undefined)
+        for lane in range(WIDTH):
+            limits = builder.insert_element(limits, args[2], ir.IntType(32)(lane))
+        within = builder.fcmp_unordered("<=", numbers, limits)
+        return builder.zext(builder.bitcast(within, ir.IntType(WIDTH)), WIDE)
+
+    return types.int64(rows, i, types.float32), built
+
+
+@_intrinsic
+def lowest_bit(_: Any, bits: Any) -> Any:
+    """Return the place of the lowest bit that is set in an integer other than zero."""
+
+    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(types.int64), built
+
+
+def _place(context: Any, builder: Any, kinds: Any, args: Any, size: int, loaded: int) -> Any:
+    """Return where a row of `size` numbers begins, as a vector. kinds, args: of array and row number."""
+    array, number = kinds
+    start = context.make_array(array)(context, builder, args[0]).data
+    place = builder.gep(start, [builder.mul(context.cast(builder, args[1], number, types.intp), WIDE(size))])
+    return builder.bitcast(place, ir.VectorType(context.get_value_type(array.dtype), loaded).as_pointer())
