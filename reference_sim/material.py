@@ -158,13 +158,6 @@ class Material:
         """Mass per area rho t [kg/m^2]."""
         return self.density * self.thickness
 
-    def self_weight_stretch(self, length: float) -> float:
-        """Estimate linearly the relative stretch at the top of a strip of `length` [m] under its own weight.
-
-        Above 10 % a unit is usually wrong (the thickness counted twice, say).
-        """
-        return self.areal_density * GRAVITY * length / self.membrane_modulus
-
 
 def _table(path: Path) -> dict[str, Any]:
     if not path.is_file():

@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reference_sim.command_line import Parser, command
+from reference_sim.command_line import Parser, announce_compilation, command
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,10 +22,8 @@ if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
     from reference_sim.trajectory import Trajectory
 
-PROGRAM = "simulate"
 DONE, NOT_CONVERGED = 0, 1  # exit status
 DEFAULT_FRAMES, DEFAULT_DT = 60, 1 / 30
-LARGEST_STRETCH = 0.1  # by its own weight, beyond which a unit is probably wrong
 FAR_FROM_OBSTACLE = 1.0  # [m] from which garment and obstacle hardly belong together
 EXAMPLES = """examples:
   python -m reference_sim.simulate sheet.obj --pins top --frames 90 -o sheet.vtkhdf
@@ -45,22 +43,14 @@ REPLACED = {  # former option -> what serves in its place
         "write_point_cache('out.pc2', Trajectory.load('out.vtkhdf')) in Python": "pc2",
         "Cloth(..., rest_uv=rest_chart(surface, scale)) in Python": "rest uv-scale",
         "Obstacle(..., region=0.2) in Python": "region",
-        "BendHinge(cloth, scaling='none', rest_angles='rest') in Python": "bending-scaling rest-angles",
-        "ContactPenalty(cloth, stiffness=..., margin=..., samples=...) in Python": "contact-stiffness "
-        "contact-margin contact-samples",
-        "ContactBarrier(cloth, distance=..., stiffness=...) in Python": "barrier barrier-distance "
-        "barrier-stiffness",
-        "AreaBarrier(cloth, stiffness=100) in Python": "area-barrier",
+        "an argument of the energy of that name in Python": "bending-scaling rest-angles contact-stiffness "
+        "contact-margin contact-samples barrier barrier-distance barrier-stiffness area-barrier",
         "simulate(..., substeps=2, tolerance=1e-8, method='newton') in Python": "substeps tolerance method "
         "max-iterations",
         "> /dev/null 2>&1": "quiet",
     }.items()
     for option in options.split()
 }
-
-
-class BadInput(ValueError):
-    """Bad input, in one line that names file, element and remedy."""
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -119,57 +109,45 @@ def _count(text: str) -> int:
     return int(text)
 
 
-@command(PROGRAM, goes_on="the output has the frames of the last save, a minute ago at most")
+@command("simulate", goes_on="the output has the frames until then")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command with these arguments; return the exit status."""
-    options = make_parser().parse_args(arguments)
-    from reference_sim.command_line import announce_compilation
-
-    announce_compilation()
-    return simulate_files(options)
-
-
-def simulate_files(options: argparse.Namespace) -> int:
-    """Read, simulate and write as the options say; return the exit status.
+    """Read, simulate and write as the arguments say; return the exit status.
 
     Raises:
         ValueError: bad input, before anything is written; the message names file, element and remedy.
         OSError: a file cannot be read or written.
     """
+    options = make_parser().parse_args(arguments)
+    announce_compilation()
+    _check_options(options)
     from reference_sim.time_loop import simulate
 
-    _check_options(options)
     cloth = read_cloth(options)
     obstacle, obstacle_dt = read_obstacle(cloth, options)
     frames = options.frames
     if frames is None:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else DEFAULT_FRAMES
     dt = options.dt if options.dt is not None else obstacle_dt or DEFAULT_DT
-    if obstacle_dt and abs(dt - obstacle_dt) > 1e-6 * obstacle_dt:
-        print_note(f"{options.obstacle} has {obstacle_dt:.4g} s between frames, and --dt is {dt:.4g}")
     trajectory = simulate(
         cloth, make_terms(cloth, options), dt=dt, frames=frames, obstacle=obstacle, path=options.output,
         progress=options.output.name,
     )  # fmt: skip
-    print(summarise(trajectory, obstacle, frames=frames))
-    print(f"wrote      {options.output}", flush=True)
+    print(f"{summarise(trajectory, frames)}\nwrote      {options.output}", flush=True)
     whole = trajectory.frames == frames and trajectory.status == "converged"
     return DONE if whole else NOT_CONVERGED
 
 
 def _check_options(options: argparse.Namespace) -> None:
     """Refuse what could not be written, or has no meaning, before any work."""
-    from reference_sim.trajectory import TRAJECTORY_SUFFIXES
-
     path = options.output
-    if path.suffix.lower() not in TRAJECTORY_SUFFIXES:
-        raise BadInput(f"{path}: the trajectory ends in .vtkhdf")
+    if path.suffix.lower() not in (".vtkhdf", ".hdf"):
+        raise ValueError(f"{path}: the trajectory ends in .vtkhdf")
     if path.exists():
-        raise BadInput(f"{path} exists: remove it, or choose another name")
+        raise ValueError(f"{path} exists: remove it, or choose another name")
     if not path.parent.is_dir():
-        raise BadInput(f"{path.parent}: no such folder to write {path.name} in")
+        raise ValueError(f"{path.parent}: no such folder to write {path.name} in")
     if options.obstacle is None and (options.obstacle_rest or options.friction):
-        raise BadInput("--obstacle-rest and --friction need an --obstacle")
+        raise ValueError("--obstacle-rest and --friction need an --obstacle")
 
 
 def read_cloth(options: argparse.Namespace) -> Cloth:
@@ -187,20 +165,14 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
     pins = choose_pins(options.pins, positions)
     if len(pins) == len(positions):
-        raise BadInput(f"--pins {options.pins!r} holds every vertex of {options.garment}: choose fewer")
+        raise ValueError(f"--pins {options.pins!r} holds every vertex of {options.garment}: choose fewer")
     size = float((positions.max(axis=0) - positions.min(axis=0)).max())
     if not 0.02 < size < 20:
-        print_note(f"{options.garment} measures {size:.3g} m: is --units {options.units} right?")
-    stretch = material.self_weight_stretch(size)
-    if stretch > LARGEST_STRETCH:
-        print_note(
-            f"a strip of {size:g} m stretches by about {100 * stretch:.0f} % under its own weight: "
-            "check the units of young_modulus [Pa], thickness [m] and density [kg/m^3]"
-        )
+        print(f"note: {options.garment} measures {size:.3g} m: is --units {options.units} right?")
     try:
         return Cloth(positions, surface.faces, material, pins=pins)
     except MeshError as error:
-        raise BadInput(f"{options.garment}: {error}") from None
+        raise ValueError(f"{options.garment}: {error}") from None
 
 
 def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
@@ -210,7 +182,7 @@ def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
     is a box, comparisons joined by commas.
 
     Raises:
-        BadInput: not understood, an index out of range, or nothing chosen.
+        ValueError: not understood, an index out of range, or nothing chosen.
     """
     import numpy as np
 
@@ -223,21 +195,18 @@ def choose_pins(which: str | None, positions: np.ndarray) -> np.ndarray:
     if all(re.fullmatch(r"\d{1,18}", part, re.ASCII) for part in parts):
         indices = np.array([int(part) for part in parts])
         if indices.max() >= len(positions):
-            raise BadInput(f"--pins {indices.max()}: the garment has vertices 0..{len(positions) - 1}")
+            raise ValueError(f"--pins {indices.max()}: the garment has vertices 0..{len(positions) - 1}")
         return indices
     chosen = np.ones(len(positions), dtype=bool)
     for part in parts:
-        match = re.fullmatch(r"([xyz])\s*([<>])=?\s*([-+.\de]+)", part)
-        try:
-            axis, sign, bound = match.groups()  # type: ignore[union-attr]
-            value = float(bound)
-        except (AttributeError, ValueError):
-            raise BadInput(f"--pins {which!r}: give indices, 'top', or a box such as 'y>1.4,x<0.1'") from None
-        along = positions[:, "xyz".index(axis)]
-        chosen &= along >= value if sign == ">" else along <= value
+        match = re.fullmatch(r"([xyz])\s*([<>])=?\s*([-+]?\d*\.?\d+)", part)
+        if match is None:
+            raise ValueError(f"--pins {which!r}: give indices, 'top', or a box such as 'y>1.4,x<0.1'")
+        along, bound = positions[:, "xyz".index(match[1])], float(match[3])
+        chosen &= along >= bound if match[2] == ">" else along <= bound
     if not chosen.any():
         low, high = positions.min(axis=0).round(3).tolist(), positions.max(axis=0).round(3).tolist()
-        raise BadInput(f"--pins {which!r}: no vertex in this box; the garment spans {low} to {high} m, y up")
+        raise ValueError(f"--pins {which!r}: no vertex in this box; the garment spans {low} to {high} m")
     return np.flatnonzero(chosen)
 
 
@@ -255,43 +224,35 @@ def read_obstacle(cloth: Cloth, options: argparse.Namespace) -> tuple[Obstacle |
     from reference_sim.trajectory import TRAJECTORY_SUFFIXES, Trajectory
 
     axes = {"units": options.units, "up": options.up}
-    dt = None
+    rest, dt = None, None
     if options.obstacle.lower().endswith(TRAJECTORY_SUFFIXES):
-        moving = Trajectory.load(options.obstacle, guarded=True)
+        moving = Trajectory.load(options.obstacle)
         positions, faces = moving.positions, moving.faces
         dt = moving.dt if moving.frames > 1 else None
     else:
         positions, surface = read_sequence(options.obstacle)
         positions, faces = to_metres_y_up(positions, **axes), surface.faces
-    rest = None
     if options.obstacle_rest:
         rest_surface = read_mesh(options.obstacle_rest)
         if rest_surface.faces.shape != faces.shape or (rest_surface.faces != faces).any():
-            raise BadInput(
-                f"{options.obstacle_rest}: other faces than {options.obstacle}: export both from one mesh"
-            )
+            remedy = "export both from one mesh"
+            raise ValueError(f"{options.obstacle_rest}: other faces than {options.obstacle}: {remedy}")
         rest = to_metres_y_up(rest_surface.positions, **axes)
     try:
         obstacle = Obstacle(positions, faces, rest_positions=rest)
     except MeshError as error:
-        raise BadInput(f"{options.obstacle}: {error}") from None
+        raise ValueError(f"{options.obstacle}: {error}") from None
     distance = obstacle.signed_distance(cloth.rest_positions, 0)
     if distance.min() > FAR_FROM_OBSTACLE:
-        print_note(f"the garment starts {distance.min():.2g} m from the obstacle: same units and up axis?")
-    elif (inside := distance < 0).any():
-        print_note(
-            f"the garment starts with {inside.sum()} of {len(inside)} vertices inside the obstacle, "
-            f"vertex {distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
-        )
+        print(f"note: the garment starts {distance.min():.2g} m from the obstacle: same units and up axis?")
+    elif distance.min() < 0:
+        depth = f"vertex {distance.argmin()} {-1e3 * distance.min():.0f} mm deep"
+        print(f"note: the garment starts with {(distance < 0).sum()} vertices in the obstacle, {depth}")
     return obstacle, dt
 
 
 def make_terms(cloth: Cloth, options: argparse.Namespace) -> list[Energy]:
-    """Return the terms of Phi in the order of the tables.
-
-    Raises:
-        ValueError: the package of the barrier is missing.
-    """
+    """Return the terms of Phi in the order of the tables. Raises ValueError without the barrier's package."""
     from reference_sim import energies
 
     terms: list[Energy] = [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)]
@@ -303,44 +264,19 @@ def make_terms(cloth: Cloth, options: argparse.Namespace) -> list[Energy]:
         try:
             terms.append(energies.ContactBarrier(cloth, self_contact=True, obstacle=False))
         except ImportError as error:
-            raise BadInput(str(error)) from None
+            raise ValueError(str(error)) from None
     return terms
 
 
-def summarise(trajectory: Trajectory, obstacle: Obstacle | None, *, frames: int) -> str:
-    """Return lines on convergence, energies [J] and depth [mm] at the last frame, and time.
-
-    Args:
-        trajectory: of `simulate`.
-        obstacle: the body that it met, if any.
-        frames: number of frames that was asked for.
-    """
-    import numpy as np
-
+def summarise(trajectory: Trajectory, frames: int) -> str:
+    """Return lines on convergence, energies [J] at the last frame, and time; of `frames` that were due."""
     fields = trajectory.frame_fields
-    lines = [f"frames     {trajectory.frames} of {frames}"]
-    if trajectory.frames > 1:
-        converged, worst = int(fields["converged"][1:].sum()), np.nanmax(fields["gradient_norm"])
-        lines[0] += f"; {converged} of {frames - 1} steps converged, worst relative residual {worst:.1e}"
-    if (relaxed := int(fields["relaxed"].sum())) and trajectory.status == "converged":
-        lines.append(
-            f"round-off  {relaxed} frames within tolerance up to round-off alone, first {trajectory.reason}"
-        )
-    if trajectory.status != "converged":
-        lines.append(f"worst      {trajectory.status}: {trajectory.reason}")
-    if trajectory.frames > 1:
-        energies = [f"{name[7:]} {fields[name][-1]:.3g}" for name in fields if name.startswith("energy/")]
-        lines.append(f"energies   {', '.join(energies)} J at the last frame")
-    if obstacle is not None:
-        distance = obstacle.signed_distance(trajectory.positions[-1], trajectory.frames - 1)
-        share, depth = (distance < 0).mean(), 1e3 * max(-float(distance.min()), 0.0)
-        lines.append(f"obstacle   {share:.2%} of vertices inside, deepest {depth:.1f} mm, at the last frame")
-    if trajectory.frames > 1:
-        seconds = trajectory.frame_seconds[1:]
-        lines.append(f"time       {seconds.sum():.1f} s, {1e3 * np.median(seconds):.0f} ms a frame (median)")
-    return "\n".join(lines)
-
-
-def print_note(text: str) -> None:
-    """Print a note on input that is possible and suspicious."""
-    print(f"note: {text}", flush=True)
+    converged, worst = int(fields["converged"][1:].sum()), max(fields["gradient_norm"][1:], default=0.0)
+    energies = [f"{name[7:]} {fields[name][-1]:.3g}" for name in fields if name.startswith("energy/")]
+    return (
+        f"frames     {trajectory.frames} of {frames}; {converged} of {frames - 1} steps converged, "
+        f"worst relative residual {worst:.1e}\n"
+        f"status     {trajectory.status}{trajectory.reason and ': '}{trajectory.reason}\n"
+        f"energies   {', '.join(energies)} J at the last frame\n"
+        f"time       {trajectory.frame_seconds[1:].sum():.1f} s"
+    )

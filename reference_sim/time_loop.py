@@ -27,9 +27,6 @@ from reference_sim.trajectory import Trajectory
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
 
-BETWEEN_SAVES = 60.0  # [s]
-UNFINISHED = "unfinished", "the run that wrote this did not end"  # status and reason
-
 
 def simulate(
     cloth: Cloth,
@@ -72,8 +69,7 @@ def simulate(
         refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
             ended, and the step solved again from there. A step in which a barrier stopped the obstacle on its
             way is not solved again.
-        path: write the VTKHDF file there: at the end, also of a run that an exception ends, and with the
-            frames so far and status "unfinished" about once a minute.
+        path: write the VTKHDF file there at the end, with status "unfinished" if an exception is the end.
         progress: label of a progress bar with time left; None for silence.
         options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
             that makes one of a potential and the other options), tolerance, max_iterations, timeout [s] of
@@ -136,18 +132,7 @@ def simulate_with(
 ) -> Trajectory:
     """Simulate with a stepper that is set up, which `simulate` makes anew for each run.
 
-    Args:
-        stepper: new, or one that has served another run and was told to `start_again`.
-        frames: number of frames T in the result.
-        start: (V, 3) [m] at frame 0; default the rest positions.
-        velocity: (V, 3) [m/s] at frame 0; default zero.
-        pin_positions: frame -> (P, 3) [m], for handles that move.
-        path: of the VTKHDF file.
-        progress: label of a progress bar.
-
-    Raises:
-        ValueError: wrong shapes, fewer than 1 frame.
-        OSError: no room for the file, or no such folder.
+    The stepper is new, or has served another run and was told to `start_again`; for all else see `simulate`.
     """
     cloth = stepper.cloth
     if frames < 1:
@@ -158,9 +143,7 @@ def simulate_with(
     stepper.check_start(x, v)
     state = State(x, v)
     record.add(x, 0.0, 0.0, _fields_of_start(stepper.potential.energies))
-    if path:  # what cannot be written is to be known before the work
-        record.trajectory(*UNFINISHED).save(path)
-    saved, ended = time.monotonic(), False
+    unfinished: tuple[str, ...] = ("unfinished", "the run that wrote this did not end")
     try:
         for frame in _with_bar(range(1, frames), progress):
             clock = time.perf_counter()
@@ -171,13 +154,10 @@ def simulate_with(
                 break
             state = after
             record.add(state.x, frame * stepper.frame_dt, seconds, _fields(results))
-            if path and time.monotonic() - saved > BETWEEN_SAVES:
-                record.trajectory(*UNFINISHED).save(path)
-                saved = time.monotonic()
-        ended = True
+        unfinished = ()
     finally:
         if path:
-            record.trajectory(*(() if ended else UNFINISHED)).save(path)
+            record.trajectory(*unfinished).save(path)
     return record.trajectory()
 
 

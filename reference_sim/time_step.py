@@ -44,21 +44,7 @@ class TimeStepper:
 
     All that many runs of one scene can share is set up here; `start_again` stands between two of them.
 
-    Args:
-        cloth: the rest state.
-        energies: the terms of Phi; inertia is added.
-        dt: time between frames [s].
-        substeps: steps per frame.
-        obstacle: the moving body, one mesh per frame.
-        guess: one of GUESSES or a function, see `simulate`.
-        quasi_static: whether the velocity is set to zero after every step, sub-steps included.
-        refreeze: times that what a step freezes is searched again at its end, and the step solved again. A
-            step in which a barrier stopped the obstacle is not.
-        options: of the minimiser, see `simulate`.
-
-    Raises:
-        ValueError: unknown guess, fewer than 1 sub-step, a step of no size, a negative refreeze, a tolerance
-            that is no number above 0, or a function as method beside a term that joins late.
+    Arguments and what is refused are those of `simulate`.
     """
 
     def __init__(

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.files.array_file import MOST_PACKED
+from reference_sim.files.array_file import MOST_PACKED, try_out
 from reference_sim.files.atomic_files import replacing
-from reference_sim.files.trial import try_out
 
 if TYPE_CHECKING:
     import h5py

@@ -185,7 +185,7 @@ def _npz(path: str) -> dict[str, Any]:
 
 
 def _pickle(path: str) -> dict[str, Any]:
-    from reference_sim.files.pickle_file import read_pickled_arrays
+    from reference_sim.files.array_file import read_pickled_arrays
 
     return {KEYS[name]: array for name, array in read_pickled_arrays(path, KEYS).items()}
 

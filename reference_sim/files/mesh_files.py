@@ -1,28 +1,37 @@
 """Mesh files of other programs: read one, read a sequence, bring both to metres with y up.
 
-The files are meshio's formats (OBJ, PLY, STL, OFF, VTK) and trajectories of this project (VTKHDF).
+OBJ is read here, since meshio refuses the texture coordinates of a garment with seams; PLY, STL and OFF are
+read by meshio, VTK's files by VTK, which may crash: a process of its own tries these first.
 """
 
 from __future__ import annotations
 
+import contextlib
 import glob
+import io
+import logging
 import re
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.mesh_formats import UV_OF_VTK, Parts, Polygon, read_parts
+from reference_sim.files.array_file import try_out
 
-MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".vtu")
+VTK_SUFFIXES = (".vtk", ".vtp", ".vtu")
+MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", *VTK_SUFFIXES)
+# What a header has that ends; meshio looks for it for ever.
+HEADERS = {".ply": rb"^\s*end_header\s*$", ".off": rb"^\s*\d+\s+\d+\s+\d+\s*$"}
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
 LARGEST_COORDINATE = 1e12  # in any unit: squares and cubes of it are still numbers
 # What programs call the texture coordinates of a vertex: two numbers, or one array of both.
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
-UV_ARRAYS = (UV_OF_VTK, "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
+UV_ARRAYS = ("UV", "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +52,20 @@ class Surface:
     quads: int = 0
     uv: np.ndarray | None = None
     vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+class Contents(NamedTuple):
+    """Contents of a file, before polygons become triangles.
+
+    uv_polygons are places in uv (N, 2), parallel to polygons and -1 for a corner without; none in a file
+    whose vertex_data have the texture coordinates.
+    """
+
+    points: Any
+    polygons: Sequence[Any]
+    vertex_data: Mapping[str, np.ndarray]
+    uv: Sequence[Sequence[float]] = ()
+    uv_polygons: Sequence[Any] = ()
 
 
 def read_mesh(path: str | Path) -> Surface:
@@ -68,10 +91,97 @@ def _read(paths: Sequence[Path]) -> Iterator[Surface]:
             raise MeshError(f"{path}: no such file")
         if path.suffix.lower() not in MESH_SUFFIXES:
             raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
-    yield from map(_surface, paths, read_parts(paths))
+    of_vtk = [path for path in paths if path.suffix.lower() in VTK_SUFFIXES]
+    if of_vtk and try_out(read_vtk, *of_vtk):
+        path, reason = next((path, why) for path in of_vtk if (why := try_out(read_vtk, path)))
+        raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY")
+    for path in paths:
+        read = _read_obj if path.suffix.lower() == ".obj" else read_vtk if of_vtk else _read_with_meshio
+        yield _surface(path, read(path))
 
 
-def _surface(path: Path, parts: Parts) -> Surface:
+def _read_obj(path: Path) -> Contents:
+    points: list[list[float]] = []
+    polygons: list[list[int]] = []
+    uv: list[list[float]] = []
+    uv_polygons: list[list[int]] = []
+    with open(path, encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            kind, *words = line.partition("#")[0].split() or [""]
+            try:
+                if kind == "v":
+                    x, y, z = words[:3]  # colours may follow
+                    points.append([float(x), float(y), float(z)])
+                elif kind == "vt":
+                    uv.append([float(words[0]), float(words[1]) if len(words) > 1 else 0.0])
+                elif kind == "f":
+                    corners = [[*word.split("/"), ""] for word in words]
+                    polygons.append([_counted(c[0], len(points)) for c in corners])
+                    uv_polygons.append([_counted(c[1], len(uv)) if c[1] else -1 for c in corners])
+            except (ValueError, IndexError):
+                raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
+    return Contents(points, polygons, {}, uv, uv_polygons)
+
+
+def _counted(text: str, count: int) -> int:
+    """Return an index from 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError."""
+    number = int(text)
+    if not 0 < abs(number) < 1 << 62:
+        raise ValueError(text)
+    return number - 1 if number > 0 else count + number
+
+
+def _read_with_meshio(path: Path) -> Contents:
+    import meshio
+
+    printed = io.StringIO()
+    try:
+        pattern = HEADERS.get(path.suffix.lower())
+        if pattern and not re.search(pattern, path.read_bytes(), re.MULTILINE):
+            raise ValueError("its header does not end")
+        # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
+        with (
+            contextlib.redirect_stdout(printed),
+            contextlib.redirect_stderr(printed),
+            np.errstate(over="ignore"),
+        ):
+            mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:
+        message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
+        reason = " ".join(message.split())[:300] or type(error).__name__
+        raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ") from None
+    kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
+    data = {name: np.asarray(values) for name, values in mesh.point_data.items()}
+    return Contents(mesh.points, [polygon for block in kinds for polygon in block.data], data)
+
+
+def read_vtk(path: Path) -> Contents:
+    """Read surface cells and values of vertices by VTK. Raises an exception of pyvista, or crashes."""
+    import pyvista
+
+    try:
+        with (
+            warnings.catch_warnings(),
+            pyvista.vtk_verbosity("off"),
+            pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False),
+        ):
+            warnings.simplefilter("ignore")
+            logging.disable(logging.CRITICAL)  # to which readers of pyvista hand errors on
+            mesh: Any = pyvista.read(path)
+    finally:
+        logging.disable(logging.NOTSET)
+    if isinstance(mesh, pyvista.PolyData):
+        polygons = list(mesh.irregular_faces)
+    else:
+        kinds = (pyvista.CellType.TRIANGLE, pyvista.CellType.QUAD, pyvista.CellType.POLYGON)
+        polygons = [mesh.get_cell(i).point_ids for i, kind in enumerate(mesh.celltypes) if kind in kinds]
+    data = {name: np.asarray(mesh.point_data[name]) for name in mesh.point_data}
+    if mesh.active_texture_coordinates is not None:
+        data[UV_ARRAYS[0]] = np.asarray(mesh.active_texture_coordinates)
+    return Contents(mesh.points, polygons, data)
+
+
+def _surface(path: Path, parts: Contents) -> Surface:
     """Check the contents of a file, and cut its quads into triangles."""
     positions, polygons = np.asarray(parts.points, dtype=np.float64), parts.polygons
     if not polygons:
@@ -96,12 +206,12 @@ def _surface(path: Path, parts: Parts) -> Surface:
     return Surface(positions, faces, int((corners == 4).sum()), uv, parts.vertex_data)
 
 
-def _halved(polygons: Sequence[Polygon]) -> list[tuple[int, int, int]]:
+def _halved(polygons: Sequence[Any]) -> list[tuple[int, int, int]]:
     """Cut quads into triangles; triangles stay."""
     return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
 
 
-def _corner_uv(path: Path, parts: Parts, faces: np.ndarray) -> np.ndarray | None:
+def _corner_uv(path: Path, parts: Contents, faces: np.ndarray) -> np.ndarray | None:
     """Return the texture coordinates (F, 3, 2) of the faces' corners, NaN where there are none."""
     places = faces
     if parts.uv_polygons:

@@ -24,8 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.array_file import ArrayFileError, read_arrays
-from reference_sim.files.pickle_file import read_pickled_arrays
+from reference_sim.files.array_file import ArrayFileError, read_arrays, read_pickled_arrays
 from reference_sim.geometry.topology import boundary_loops, check_closed
 from snug.body.parametric_body import SHAPES, Body
 from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, PARENTS, BodyError

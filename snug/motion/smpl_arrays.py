@@ -25,8 +25,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from reference_sim.files.array_file import ArrayFileError, array_names, read_array, read_arrays
-from reference_sim.files.pickle_file import read_pickled_arrays
+from reference_sim.files.array_file import (
+    ArrayFileError,
+    array_names,
+    read_array,
+    read_arrays,
+    read_pickled_arrays,
+)
 from snug.body.skeleton import BODY_JOINTS, JOINT_NAMES, axis_angles
 from snug.motion.motion import MotionError
 from snug.motion.options import MotionFileOptions

@@ -22,8 +22,6 @@ from benchmarks import run
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.isolated_process import start_loading
-from reference_sim import Trajectory
-from reference_sim import simulate_command as command
 from reference_sim.files.array_file import write_array
 from reference_sim.files.atomic_files import disk_full, new_folder, replacing
 from reference_sim.trajectory import write_obj
@@ -108,18 +106,14 @@ def test_a_trajectory_that_finds_no_room_leaves_no_part(tmp_path, size):
 # --- commands ----------------------------------------------------------------------------------------------
 
 
-def test_a_simulation_stops_in_one_line_and_leaves_what_it_saved(tmp_path, monkeypatch):
+def test_a_simulation_stops_in_one_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_obj(Path("sheet.obj"), *grid(6, 6, width=0.4, depth=0.4))
-    arguments = ["sheet.obj", "--pins", "0,6", "--frames", "12", "-o"]
-    assert command.main([*arguments, "whole.vtkhdf"]) == 0
-    limit = Path("whole.vtkhdf").stat().st_size - 2000
-    stopped = limited(limit, "reference_sim.simulate", *arguments, "a.vtkhdf", cwd=tmp_path)
+    arguments = ["sheet.obj", "--pins", "0,6", "--frames", "3", "-o", "a.vtkhdf"]
+    stopped = limited(2000, "reference_sim.simulate", *arguments, cwd=tmp_path)
     assert stopped.returncode == 1 and "Traceback" not in stopped.stderr
     assert "\nsimulate: a.vtkhdf: File too large" in stopped.stderr
-    whole, held = Trajectory.load("whole.vtkhdf"), Trajectory.load("a.vtkhdf")
-    assert held.status == "unfinished" and 1 <= held.frames < 12
-    np.testing.assert_array_equal(held.positions, whole.positions[: held.frames])
+    assert os.listdir() == ["sheet.obj"]
 
 
 def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from reference_sim import GRAVITY, Material
+from reference_sim import Material
 from reference_sim.material import MaterialError
 
 
@@ -38,11 +38,6 @@ def test_plane_stress_in_two_dimensions_is_the_same_sheet(nu):
     m = Material(young_modulus=5e4, poisson_ratio=nu, thickness=1e-3)
     assert m.membrane_modulus == pytest.approx(50.0, rel=1e-13)  # round-off
     assert m.lame_lambda / (m.lame_lambda + 2 * m.lame_mu) == pytest.approx(nu, abs=1e-15)
-
-
-def test_self_weight_stretch_is_that_of_a_hanging_bar():
-    stretch = Material().self_weight_stretch(0.7)
-    assert stretch == pytest.approx(426.0 * GRAVITY * 0.7 / 70e3, rel=1e-13)  # rho g L / E
 
 
 @pytest.mark.parametrize(

@@ -40,20 +40,18 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_every_example_of_the_help_is_understood():
-    lines = EXAMPLES.replace("\\\n", " ").splitlines()
-    commands = [line.split() for line in lines if line.strip().startswith("python -m")]
-    assert len(commands) >= 4
-    for arguments in commands:
-        assert arguments[:3] == ["python", "-m", "reference_sim.simulate"]
-        make_parser().parse_args([word.strip("'") for word in arguments[3:]])
+    commands = [line.split() for line in EXAMPLES.replace("\\\n", " ").splitlines() if "python" in line]
+    assert len(commands) >= 4 and all(
+        words[:3] == ["python", "-m", "reference_sim.simulate"] for words in commands
+    )
+    for words in commands:
+        make_parser().parse_args([word.strip("'") for word in words[3:]])
 
 
 def test_pins_by_index_place_and_height():
     tall = np.column_stack([np.arange(5.0), np.linspace(0, 2, 5), np.zeros(5)])
-    assert choose_pins(None, tall).tolist() == []
-    assert choose_pins("3, 1", tall).tolist() == [3, 1]
-    assert choose_pins("top", tall).tolist() == [4]
-    assert choose_pins("x > 1.5, y<=1.5", tall).tolist() == [2, 3]
+    for which, chosen in ((None, []), ("3, 1", [3, 1]), ("top", [4]), ("x > 1.5, y<=1.5", [2, 3])):
+        assert choose_pins(which, tall).tolist() == chosen
 
 
 def run_module(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -86,7 +84,6 @@ def test_garment_on_a_moving_obstacle(folder, capsys):
     for expected in (
         "frames     4 of 4; 3 of 3 steps converged",
         f"strain {trajectory.frame_fields['energy/strain'][-1]:.3g}",
-        "of vertices inside",
         "wrote      out.vtkhdf",
     ):
         assert expected in out
@@ -107,27 +104,20 @@ def test_units_and_up_axis_do_not_change_the_physics(folder):
     )
 
 
-def test_options_reach_the_simulation(folder):
+def test_options_reach_the_simulation(folder, capsys, monkeypatch):
+    pytest.importorskip("ipctk")
     Path("silk.toml").write_text("young_modulus = 5e4\nthickness = 0.001\n")
     arguments = ["sheet.obj", "--pins", "x<-0.19", "--dt", "1/60", "--frames", "3", "--material", "silk.toml"]
-    assert main([*arguments, "-o", "a.vtkhdf"]) == 0
+    contact = ["--self-contact", "--friction", "0.3", "--obstacle", "ball"]
+    assert main([*arguments, *contact, "-o", "a.vtkhdf"]) == 0
     made = Trajectory.load("a.vtkhdf").provenance
     assert made["dt_s"] == 1 / 60
     assert list(made["material"].values())[:4] == [5e4, 0.485, 0.001, 426.0]
-
-
-def test_self_contact_stands_beside_the_penalty_and_its_friction(folder):
-    pytest.importorskip("ipctk")
-    arguments = ["sheet.obj", "--self-contact", "--friction", "0.3", "--obstacle", "ball"]
-    assert main([*arguments, "-o", "a.vtkhdf"]) == 0
-    terms = Trajectory.load("a.vtkhdf").provenance["terms"]
+    terms = made["terms"]
     assert (terms["barrier"]["self_contact"], terms["barrier"]["obstacle"]) == (True, False)
     assert terms["collision"] and terms["friction"]["coefficient"] == 0.3
-
-
-def test_a_missing_package_is_said_with_its_remedy(folder, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "ipctk", None)
-    assert main(["sheet.obj", "--self-contact", "-o", "a.vtkhdf"]) == 2
+    assert main(["sheet.obj", "--self-contact", "-o", "b.vtkhdf"]) == 2
     assert "needs the package ipctk: pip install ipctk" in capsys.readouterr().err
 
 
@@ -135,22 +125,18 @@ def test_not_converged_is_status_1(folder, capsys, monkeypatch):
     monkeypatch.setattr("reference_sim.time_loop.simulate", partial(simulate, max_iterations=1))
     assert main(["sheet.obj", "--pins", "0", "--frames", "4", "-o", "a.vtkhdf"]) == 1
     out = capsys.readouterr().out
-    assert re.search(
-        r"frames     4 of 4; 0 of 3 steps converged.*\nworst      max_iterations: frame 1: ", out
-    )
+    assert re.search(r"frames     4 of 4; 0 of 3 steps.*\nstatus     max_iterations: frame 1: ", out)
 
 
 def test_suspicious_but_possible_input_is_noted(folder, capsys):
     write("inside.obj", SHEET + np.array([0, -0.05, 0]), FACES)
-    assert main(["inside.obj", "--obstacle", "ball/ball_0.obj", "--frames", "1", "-o", "a.vtkhdf"]) == 0
-    assert re.search(
-        r"note: the garment starts with \d+ of 49 vertices inside the obstacle", capsys.readouterr().out
-    )
     write("mm.obj", 1000 * SHEET + np.array([0, 900, 0]), FACES)
-    assert main(["mm.obj", "--obstacle", "ball/ball_0.obj", "--frames", "1", "-o", "b.vtkhdf"]) == 0
+    for name in ("inside", "mm"):
+        arguments = [f"{name}.obj", "--obstacle", "ball/ball_0.obj", "--frames", "1", "-o", f"{name}.vtkhdf"]
+        assert main(arguments) == 0
     out = capsys.readouterr().out
+    assert re.search(r"note: the garment starts with \d+ vertices in the obstacle", out)
     assert "note: mm.obj measures 400 m: is --units m right?" in out
-    assert "note: a strip of 400 m stretches by about" in out
     assert "m from the obstacle: same units and up axis?" in out
 
 
@@ -212,15 +198,13 @@ def test_a_place_that_serves_no_output_is_refused(folder, refused, place):
     refused(PLACES[place], main, ["sheet.obj", "-o", place])
 
 
-def test_an_obstacles_trajectory_brings_its_time_between_frames(folder, capsys):
+def test_an_obstacles_trajectory_brings_its_time_between_frames(folder):
     Trajectory(BALL + np.zeros((3, 1, 1)), BALL_FACES, np.arange(3) / 60).save("ball.vtkhdf")
     arguments = ["sheet.obj", "--obstacle", "ball.vtkhdf", "--obstacle-rest", "ball/ball_0.obj"]
-    assert main([*arguments, "-o", "a.vtkhdf"]) in (0, 1)
-    assert Trajectory.load("a.vtkhdf").times[1] == pytest.approx(1 / 60)
-    assert "between frames" not in capsys.readouterr().out
-    assert main([*arguments, "--dt", "1/30", "-o", "b.vtkhdf"]) in (0, 1)
-    assert Trajectory.load("b.vtkhdf").times[1] == pytest.approx(1 / 30)
-    assert "note: ball.vtkhdf has 0.01667 s between frames, and --dt is 0.03333" in capsys.readouterr().out
+    for dt, options in ((1 / 60, []), (1 / 30, ["--dt", "1/30"])):
+        Path("a.vtkhdf").unlink(missing_ok=True)
+        assert main([*arguments, *options, "-o", "a.vtkhdf"]) in (0, 1)
+        assert Trajectory.load("a.vtkhdf").times[1] == pytest.approx(dt)
 
 
 def test_interrupted_by_hand(folder, capsys, monkeypatch):
@@ -229,4 +213,4 @@ def test_interrupted_by_hand(folder, capsys, monkeypatch):
 
     monkeypatch.setattr("reference_sim.time_loop.simulate", interrupt)
     assert main(["sheet.obj", "-o", "out.vtkhdf"]) == 130
-    assert "the frames of the last save" in capsys.readouterr().err
+    assert "the frames until then" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import h5py
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 from reference_sim import Trajectory, TrajectoryError
+from reference_sim.files.mesh_files import read_mesh
+from reference_sim.trajectory import read_point_cache, write_point_cache
 from tests.reference_sim.meshes import grid
 
 REST, FACES = grid(4, 3)
@@ -47,19 +50,9 @@ def test_what_is_saved_is_loaded_to_the_last_bit(tmp_path, frames):
     assert_same(Trajectory.load(tmp_path / "wave.vtkhdf"), wave(frames))
     wave(frames).save(str(tmp_path / "again.vtkhdf"))  # a path may be a string
     assert_same(Trajectory.load(str(tmp_path / "again.vtkhdf")), wave(frames))
-
-
-def test_time_step_and_count_of_frames():
-    assert wave(5).frames == 5 and wave(5).dt == pytest.approx(1 / 30)
-    assert np.isnan(wave(1).dt)
-
-
-def test_saving_replaces_a_file_whole_and_leaves_nothing_else(tmp_path):
-    path = tmp_path / "wave.vtkhdf"
-    wave(5).save(path)
-    wave(2).save(path)
-    assert Trajectory.load(path).frames == 2
-    assert [p.name for p in tmp_path.iterdir()] == ["wave.vtkhdf"]
+    wave(2).save(tmp_path / "wave.vtkhdf")  # replaces a file whole
+    assert Trajectory.load(tmp_path / "wave.vtkhdf").dt == pytest.approx(1 / 30)
+    assert np.isnan(wave(1).dt) and len(list(tmp_path.iterdir())) == 2
 
 
 def test_a_trajectory_of_no_frames_is_saved_too(tmp_path):
@@ -147,3 +140,22 @@ def test_a_tree_that_comes_back_to_itself_crashes_no_reader(tmp_path):
     path.write_bytes(data)
     with pytest.raises(TrajectoryError, match=r"round\.vtkhdf: not a VTKHDF trajectory"):
         Trajectory.load(path, guarded=True)
+
+
+def test_point_cache_by_its_bytes(tmp_path):
+    positions, faces = grid(2, 1)
+    moving = np.stack([positions, positions + 0.1, positions + 0.2])
+    trajectory = Trajectory(moving, faces, np.arange(3) / 30, np.zeros(3))
+    cache, mesh = write_point_cache(tmp_path / "sheet.pc2", trajectory)
+    data = cache.read_bytes()
+    assert data[:12] == b"POINTCACHE2\0"
+    assert struct.unpack("<iiffi", data[12:32]) == (1, 6, 0.0, 1.0, 3)
+    samples = np.frombuffer(data[32:], dtype="<f4").reshape(3, 6, 3)
+    np.testing.assert_array_equal(samples, moving.astype(np.float32))
+    np.testing.assert_array_equal(read_point_cache(cache), samples)
+    surface = read_mesh(mesh)
+    np.testing.assert_array_equal(surface.faces, faces)
+    np.testing.assert_allclose(surface.positions, positions, atol=1e-9)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.obj", "sheet.pc2"]
+    with pytest.raises(ValueError, match=r"ends in \.pc2"):
+        write_point_cache(tmp_path / "sheet.abc", trajectory)

@@ -29,9 +29,8 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.timing import peak_memory
 from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError
-from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
+from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays, read_pickled_arrays
 from reference_sim.files.mesh_files import read_mesh
-from reference_sim.files.pickle_file import read_pickled_arrays
 from reference_sim.trajectory import read_point_cache
 from snug.body.parametric_body import Body
 from snug.body.skeleton import BodyError
