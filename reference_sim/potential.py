@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from reference_sim.cholesky import nested_dissection
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import BlockPlaces
-from reference_sim.minimise.cholesky import nested_dissection
 
 # A wider pattern keeps up to this many times the blocks that dynamic terms need at the moment.
 SPARE_BLOCKS = 3

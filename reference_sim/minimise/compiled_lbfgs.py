@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from reference_sim.cholesky import WIDTH, ScalarPattern, factorise, solve
 from reference_sim.kernels.fast_kernels import StepTerms, step_terms
 from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit
 from reference_sim.kernels.lanes import FAST, HALF, SCRATCH, Float32Lanes, to_blocks
-from reference_sim.minimise.cholesky import WIDTH, ScalarPattern, factorise, solve
 from reference_sim.minimise.descent import (
     LEAST_CURVATURE,
     SUFFICIENT_DECREASE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference_sim.minimise.cholesky import analyse
+from reference_sim.cholesky import analyse
 from reference_sim.minimise.descent import Descent, Observer, Stop, dot, mean_weight
 from reference_sim.potential import Potential
 

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reference_sim.cholesky import analyse
 from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
-from reference_sim.minimise.cholesky import analyse
 from reference_sim.minimise.descent import (
     NOT_FINITE,
     TOLERANCE,

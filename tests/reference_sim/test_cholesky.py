@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sp
 
 from reference_sim import Cloth, Potential
+from reference_sim.cholesky import CholmodSolver, SuperLUSolver, analyse, nested_dissection
 from reference_sim.energies import Inertia, StretchStVK
-from reference_sim.minimise.cholesky import CholmodSolver, SuperLUSolver, analyse, nested_dissection
 from tests.reference_sim.meshes import patch
 
 both = pytest.mark.parametrize("backend", [CholmodSolver, SuperLUSolver])

@@ -15,9 +15,9 @@ from benchmarks.scenes import of_garment
 from benchmarks.scenes.long_motion import repeated_there_and_back
 from benchmarks.scenes.out_of_distribution import faster
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
+from reference_sim.cholesky import WIDTH, ScalarPattern, factorise, solve
 from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import compiled_lbfgs, lbfgs
-from reference_sim.minimise.cholesky import WIDTH, ScalarPattern, factorise, solve
 from reference_sim.minimise.compiled_lbfgs import ELEMENTS, CompiledLBFGS, evaluate
 from reference_sim.minimise.descent import Result
 from reference_sim.minimise.lbfgs import LBFGS
