@@ -250,11 +250,6 @@ class Potential:
         steps = (energy.parameters()["dt_s"] for energy in self.energies if energy.name == "inertia")
         return next(steps, None)
 
-    @property
-    def impassable(self) -> bool:
-        """True if some term may stop an obstacle on its way."""
-        return any(energy.impassable for energy in self.energies)
-
     def prepare(self, step: Step) -> None:
         """Freeze in every term what it needs for one step."""
         for energy in self.energies:
@@ -286,14 +281,14 @@ class Potential:
         """Return the largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
         return min(energy.largest_step(x, direction) for energy in self.energies)
 
-    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
+    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray) -> float:
         """Return the share of the way from x to goal (V, 3) that all terms find free; see `Energy`."""
-        return min(energy.ccd_fraction(x, goal, progress) for energy in self.energies)
+        return min(energy.ccd_fraction(x, goal) for energy in self.energies)
 
-    def set_progress(self, progress: float) -> None:
-        """Put the obstacle of every term at `progress` (0 to 1) of its motion in this step."""
+    def search_again(self) -> None:
+        """Let every term forget what it has found near; see `Energy`."""
         for energy in self.energies:
-            energy.set_progress(progress)
+            energy.search_again()
 
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         """Let every term's Hessian use what `step` from x (V, 3) predicts of its stresses; see `Energy`."""

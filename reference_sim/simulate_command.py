@@ -262,7 +262,7 @@ def make_terms(cloth: Cloth, options: argparse.Namespace) -> list[Energy]:
             terms.append(energies.ContactFriction(contact, coefficient=options.friction))
     if options.self_contact:
         try:
-            terms.append(energies.ContactBarrier(cloth, self_contact=True, obstacle=False))
+            terms.append(energies.ContactBarrier(cloth))
         except ImportError as error:
             raise ValueError(str(error)) from None
     return terms

@@ -67,8 +67,7 @@ def simulate(
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
         refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
-            ended, and the step solved again from there. A step in which a barrier stopped the obstacle on its
-            way is not solved again.
+            ended, and the step solved again from there.
         path: write the VTKHDF file there at the end, with status "unfinished" if an exception is the end.
         progress: label of a progress bar with time left; None for silence.
         options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function

@@ -80,7 +80,7 @@ class TimeStepper:
         self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
         self.potential = Potential([*energies, Inertia(cloth, self.dt)])
         self.quasi_static = quasi_static
-        self.minimiser = StepMinimiser(self.potential, obstacle=obstacle is not None, **options)
+        self.minimiser = StepMinimiser(self.potential, **options)
 
     def start_again(self) -> None:
         """Let the next run give the bits of a first one: minimisers forget what they have learned."""
@@ -88,9 +88,8 @@ class TimeStepper:
 
     def check_start(self, x: np.ndarray, v: np.ndarray) -> None:
         """Raise ValueError where x (V, 3) [m] at frame 0 is impossible for a term that nothing may pass."""
-        if self.potential.impassable:
+        if any(energy.joins_late for energy in self.potential.energies):
             self.prepare(1, x, v, x[self.cloth.pins])
-            self.potential.set_progress(0.0)
             if infeasibility := self.potential.infeasibility(x):
                 raise ValueError(f"simulate: the start is not free of intersections: {infeasibility}")
 
@@ -119,8 +118,7 @@ class TimeStepper:
             guess = self.prepare(step, x, v, handles)
             results.append(self.minimiser.minimise(x, guess))
             for _ in range(self.refreeze):
-                # To freeze the step again would put an obstacle that stopped on its way at the end of it.
-                if self.minimiser.obstacle_stopped or not np.isfinite(results[-1].positions).all():
+                if not np.isfinite(results[-1].positions).all():
                     break
                 self.freeze(step, x, v, results[-1].positions)
                 results.append(self.minimiser.minimise_from(results[-1].positions))

@@ -22,10 +22,7 @@ def with_self_contact(energies: tuple[Energy, ...]) -> tuple[Energy, ...]:
         ImportError: ipctk is not installed.
         ValueError: a triangle of the mesh is less than DISTANCE high; the message names it.
     """
-    barrier = ContactBarrier(
-        energies[0].cloth, distance=DISTANCE, stiffness=STIFFNESS, self_contact=True, obstacle=False
-    )
-    return (*energies, barrier)
+    return (*energies, ContactBarrier(energies[0].cloth, distance=DISTANCE, stiffness=STIFFNESS))
 
 
 def crossing(x: np.ndarray, energies: tuple[Energy, ...]) -> str:

@@ -1,4 +1,4 @@
-"""IPC's barrier: cloth meets neither itself nor a body (Li et al. 2020; in physical units Li et al. 2023).
+"""IPC's barrier: cloth never passes through itself (Li et al. 2020; in physical units Li et al. 2023).
 
     E = kappa dhat sum_k w_k m_k b(d_k^2 / dhat^2),   b(s) = -(s - 1)^2 ln s  for s < 1, else 0
 
@@ -7,29 +7,26 @@ w_k [m^2] is a quarter of the rest area of the vertex, or of those of both edges
 nearly parallel. kappa [Pa] is a pressure: a pair pushes with -2 kappa w_k m_k b'(s) d_k / dhat, which at
 half the distance dhat is 4.3 kappa w_k.
 
-Distances, pairs and derivatives are those of the package ipctk (see collisions.py), which *is* the
-definition: there is none in torch. Networks are trained with ContactPenalty.
+Distances, pairs, their derivatives and collision detection are those of the package ipctk (IPC Toolkit, MIT
+licence), which *is* the definition: there is none in torch. Networks are trained with ContactPenalty.
 
 Beyond a touch the energy means nothing: a distance has no sign. Hence `largest_step` bounds every line
-search by continuous collision detection, and a step starts without an intersection: `ccd_fraction` and
-`set_progress` let the simulator move cloth and body together from the start of the step as far as nothing
-meets, minimise there to gain distance, and go on, until the body is where the frame has it.
-
-Without the obstacle the barrier is self-contact alone, beside another term for contact with the body. Where
-the body leaves less room than the cloth needs, as between arm and chest, that other term gives way: cloth
-goes into the body and never through itself.
+search by continuous collision detection, and a step starts without an intersection: by `ccd_fraction` the
+simulator moves the cloth from the start of the step as far as nothing meets, minimises there to gain
+distance, and goes on. Contact with a body is another term's: where the body leaves less room than the cloth
+needs, as between arm and chest, that term gives way: cloth goes into the body and never through itself.
 """
 
 from __future__ import annotations
 
 import copy
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step, demand_positive
-from reference_sim.geometry.collisions import NO_OBSTACLE, Collisions
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -37,66 +34,50 @@ if TYPE_CHECKING:
 
 DEFAULT_DISTANCE = 2e-3  # [m]
 DEFAULT_STIFFNESS = 1e2  # [Pa]; measured: a tenth of it saves nothing, a hundred times it doubles Newton
+LONGEST_STEP = 0.05  # [m] of a vertex in a line search: a step of a metre would meet nearly every pair
 
 
 class ContactBarrier(Energy):
-    """Barrier energy [J] of `cloth` against itself and against the obstacle of a step.
+    """Barrier energy [J] of `cloth` against itself.
 
     Args:
         distance: dhat [m], where the barrier begins; must be below every height of a rest triangle.
         stiffness: kappa [Pa].
-        self_contact: whether the cloth meets itself.
-        obstacle: whether the cloth meets the obstacle; if not, another term keeps it out of the body.
 
     Raises:
         ImportError: ipctk is not installed.
-        ValueError: distance or stiffness not positive, distance above a height of a rest triangle, or nothing
-            to meet.
+        ValueError: distance or stiffness not positive, distance above a height of a rest triangle.
     """
 
     name = "barrier"
-    remembers = impassable = True  # what it remembers is where the obstacle stopped
-    dynamic = True
+    dynamic = joins_late = True
 
     def __init__(
-        self,
-        cloth: Cloth,
-        *,
-        distance: float = DEFAULT_DISTANCE,
-        stiffness: float = DEFAULT_STIFFNESS,
-        self_contact: bool = True,
-        obstacle: bool = True,
+        self, cloth: Cloth, *, distance: float = DEFAULT_DISTANCE, stiffness: float = DEFAULT_STIFFNESS
     ) -> None:
         demand_positive("ContactBarrier", distance=distance, stiffness=stiffness)
-        if not (self_contact or obstacle):
-            raise ValueError("ContactBarrier: meets nothing: give self_contact=True or obstacle=True")
-        if self_contact:
-            _check_heights(cloth, distance)
+        _check_heights(cloth, distance)
         self.cloth = cloth
         self.stencils = np.zeros((0, 4), dtype=np.int64)
         self.distance, self.stiffness = float(distance), float(stiffness)
-        self.obstacle, self.joins_late = obstacle, not obstacle
-        self.collisions = Collisions(cloth, distance, self_contact=self_contact)
-        ipctk = self.collisions.package
-        self.potential = ipctk.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
-        self.step: Step | None = None
-        self._hessians_of: tuple | None = None
+        self.pairs = Pairs(cloth, self.distance)
+        package = self.pairs.package
+        self.potential = package.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
+        self._hessians_of: Any = None
         self._hessians: dict[str, sp.csc_matrix] = {}
 
     def __copy__(self) -> ContactBarrier:
-        """Return a copy with its own collisions: they hold where the obstacle is in a step."""
+        """Return a copy with pairs of its own."""
         twin = object.__new__(type(self))
-        vars(twin).update(vars(self), collisions=copy.copy(self.collisions))
+        vars(twin).update(vars(self), pairs=copy.copy(self.pairs))
         return twin
 
     def parameters(self) -> dict[str, Any]:
-        """Return distance, stiffness, self-contact and the version of the package."""
+        """Return distance, stiffness and the version of the package."""
         return {
             "distance_m": self.distance,
             "stiffness_Pa": self.stiffness,
-            "self_contact": self.collisions.self_contact,
-            "obstacle": self.obstacle,
-            "package": f"ipctk {self.collisions.package.__version__}",
+            "package": f"ipctk {self.pairs.package.__version__}",
         }
 
     def energy(self, x: Tensor) -> Tensor:
@@ -107,31 +88,20 @@ class ContactBarrier(Energy):
         )
 
     def prepare(self, step: Step) -> None:
-        """Put the obstacle at its end of the step.
+        """Keep nothing from the step before, so that sums over pairs have one order."""
+        self.pairs.forget()
 
-        Its start is where the step before left it, if that was the frame before: an obstacle that found no
-        way to its place goes on from where it stopped. A step that is prepared again keeps its start.
-        """
-        last, self.step = self.step, step
-        if step.obstacle is None or not self.obstacle:
-            self.collisions.begin(*NO_OBSTACLE)
-            return
-        after = step.obstacle.at(step.frame)
-        before = step.obstacle.at(max(step.frame - 1, 0))
-        if last and last.obstacle is step.obstacle:
-            if last.frame == step.frame - 1:
-                before = self.collisions.obstacle_at(self.collisions.progress)
-            elif last.frame == step.frame:
-                before = self.collisions.obstacle_at(0.0)
-        self.collisions.begin(step.obstacle.faces, before, after)
+    def search_again(self) -> None:
+        """Forget the pairs found so far."""
+        self.pairs.forget()
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         if not np.isfinite(x).all():
             return float("nan"), np.full(x.shape, np.nan)
-        pairs, near, positions = self.collisions.pairs(x)
-        gradient = self.potential.gradient(pairs, near.mesh, positions)
-        return self.potential(pairs, near.mesh, positions), gradient.reshape(-1, 3)[: len(x)]
+        pairs, positions = self.pairs.at(x)
+        gradient = self.potential.gradient(pairs, self.pairs.mesh, positions)
+        return self.potential(pairs, self.pairs.mesh, positions), gradient.reshape(-1, 3)
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
         """Return the second derivatives (3V, 3V) [N/m] at x (V, 3) [m]; see Energy."""
@@ -143,31 +113,26 @@ class ContactBarrier(Energy):
 
     def _hessian(self, x: np.ndarray, projection: str) -> sp.csc_matrix:
         """Return (3V, 3V), with the negative eigenvalues of each pair or without; kept while x stays."""
-        candidates = self.collisions.pairs(x)
-        if self._hessians_of is not candidates:
-            self._hessians_of, self._hessians = candidates, {}
+        found = self.pairs.at(x)
+        if self._hessians_of is not found:
+            self._hessians_of, self._hessians = found, {}
         if projection not in self._hessians:
-            pairs, near, positions = candidates
-            method = getattr(self.collisions.package.PSDProjectionMethod, projection)
-            hessian, size = self.potential.hessian(pairs, near.mesh, positions, method), 3 * len(x)
-            self._hessians[projection] = hessian[:, :size][:size]
+            pairs, positions = found
+            method = getattr(self.pairs.package.PSDProjectionMethod, projection)
+            self._hessians[projection] = self.potential.hessian(pairs, self.pairs.mesh, positions, method)
         return self._hessians[projection]
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         """Return the share of `direction` that may be gone before anything meets; see Energy."""
-        return self.collisions.largest_step(x, direction) if np.isfinite(direction).all() else 1.0
+        return self.pairs.largest_step(x, direction) if np.isfinite(direction).all() else 1.0
 
-    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        """Return the share of the joint way to goal (V, 3) [m] that is free of collisions; see Energy."""
-        return self.collisions.ccd_fraction(x, goal, progress)
-
-    def set_progress(self, progress: float) -> None:
-        """Put the obstacle at `progress` of its motion in this step."""
-        self.collisions.place(progress)
+    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray) -> float:
+        """Return the share of the way to goal (V, 3) [m] that is free of collisions; see Energy."""
+        return self.pairs.free_share(x, goal)
 
     def infeasibility(self, x: np.ndarray) -> str:
-        """Name an edge that cuts a face, as far as the obstacle has come; "" if there is none."""
-        return self.collisions.first_intersection(x) if np.isfinite(x).all() else ""
+        """Name an edge that cuts a face; "" if there is none."""
+        return self.pairs.first_intersection(x) if np.isfinite(x).all() else ""
 
 
 def _check_heights(cloth: Cloth, distance: float) -> None:
@@ -181,3 +146,110 @@ def _check_heights(cloth: Cloth, distance: float) -> None:
             f"ContactBarrier distance = {distance:g} m: face {face} is only {heights[face]:.3g} m high at "
             "rest; choose a distance below that, or a mesh without slivers"
         )
+
+
+class Pairs:
+    """Pairs of a cloth with itself that are closer than a distance [m], or about to meet.
+
+    Candidate pairs serve as long as nothing has moved farther than they were searched for.
+
+    Attributes:
+        package: the module ipctk.
+        mesh: ipctk.CollisionMesh, weighed by rest areas, perhaps from the cloth's uv.
+
+    Raises:
+        ImportError: ipctk is not installed.
+    """
+
+    def __init__(self, cloth: Cloth, distance: float) -> None:
+        self.package = ipctk = _load()
+        self._distance = distance
+        self._slack = distance / 4  # how far vertices may move before candidates are searched again
+        self._ccd = ipctk.AdditiveCCD()
+        triangles = np.asfortranarray(cloth.faces, dtype=np.int32)
+        self.mesh = ipctk.CollisionMesh(
+            np.asfortranarray(cloth.rest_positions), ipctk.edges(triangles), triangles
+        )
+        sides = self.mesh.faces_to_edges.ravel()
+        self.mesh.vertex_areas = cloth.vertex_areas
+        self.mesh.edge_areas = np.bincount(sides, np.repeat(cloth.areas / 3, 3), len(self.mesh.edges))
+        self.forget()
+
+    def forget(self) -> None:
+        """Search candidates and pairs anew when they are needed next."""
+        self._way: tuple[np.ndarray, np.ndarray] | None = None  # what the candidates were searched for
+        self._at: np.ndarray | None = None  # where the pairs were found
+
+    def at(self, x: np.ndarray) -> tuple[Any, np.ndarray]:
+        """Return the pairs closer than the distance at x (V, 3), and x as ipctk reads it."""
+        if self._at is None or not np.array_equal(self._at, x):
+            candidates, positions = self._candidates(x, x), np.asfortranarray(x)
+            pairs = self.package.NormalCollisions()
+            pairs.use_area_weighting = True
+            pairs.build(candidates, self.mesh, positions, self._distance)
+            self._pairs, self._at = (pairs, positions), x.copy()
+        return self._pairs
+
+    def _candidates(self, a: np.ndarray, b: np.ndarray) -> Any:
+        """Return pairs that may come within the distance near the way from a to b, within the slack."""
+        if not (self._covers(a) and (b is a or self._covers(b))):
+            candidates = self.package.Candidates()
+            start, end = np.asfortranarray(a), np.asfortranarray(b)
+            candidates.build(self.mesh, start, end, self._distance / 2 + self._slack)
+            self._candidate_pairs, self._way = candidates, (a.copy(), b.copy())
+        return self._candidate_pairs
+
+    def _covers(self, x: np.ndarray) -> bool:
+        if self._way is None:
+            return False
+        a, b = self._way
+        way, off = b - a, x - a
+        if way.any():
+            t = np.einsum("vi,vi->v", off, way) / np.maximum(np.einsum("vi,vi->v", way, way), 1e-300)
+            off -= np.clip(t, 0.0, 1.0)[:, None] * way
+        return bool(np.einsum("vi,vi->v", off, off).max() <= self._slack**2)
+
+    def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
+        """Return the share of `direction` (V, 3) [m] that the cloth may go from x (V, 3)."""
+        pairs, positions = self.at(x)
+        gap = min(self._distance, pairs.compute_minimum_distance(self.mesh, positions) ** 0.5)
+        farthest = float(np.sqrt(np.einsum("vi,vi->v", direction, direction).max()))
+        if 2 * farthest < gap:
+            return 1.0  # nothing is close enough to be reached
+        part = min(1.0, LONGEST_STEP / farthest)
+        goal = x + part * direction
+        return part * self._free_share(self._candidates(x, goal), x, goal)
+
+    def free_share(self, x: np.ndarray, goal: np.ndarray) -> float:
+        """Return the free share of the way from x to goal (V, 3)."""
+        candidates = self.package.Candidates()
+        candidates.build(self.mesh, np.asfortranarray(x), np.asfortranarray(goal), 0.0)
+        return self._free_share(candidates, x, goal)
+
+    def _free_share(self, candidates: Any, x: np.ndarray, goal: np.ndarray) -> float:
+        start, end = np.asfortranarray(x), np.asfortranarray(goal)
+        return candidates.compute_collision_free_stepsize(self.mesh, start, end, 0.0, self._ccd)
+
+    def first_intersection(self, x: np.ndarray) -> str:
+        """Return an edge and a face that cut each other at x (V, 3), in words; "" if there are none."""
+        mesh, ipctk, positions = self.mesh, self.package, np.asfortranarray(x)
+        if not ipctk.has_intersections(mesh, positions):
+            return ""
+        search = ipctk.LBVH()
+        search.can_vertices_collide = mesh.can_collide
+        search.build(positions, mesh.edges, mesh.faces, 1e-6 * float(np.ptp(positions, axis=0).max()))
+        for pair in search.detect_edge_face_candidates():
+            edge, face = mesh.edges[pair.edge_id], mesh.faces[pair.face_id]
+            if ipctk.is_edge_intersecting_triangle(*positions[edge], *positions[face]):
+                return f"edge ({min(edge)}, {max(edge)}) of the cloth cuts face {pair.face_id} of the cloth"
+        return "an edge cuts a face"
+
+
+def _load() -> ModuleType:
+    try:
+        import ipctk
+    except ImportError:
+        raise ImportError("a contact barrier needs the package ipctk: pip install ipctk") from None
+    ipctk.set_logger_level(ipctk.error)  # its warnings go to standard output
+    ipctk.set_num_threads(1)  # sums of several threads differ in the last digit from run to run
+    return ipctk

@@ -78,9 +78,8 @@ class Energy:
             and in every step.
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
             judged without preparing the one before it.
-        impassable: whether an obstacle may have to stop on its way to the end of a step.
-        joins_late: whether a step is minimised without the term first. It is zero wherever nothing is near,
-            so most steps end there.
+        joins_late: whether a step is minimised without the term first, and goes on with it by a way without
+            a collision. It is zero wherever nothing is near, so most steps end without it.
         kernels: functions for fast kernels by use; the uses are listed in kernels.fast_kernels. A subclass
             does not inherit them.
     """
@@ -91,7 +90,6 @@ class Energy:
     dynamic: bool = False
     constant: tuple[int, ...] = ()
     remembers: bool = False
-    impassable: bool = False
     joins_late: bool = False
     kernels: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
 
@@ -207,16 +205,12 @@ class Energy:
         """
         return 1.0
 
-    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray, progress: float) -> float:
-        """Return the share (0 to 1) of the joint way from x (V, 3) to goal (V, 3) without a collision.
-
-        On that way the obstacle moves from its place at `progress` (0: start of the step, 1: end) to its
-        place at the end.
-        """
+    def ccd_fraction(self, x: np.ndarray, goal: np.ndarray) -> float:
+        """Return the share (0 to 1) of the way from x (V, 3) to goal (V, 3) [m] without a collision."""
         return 1.0
 
-    def set_progress(self, progress: float) -> None:
-        """Put the obstacle at `progress` of its motion in this step; `prepare` puts it at the end, 1."""
+    def search_again(self) -> None:
+        """Forget what was found so far of what is near, as `prepare` does at the beginning of a step."""
 
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         """Let the Hessian take, until `forget`, the stresses that linear strain predicts at x + step (V, 3).

@@ -1,8 +1,8 @@
 """Minimisers by name, and the minimisation of one time step.
 
-A step of most potentials is one call of their minimiser, from the first guess. A barrier, which nothing may
-pass, must be approached along a free way; a term that joins late is left out until the cloth comes near
-itself.
+A step of most potentials is one call of their minimiser, from the first guess. A term that joins late, as a
+barrier, which nothing may pass, is left out until the cloth comes near itself, and approached along a free
+way.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **opt
     return make_minimiser(potential, method, **options).minimise(x0)
 
 
-MAX_APPROACHES = 100  # minimisations on the way of an obstacle within one step
+MAX_APPROACHES = 100  # minimisations on the way of the pins within one step
 LEAST_APPROACH = 2e-3  # of that way, by three of them together; less is no way
 APPROACH_SHARE = 0.8  # of the way to the next touch: closer, a barrier grows stiff
 # Minimiser of a step whose terms join late, as L-BFGS ends by it too, and options that it shares.
@@ -113,35 +113,32 @@ class StepMinimiser:
 
     Args:
         potential: of the step, inertia included; frozen by its user before each step.
-        obstacle: whether the scene has one, which a barrier may stop on its way.
         options: of the minimiser, see `simulate`.
 
     Attributes:
         options: as given, with the method by default: "newton" with a term whose pairs change, else "lbfgs",
             whose preconditioner knows nothing of pairs that come and go.
         opening_method: of the minimisation without the terms that join late; "" where none does.
-        obstacle_stopped: whether a barrier stopped the obstacle on its way in the last step.
 
     Raises:
         ValueError: a tolerance that is no number above 0, an unknown method, or a function as method beside a
             term that joins late.
     """
 
-    def __init__(self, potential: Potential, *, obstacle: bool, **options: Any) -> None:
+    def __init__(self, potential: Potential, **options: Any) -> None:
         self.potential = potential
         method = "newton" if any(energy.dynamic for energy in potential.energies) else "lbfgs"
         self.options = {"method": method} | options
         self._late = [energy for energy in potential.energies if energy.joins_late]
-        early = Potential([energy for energy in potential.energies if not energy.joins_late])
-        self._obstacle_may_stop, self.obstacle_stopped = obstacle and early.impassable, False
         self.opening_method, self._ending = "", self.options
         self._opening: Minimiser | None = None
-        if self._late and not early.impassable:
+        if self._late:
             if callable(self.options["method"]):
                 raise ValueError(
                     "simulate: Newton's method, not a function, ends steps that "
                     f"{self._late[0].name!r} joins: choose method 'lbfgs' or 'newton', or leave the term out"
                 )
+            early = Potential([energy for energy in potential.energies if not energy.joins_late])
             self.opening_method = options.get("method", "lbfgs")
             self._opening = make_minimiser(early, **options | {"method": self.opening_method})
             self._ending = ENDING | {name: options[name] for name in LIMITS if name in options}
@@ -165,40 +162,37 @@ class StepMinimiser:
 
         Counts and seconds of the result are those of all its minimisations together.
         """
-        self.obstacle_stopped = False
-        if not np.isfinite(guess).all():
-            return self.minimise_from(guess)  # it reports the divergence
-        return self._open(x, guess) if self._opening else self._approach(x, guess)
+        if not self._opening or not np.isfinite(guess).all():
+            return self.minimise_from(guess)  # which reports a divergence
+        return self._open(self._opening, x, guess)
 
     def minimise_from(self, x: np.ndarray) -> Result:
-        """Minimise from x (V, 3) [m], which no barrier keeps pins and obstacle from."""
+        """Minimise from x (V, 3) [m], to which no collision bars the way."""
         return self._minimiser.minimise(x)
 
-    def _open(self, x: np.ndarray, guess: np.ndarray) -> Result:
+    def _open(self, opening: Minimiser, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise without the terms that join late, and with them only where they have something to say.
 
         The minimum without them is the answer if the way there is free and they are zero around it. If not,
         the minimisation with them starts on the way there: from `guess` on if that can be reached, else from
         x on. Cloth meets itself late on such a way, for a guess moves it with the body.
         """
-        assert self._opening is not None
-        potential, opened = self.potential, self._opening.minimise(guess)
+        potential, opened = self.potential, opening.minimise(guess)
         y = opened.positions if np.isfinite(opened.positions).all() else guess
-        free = potential.ccd_fraction(x, y, 0.0) == 1
+        free = potential.ccd_fraction(x, y) == 1
         terms = potential.terms(y)
         if free and opened.status == "converged" and not any(terms[term.name] for term in self._late):
             return replace(opened, terms=terms)
-        if not free and potential.ccd_fraction(x, guess, 0.0) == 1:
+        if not free and potential.ccd_fraction(x, guess) == 1:
             x = guess
         return _after(opened, self._approach(x, y))
 
     def _approach(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
 
-        With such a term (a barrier) x, pins and obstacle move together from the start of the step to the
-        guess until something would touch. From there pins and obstacle go on alone; if they cannot, a rough
-        minimisation gains distance, and all move on. So the last minimisation starts without an intersection,
-        pins and obstacle at the end of their way. Without such a term it starts at the guess.
+        All vertices move from x to the guess until something would touch. From there pins go on alone; if
+        they cannot, a rough minimisation gains distance, and all move on. So the last minimisation starts
+        without an intersection, pins at the end of their way.
 
         The rough minimisations share one timeout, and the last one has its own.
         """
@@ -212,15 +206,15 @@ class StepMinimiser:
                 if not free_too:
                     goal = x.copy()
                     goal[pins] = guess[pins]
-                share = potential.ccd_fraction(x, goal, progress)
+                share = potential.ccd_fraction(x, goal)
                 if share == 1:
-                    potential.set_progress(1.0)
+                    potential.search_again()
                     return _after(*rough, self.minimise_from(goal))
                 if share >= max(shares, default=0.0):
                     part = APPROACH_SHARE * share
                     x, progress = x + part * (goal - x), progress + part * (1 - progress)
                 shares.append(share)
-            potential.set_progress(progress)
+            potential.search_again()
             rough.append(self._rough_minimiser.minimise(x))
             x = rough[-1].positions
             goal = x + (1 - progress) * motion
@@ -229,14 +223,12 @@ class StepMinimiser:
             late = time.perf_counter() - begun > self.options.get("timeout", float("inf"))
             if progress - reached[max(len(reached) - 4, 0)] < LEAST_APPROACH and len(reached) > 3:
                 break
-        self.obstacle_stopped = self._obstacle_may_stop
         result = _after(*rough, self.minimise_from(x))
         if result.status == "diverged":
             return result
         status = max("stalled", "timeout" if late else result.status, key=severity)
         problem = "no way without intersection" if status == "stalled" else "gave up after the timeout"
-        reason = f"{problem}: pins and obstacle came {progress:.1%} of theirs"
-        return replace(result, status=status, reason=reason)
+        return replace(result, status=status, reason=f"{problem}: pins came {progress:.1%} of their way")
 
     @cached_property
     def _rough_minimiser(self) -> Minimiser:

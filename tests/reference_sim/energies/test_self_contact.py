@@ -1,51 +1,246 @@
-"""Self-contact alone, beside another term for the body: known answers, and that it changes nothing elsewhere.
+"""The barrier of a cloth against itself: derivatives, known answers, and that nothing passes through anything.
 
 Whether edges cut faces is asked here with determinants of its own, not with the package under test.
 """
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from reference_sim import Cloth, Material, Obstacle, simulate
-from reference_sim.energies import BendHinge, ContactBarrier, ContactPenalty, Gravity, StretchStVK
+from reference_sim import Cloth, Material, Obstacle, Potential, Trajectory, minimise, simulate
+from reference_sim.energies import (
+    BendHinge,
+    ContactBarrier,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    Inertia,
+    Step,
+    StretchStVK,
+)
+from reference_sim.material import GRAVITY
 from reference_sim.minimise.newton import Newton
-from tests.reference_sim.energies.barriers import assert_free, cuts, folded, sheet
-from tests.reference_sim.meshes import box, grid
+from tests.reference_sim.meshes import box, grid, patch
 
 pytest.importorskip("ipctk", reason="ipctk is not installed: no barrier to test")
 
 
-def self_contact(cloth: Cloth) -> ContactBarrier:
-    return ContactBarrier(cloth, distance=1e-3, obstacle=False)
+def cuts(x: np.ndarray, edges: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(E, F): whether an edge of points x passes through a face; shared vertices are no cut."""
+    a, b = x[edges[:, 0]][:, None], x[edges[:, 1]][:, None]
+    p, q, r = (x[faces[:, i]][None] for i in range(3))
+
+    def volume(u, v, w, t):
+        return np.einsum("efi,efi->ef", u - t, np.cross(v - t, w - t))
+
+    sides = volume(a, p, q, r) * volume(b, p, q, r) < 0
+    turns = np.sign([volume(a, p, q, b), volume(a, q, r, b), volume(a, r, p, b)])
+    shared = (edges[:, None, :, None] == faces[None, :, None, :]).any(axis=(2, 3))
+    return sides & (np.abs(turns.sum(axis=0)) == 3) & ~shared
 
 
-def two_sheets() -> tuple[Cloth, int]:
-    """A sheet that is held, and one 3 mm above it, not vertex over vertex; the number of vertices held."""
-    x, faces = grid(4, 4, width=0.08, depth=0.08)
+def free(trajectory: Trajectory, cloth: Cloth) -> bool:
+    return not any(cuts(x, cloth.edges, cloth.faces).any() for x in trajectory.positions)
+
+
+def folded(cells: int) -> tuple[Cloth, np.ndarray]:
+    """A strip whose right half lies 16 mm above its left half, bent round a cylinder between them."""
+    x, faces = grid(2 * cells, cells, width=0.16, depth=0.08)
+    s, radius = x[:, 0] - 0.08, 0.008
+    phi = np.clip(s / radius, 0, np.pi)
+    along = np.where(s < 0, s, radius * np.sin(phi) - np.maximum(s - np.pi * radius, 0))
+    return Cloth(x, faces, Material()), np.stack([along, 3e-3 + radius * (1 - np.cos(phi)), x[:, 2]], 1)
+
+
+def two_sheets(gap: float = 3e-3, lower: int = 4, width: float = 0.08) -> tuple[Cloth, int]:
+    """A sheet that is held, and one above it, not vertex over vertex; the number of vertices held."""
+    x, faces = grid(lower, lower, width=width, depth=width)
     y, more = grid(3, 3, width=0.05, depth=0.05)
-    both = np.concatenate([x, y + np.array([0.0131, 3e-3, 0.0147])])
+    both = np.concatenate([x, y + np.array([0.0131 * width / 0.08, gap, 0.0147])])
     return Cloth(both, np.concatenate([faces, more + len(x)]), Material(), pins=np.arange(len(x))), len(x)
 
 
+def crumpled(distance: float = 3e-3) -> tuple[ContactBarrier, np.ndarray]:
+    """A rough sheet folded over to 2 mm from itself: pairs of every kind."""
+    x, faces = patch(3, cells=6)
+    cloth = Cloth(0.1 * x, faces, Material())
+    y = 0.1 * x[:, [0, 2, 1]]  # horizontal
+    over = y[:, 0] > 0.05
+    y[over] = y[over] * [-1, 1, 1] + [0.1, 2.0e-3, 0.0011]
+    return ContactBarrier(cloth, distance=distance), y + np.random.default_rng(5).normal(0, 3e-4, y.shape)
+
+
+def with_pairs() -> tuple[ContactBarrier, np.ndarray]:
+    barrier, x = crumpled()
+    kinds = barrier.pairs.at(x)[0]
+    assert min(map(len, (kinds.fv_collisions, kinds.ee_collisions, kinds.ev_collisions))) > 0
+    return barrier, x
+
+
+def test_derivatives_are_those_of_finite_differences():
+    energy, x = with_pairs()
+    gradient, hessian = energy.value_and_gradient(x)[1], energy.sparse_hessian(x)
+    assert np.abs(gradient).max() >= 1e-3 and np.abs(hessian.data).max() >= 1.0
+    assert abs(hessian - hessian.T).max() <= 1e-12 * np.abs(hessian.data).max()
+    h = 1e-9  # [m]: a hundred-thousandth of the smallest distance
+    for seed in range(3):
+        d = np.random.default_rng(seed).normal(size=x.shape)
+        (above, up), (below, down) = (energy.value_and_gradient(x + s * h * d) for s in (1, -1))
+        # Half the digits are left of a difference; a wrong factor or sign is far beyond that.
+        assert (above - below) / (2 * h) == pytest.approx(np.vdot(gradient, d), rel=1e-4)
+        product = (hessian @ d.ravel()).reshape(-1, 3)
+        assert np.abs((up - down) / (2 * h) - product).max() <= 1e-4 * np.abs(product).max()
+
+
+def test_convexity_takes_out_the_negative_curvature_and_nothing_else():
+    barrier, x = with_pairs()
+    true, half, convex = (barrier.sparse_hessian(x, c).toarray() for c in (0.0, 0.5, 1.0))
+    scale = np.abs(true).max()
+    assert np.linalg.eigvalsh(true)[0] < -1e-3 * scale
+    assert np.linalg.eigvalsh(convex)[0] > -1e-12 * scale
+    assert np.linalg.eigvalsh(convex - true)[0] > -1e-12 * scale
+    assert np.abs(half - (true + convex) / 2).max() <= 1e-12 * scale
+
+
+def test_a_potentials_hessian_holds_pairs_that_no_other_term_couples_and_its_pattern_serves_on():
+    barrier, x = with_pairs()
+    others: list[Energy] = [StretchStVK(barrier.cloth), BendHinge(barrier.cloth)]
+    potential = Potential([*others, barrier])
+    whole, parts = potential.hessian(x), Potential(others).hessian(x) + barrier.sparse_hessian(x)
+    assert abs(whole - parts).max() <= 1e-12 * np.abs(whole.data).max()
+    assert whole.nnz > Potential(others).hessian(x).nnz
+    fixed = potential.pattern(np.ones(barrier.cloth.vertex_count, dtype=bool))
+    wide = fixed.covering(fixed.changing(x))
+    assert len(wide.indices) > len(fixed.indices) and wide.covering(wide.changing(x)) is wide
+    apart = wide.changing(barrier.cloth.rest_positions)
+    assert apart[0].nnz == 0 and wide.covering(apart) is wide and fixed.covering(apart) is fixed
+    assert np.array_equal(np.sort(wide.order), np.arange(wide.size))
+
+
+def test_a_sheet_rests_at_the_height_of_the_formula():
+    """Each vertex over a wide face has one pair, of a quarter of its area."""
+    cloth, lower = two_sheets(1e-3, lower=1, width=1.0)  # above one face, away from its sides
+    barrier = ContactBarrier(cloth)
+    result = minimise(
+        Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), barrier]), cloth.rest_positions
+    )
+
+    def push(height: float) -> float:
+        s = (height / barrier.distance) ** 2
+        slope = -(2 * (s - 1) * np.log(s) + (s - 1) ** 2 / s)
+        return -0.25 * barrier.stiffness * slope * 2 * height / barrier.distance
+
+    pressure = cloth.material.areal_density * GRAVITY
+    height = brentq(lambda h: push(h) - pressure, 2e-6, 2e-3 * (1 - 1e-12))
+    assert result.status == "converged"
+    assert np.abs(result.positions[lower:, 1] - height).max() < 1e-8
+    up = -barrier.value_and_gradient(result.positions)[1][lower:]
+    # The weight, up to the gradient's tolerance of a relative residual of 1e-6 of a mean vertex.
+    assert up.sum(axis=0) == pytest.approx([0, GRAVITY * cloth.masses[lower:].sum(), 0], abs=1e-4)
+
+
+def test_the_way_of_a_line_search_ends_before_the_first_touch():
+    barrier, x = crumpled()
+    cloth = barrier.cloth
+    upper = cloth.rest_positions[:, 0] > 0.05
+    for down in (1e-5, 0.01, 0.5):
+        direction = np.where(upper[:, None], [0.0, -down, 0.0], 0.0)
+        share = barrier.largest_step(x, direction)
+        assert 0 < share <= 1 and (share == 1) == (down == 1e-5)
+        assert not barrier.infeasibility(x + share * direction)
+        assert not cuts(x + share * direction, cloth.edges, cloth.faces).any()
+
+
+def test_a_start_that_intersects_is_refused_with_the_elements_that_cut():
+    strip, start = folded(5)
+    start[strip.rest_positions[:, 0] > 0.11, 1] -= 0.0175  # the upper half, through the lower
+    with pytest.raises(ValueError, match="the start is not free of intersections") as told:
+        simulate(strip, [StretchStVK(strip), ContactBarrier(strip)], start=start, frames=2)
+    pattern = r"edge \((\d+), (\d+)\) of the cloth cuts face (\d+) of the cloth"
+    a, b, face = map(int, re.search(pattern, str(told.value)).groups())
+    assert cuts(start, np.array([[a, b]]), strip.faces[face : face + 1]).all()
+    result = minimise(Potential([StretchStVK(strip), ContactBarrier(strip)]), start)
+    assert result.status == "diverged" and re.search(pattern, result.reason)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"distance": 0.0}, "distance = 0.0: must be a finite number above 0"),
+        ({"stiffness": np.nan}, "stiffness = nan: must be"),
+        ({"distance": 0.05}, "is only 0.0118 m high at rest; choose a distance below that"),
+    ],
+)
+def test_impossible_barriers_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        ContactBarrier(two_sheets()[0], **options)
+
+
+def test_areas_that_weigh_pairs_are_the_rest_state_of_the_cloth():
+    x, faces = grid(3, 3, width=0.1, depth=0.1)
+    cloth = Cloth(x, faces, Material(), rest_uv=2 * x[:, [0, 2]])
+    mesh = ContactBarrier(cloth).pairs.mesh
+    assert mesh.vertex_areas == pytest.approx(cloth.vertex_areas, rel=1e-12)
+    assert mesh.edge_areas.sum() == pytest.approx(cloth.areas.sum(), rel=1e-12)
+
+
 @pytest.mark.parametrize("held", [True, False])
-def test_a_sheet_pressed_on_another_keeps_a_gap_and_its_weight_is_carried(held):
+def test_a_sheet_pressed_on_another_keeps_a_gap_and_its_weight_is_carried(held, monkeypatch):
     """The barrier pushes up as much as the sheet weighs; without it the sheet falls freely."""
     cloth, lower = two_sheets()
-    weight = Gravity(cloth, acceleration=40.0)
-    barrier = self_contact(cloth)
-    terms = [StretchStVK(cloth), BendHinge(cloth), weight, *([barrier] if held else [])]
-    fall = simulate(cloth, terms, frames=6, quasi_static=True)
+    barrier, work, newton = ContactBarrier(cloth, distance=1e-3), [], Newton.minimise
+
+    def counted(*args, **options):
+        result = newton(*args, **options)
+        work.append(result.iterations)
+        return result
+
+    monkeypatch.setattr(Newton, "minimise", counted)
+    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth, acceleration=40.0)]
+    fall = simulate(
+        cloth, [*terms, *([barrier] if held else [])], frames=6, quasi_static=True, method="newton"
+    )
     assert fall.status == "converged", fall.reason
+    assert fall.frame_fields["iterations"].sum() == sum(work) and (len(work) > 5) == held
     x = fall.positions[-1]
     if not held:
         assert x[lower:, 1].max() < -0.1
         return
-    assert_free(fall, cloth, None)
+    assert free(fall, cloth)
     push = barrier.value_and_gradient(x)[1][lower:]
     assert -push.sum(axis=0)[1] == pytest.approx(40.0 * cloth.masses[lower:].sum(), rel=1e-3)
     assert x[lower:, 1].min() > 0 and x[lower:, 1].max() < 1e-3  # the barrier reaches 1 mm
+
+
+def test_pins_push_cloth_before_them():
+    """A small sheet, all of it pinned, is driven 3 cm a frame down on a free one."""
+    x, faces = grid(6, 6, width=0.16, depth=0.16)
+    y, more = grid(2, 2, width=0.05, depth=0.05)
+    both = np.concatenate([x, y + np.array([0.0531, 4e-3, 0.0547])])
+    paddle = np.arange(len(x), len(both))
+    cloth = Cloth(both, np.concatenate([faces, more + len(x)]), Material(), pins=paddle)
+    terms = [StretchStVK(cloth), BendHinge(cloth), ContactBarrier(cloth)]
+    push = simulate(cloth, terms, frames=3, pin_positions=lambda frame: both[paddle] - [0, 0.03 * frame, 0])
+    assert push.status == "converged", push.reason
+    assert free(push, cloth)
+    assert np.array_equal(push.positions[-1][paddle], both[paddle] - [0, 0.06, 0])
+    centre = np.linalg.norm(x - [0.08, 0, 0.08], axis=1) < 0.02
+    assert (push.positions[-1][: len(x)][centre, 1] < -0.055).all()
+
+
+def test_pins_that_find_no_way_stop_and_say_so():
+    """Two sheets, all of both pinned but one vertex, driven through each other."""
+    cloth, lower = two_sheets()
+    cloth = Cloth(cloth.rest_positions, cloth.faces, Material(), pins=np.arange(cloth.vertex_count - 1))
+    down = np.where(np.arange(cloth.vertex_count - 1) < lower, 0.0, -0.01)[:, None] * [0, 1, 0]
+    terms = [StretchStVK(cloth), BendHinge(cloth), ContactBarrier(cloth)]
+    driven = simulate(cloth, terms, frames=2, pin_positions=lambda f: cloth.rest_positions[:-1] + f * down)
+    assert driven.status == "stalled" and "no way without intersection: pins came" in driven.reason
+    assert free(driven, cloth)
 
 
 @pytest.mark.parametrize("apart", [True, False])
@@ -53,61 +248,54 @@ def test_a_folded_strip_on_a_floor_of_penalty_comes_to_rest_on_itself(apart):
     cloth, start = folded(5)
     floor = Obstacle(*box((-1, -0.1, -1), (1.1, 0, 1.2)))
     terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth, acceleration=60.0), ContactPenalty(cloth)]
-    rest = simulate(
-        cloth, [*terms, *([self_contact(cloth)] if apart else [])], obstacle=floor, start=start, frames=15
-    )
+    barrier = [ContactBarrier(cloth, distance=1e-3)] if apart else []
+    rest = simulate(cloth, [*terms, *barrier], obstacle=floor, start=start, frames=15)
     assert rest.status == "converged", rest.reason
-    if apart:
-        assert_free(rest, cloth, None)
-    else:
-        assert any(cuts(x, cloth.edges, x, cloth.faces).any() for x in rest.positions)
+    assert free(rest, cloth) == apart
 
 
-def test_frames_in_which_nothing_is_near_are_those_without_it():
-    cloth = sheet(4, 0.2, (0.0, 0.0, 0.0), pins=[0, 4])
+def test_frames_in_which_nothing_is_near_are_those_without_it_and_a_run_tells_how_steps_were_opened():
+    """L-BFGS begins the steps by default, Newton's method if it is asked for; it ends them either way."""
+    cloth = Cloth(*grid(4, 4, width=0.2, depth=0.2), pins=[0, 4])
     terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
     without = simulate(cloth, terms, frames=5)
-    beside = simulate(cloth, [*terms, self_contact(cloth)], frames=5)
-    assert np.array_equal(without.positions, beside.positions)
-    assert list(beside.frame_fields["energy/barrier"][1:]) == [0.0] * 4
-
-
-def test_a_step_counts_the_iterations_without_late_terms_too(monkeypatch):
-    """Where the sheet comes near the other, an opening without the barrier is followed by one with it."""
-    work = []
-    minimise = Newton.minimise
-
-    def counted(newton, *args, **options):
-        result = minimise(newton, *args, **options)
-        work.append(result.iterations)
-        return result
-
-    monkeypatch.setattr(Newton, "minimise", counted)
-    cloth, _ = two_sheets()
-    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth, acceleration=40.0), self_contact(cloth)]
-    fall = simulate(cloth, terms, frames=4, quasi_static=True, method="newton")
-    assert len(work) > 3 and fall.frame_fields["iterations"].sum() == sum(work)
-
-
-def test_a_run_tells_how_steps_were_opened():
-    """L-BFGS begins the steps by default, Newton's method if it is asked for; it ends them either way."""
-    cloth = sheet(4, 0.2, (0.0, 0.0, 0.0), pins=[0, 4])
-    terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
-    by_default = simulate(cloth, [*terms, self_contact(cloth)], frames=3)
-    by_newton = simulate(cloth, [*terms, self_contact(cloth)], frames=3, method="newton")
-    assert not np.array_equal(by_default.positions, by_newton.positions)
+    by_default = simulate(cloth, [*terms, ContactBarrier(cloth)], frames=5)
+    by_newton = simulate(cloth, [*terms, ContactBarrier(cloth)], frames=3, method="newton")
+    assert np.array_equal(without.positions, by_default.positions)
+    assert list(by_default.frame_fields["energy/barrier"][1:]) == [0.0] * 4
+    assert not np.array_equal(by_default.positions[:3], by_newton.positions)
     assert (by_default.provenance["opening"], by_newton.provenance["opening"]) == ("lbfgs", "newton")
-    assert "opening" not in simulate(cloth, terms, frames=1).provenance
-
-
-def test_a_barrier_against_nothing_is_refused():
-    strip, _ = folded(5)
-    with pytest.raises(ValueError, match="meets nothing: give self_contact=True or obstacle=True"):
-        ContactBarrier(strip, self_contact=False, obstacle=False)
-
-
-def test_a_function_as_method_is_refused_where_newtons_method_would_end_its_steps():
-    cloth, _ = two_sheets()
-    terms = [StretchStVK(cloth), Gravity(cloth), self_contact(cloth)]
+    assert "opening" not in without.provenance
     with pytest.raises(ValueError, match="not a function, ends steps that 'barrier' joins: choose"):
-        simulate(cloth, terms, frames=2, method=lambda potential, **options: Newton(potential))
+        simulate(cloth, [*terms, ContactBarrier(cloth)], method=lambda potential, **_: Newton(potential))
+
+
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(100, 150), marks=pytest.mark.slow)], ids=len)
+def test_a_step_that_nobody_chose_ends_free_and_where_it_says(seeds):
+    """Material, distance, step and velocities over decades; the gradient by differences of the energy."""
+    for seed in seeds:
+        random = np.random.default_rng(seed)
+        crumple, start = crumpled()
+        stiffness, hinge = 10 ** random.uniform(-2, 2, 2)
+        material = Material(young_modulus=70e3 * stiffness, bending_stiffness=3.96e-5 * hinge)
+        cloth = Cloth(crumple.cloth.rest_positions, crumple.cloth.faces, material)
+        dt = 10 ** random.uniform(-3, -0.5)
+        barrier = ContactBarrier(cloth, distance=10 ** random.uniform(-3, -2.3))
+        potential = Potential(
+            [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), barrier, Inertia(cloth, dt)]
+        )
+        velocity = 10 ** random.uniform(-2, 1) * random.normal(size=start.shape)
+        potential.prepare(Step(start, velocity, start, dt))
+        result = minimise(potential, start, timeout=20.0)
+        x = result.positions
+        assert not cuts(x, cloth.edges, cloth.faces).any(), seed
+        assert result.status in ("converged", "stalled", "max_iterations", "timeout") and result.reason
+        if result.status == "converged":
+            residual = 1e-6 * cloth.masses.mean() * GRAVITY
+            for _ in range(12):
+                d = random.uniform(-1, 1, x.shape)
+                coarse, fine = (
+                    (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h) for h in (2e-8, 1e-8)
+                )
+                noise = 4e-7 * sum(map(abs, potential.terms(x).values())) + 4 * abs(coarse - fine)
+                assert abs(fine) <= residual * np.abs(d).sum() + noise, seed

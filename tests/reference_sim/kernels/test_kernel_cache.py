@@ -232,8 +232,6 @@ def test_no_file_takes_a_decorator_from_numba_itself():
                     named |= {f"{node.module}.{alias.name}" for alias in node.names}
             named -= {"numba.types", "numba.extending.intrinsic", "numba.extending.overload"}
             named -= {"numba.core.event.install_recorder"}
-            if path.name == "kernel_argument.py":
-                named -= {"numba.core.dispatcher.Dispatcher", "numba.typeof"}  # for types alone
             if any(name.split(".")[0] == "numba" for name in named):
                 wrong.append(path.relative_to(ROOT).as_posix())
     assert wrong == [wrapper]
