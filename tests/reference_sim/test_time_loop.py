@@ -95,9 +95,8 @@ def test_a_guess_that_is_not_finite_ends_the_run_at_once_and_may_write_into_its_
         x += 0.5
         return x - 0.5 if step == 1 else np.full_like(x, np.nan)
 
-    run = simulate(
-        cloth, [*terms_of(cloth), ContactPenalty(cloth)], frames=4, start=start, obstacle=ball, guess=broken
-    )
+    terms = [*terms_of(cloth), ContactPenalty(cloth)]
+    run = simulate(cloth, terms, frames=4, start=start, obstacle=ball, guess=broken)
     assert run.status == "diverged" and run.frames == 2
     assert np.array_equal(run.positions[0], start) and np.ptp(run.positions[1] - start) < 0.02
 

@@ -1,4 +1,4 @@
-"""The barrier of a cloth against itself: derivatives, known answers, and that nothing passes through anything.
+"""The barrier of a cloth against itself: derivatives, known answers, and that nothing passes through.
 
 Whether edges cut faces is asked here with determinants of its own, not with the package under test.
 """
@@ -281,9 +281,8 @@ def test_a_step_that_nobody_chose_ends_free_and_where_it_says(seeds):
         cloth = Cloth(crumple.cloth.rest_positions, crumple.cloth.faces, material)
         dt = 10 ** random.uniform(-3, -0.5)
         barrier = ContactBarrier(cloth, distance=10 ** random.uniform(-3, -2.3))
-        potential = Potential(
-            [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), barrier, Inertia(cloth, dt)]
-        )
+        terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), barrier, Inertia(cloth, dt)]
+        potential = Potential(terms)
         velocity = 10 ** random.uniform(-2, 1) * random.normal(size=start.shape)
         potential.prepare(Step(start, velocity, start, dt))
         result = minimise(potential, start, timeout=20.0)
