@@ -18,7 +18,7 @@ from benchmarks.plan.options import PROGRAM, make_parser, split, study_of
 from benchmarks.plan.plan import Plan
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
-from reference_sim.command_line import heeded_interrupts, print_text
+from reference_sim.command_line import print_text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,7 +74,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
         start_loading(*(LOADED_BY_DRESSED if dressed else ()))
         assets = check_roll_outs(plan)
-        with held(plan.folder), heeded_interrupts():
+        with held(plan.folder):
             return execute(plan, assets, report=report)
     except (RunRefused, DeclarationError, RollOutFileError) as error:
         print(f"{program}: {error}", file=sys.stderr)

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import _thread
 import argparse
 import functools
 import os
 import sys
-import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec
+from typing import Any, NoReturn, ParamSpec
 
 from reference_sim.files.atomic_files import disk_full
 
-if TYPE_CHECKING:
-    from sys import UnraisableHookArgs
-
 BAD_INPUT, DISK_FULL, INTERRUPTED = 2, 1, 130  # exit status
-AGAIN = 0.01  # [s] after which an interrupt that was swallowed is repeated
 Given = ParamSpec("Given")
 
 
@@ -70,30 +63,6 @@ class Parser(argparse.ArgumentParser):
         raise WrongWord(f"{message}; see --help")
 
 
-@contextmanager
-def heeded_interrupts() -> Iterator[None]:
-    """Repeat an interrupt from the keyboard that came within a callback, where Python prints and forgets it.
-
-    h5py's weak references have such callbacks: of 60 interrupts of a simulation 4 were lost there.
-    """
-    before, timers = sys.unraisablehook, list[threading.Timer]()
-
-    def repeat(unraisable: UnraisableHookArgs) -> None:
-        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
-            return before(unraisable)
-        timers.append(threading.Timer(AGAIN, _thread.interrupt_main))  # here it would be forgotten once more
-        timers[-1].daemon = True
-        timers[-1].start()
-
-    sys.unraisablehook = repeat
-    try:
-        yield
-    finally:
-        sys.unraisablehook = before
-        for timer in timers:
-            timer.cancel()
-
-
 def print_text(text: str) -> None:
     """Print a text that may be read no further than its first lines, as by `| head`."""
     try:
@@ -126,8 +95,7 @@ def command(
         @functools.wraps(main)
         def run(*arguments: Given.args, **named: Given.kwargs) -> int:
             try:
-                with heeded_interrupts():
-                    return main(*arguments, **named)
+                return main(*arguments, **named)
             except refused as error:
                 full = disk_full(error)
                 problem, status = full or str(error), DISK_FULL if full else BAD_INPUT

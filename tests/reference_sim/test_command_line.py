@@ -69,34 +69,6 @@ def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, message, 
     assert error.startswith("some.command: ") and message in error and error.count("\n") == 1
 
 
-SWALLOWED = """
-import signal, sys, time
-from reference_sim.command_line import command
-
-signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever starts tests in the background has it off
-
-class Swallows:  # its end interrupts, as a Ctrl-C that comes while h5py's weak references are called back
-    def __del__(self):
-        raise KeyboardInterrupt
-
-@command("some.command")
-def main():
-    Swallows()
-    for _ in range(1000):
-        time.sleep(0.005)
-    return 0
-
-before = sys.unraisablehook
-status = main()
-sys.exit(status if sys.unraisablehook is before else 1)
-"""
-
-
-def test_an_interrupt_within_a_callback_is_not_lost():
-    ended = subprocess.run([sys.executable, "-c", SWALLOWED], capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 130 and "interrupted" in ended.stderr
-
-
 NOWHERE = "/proc/nowhere/out"  # nobody makes a folder there, not even who may do everything
 
 

@@ -278,12 +278,6 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
     first = 1
     reason = f"frame {first}: round-off: residual {residual[first]:.1e} above tolerance 1.0e-06"
     assert result.reason.startswith(reason) and Trajectory.load(path).reason == result.reason
-    assert (
-        f"round-off  {relaxed.sum():.0f} frames within tolerance up to round-off alone, first {reason}"
-        in summarise(result, None, frames=4)
-    )
-    near = simulate(cloth, terms_of(cloth), frames=4)
-    assert near.reason == "" and not near.frame_fields["relaxed"].any()
 
 
 @pytest.mark.parametrize(
