@@ -79,13 +79,6 @@ def test_planes_of_a_sphere():
     assert cosine.min() > 1 - 0.01
 
 
-def test_the_place_on_the_face_is_the_plane_point():
-    planes = Obstacle(SPHERE, FACES).planes(around(50, 2, -0.02, 0.02)[0], 0)
-    place = np.einsum("sa,sai->si", planes.barycentric, SPHERE[FACES[planes.faces]])
-    assert place == pytest.approx(planes.points, abs=1e-14)
-    assert planes.barycentric.sum(axis=1) == pytest.approx(1.0, rel=1e-12)
-
-
 def test_normals_point_outwards_on_the_surface_itself():
     """At distance zero there is no direction to the sample: the smooth normal of the mesh takes over."""
     obstacle = Obstacle(SPHERE, FACES)
@@ -123,12 +116,6 @@ def test_signed_distance_of_a_sphere_and_of_a_box():
     assert (inside > 0).sum() > 5
     signed = Obstacle(*box((0, 0, 0), (0.2, 0.25, 0.28))).signed_distance(points, 0)
     assert signed == pytest.approx(exact, abs=1e-14)
-
-
-def test_signed_distance_deep_inside_a_thick_body():
-    points = np.array([(0.0, 0.01, 0.02), (0.1, 0, 0), (0, -0.12, 0)])
-    signed = Obstacle(SPHERE, FACES).signed_distance(points, 0)
-    assert signed == pytest.approx(np.linalg.norm(points, axis=1) - RADIUS, abs=sagitta(SPHERE, FACES))
 
 
 def bent(vertices: np.ndarray) -> np.ndarray:
@@ -241,36 +228,6 @@ def test_no_sample_outside_a_dressed_body_is_in_contact():
     within_face = (distance < 0) & (np.linalg.norm(points - planes.points, axis=1) < np.abs(distance) + 1e-9)
     assert within_face.sum() > 300
     assert height[within_face] == pytest.approx(distance[within_face], abs=1e-9)
-
-
-def test_what_samples_may_meet_is_found_also_from_a_few_of_them():
-    """The faces searched are those that some sample may meet, up to the very rim of the region."""
-    rest, faces = bar()
-    obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.2)
-    centroids = rest[faces].mean(axis=1)
-    rest_points = centroids[centroids[:, 0] < -0.45]
-    points = rest_points + np.array([0.17, 0.0, 0.01])  # the nearest faces are near the rim of the region
-    allowed = np.linalg.norm(centroids[None] - rest_points[:, None], axis=2) <= 0.2
-    exact = brute_force(points, rest, faces, allowed)
-    planes = obstacle.planes(points, 0, rest_points)
-    assert np.linalg.norm(points - planes.points, axis=1) == pytest.approx(exact, abs=1e-14)
-    assert exact.min() < 0.05
-
-
-def test_two_kinds_of_samples_do_not_disturb_each_other():
-    rest, faces = bar()
-    obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=0.15)
-    left = rest[rest[:, 0] < -0.3]
-    above = bent(left) + np.array([0.0, 0.0, 0.01])
-    first = obstacle.planes(above, 0, left)
-    second = obstacle.planes(bent(rest), 0, rest)
-    again = obstacle.planes(above, 0, left)
-    # Where two faces are equally near either may answer, with the same point.
-    assert again.points == pytest.approx(first.points, abs=1e-14)
-    assert again.normals == pytest.approx(first.normals, abs=1e-9)
-    assert np.linalg.norm(second.points - bent(rest), axis=1).max() < 1e-12
-    place = np.einsum("sa,sai->si", second.barycentric, bent(rest)[faces[second.faces]])
-    assert place == pytest.approx(second.points, abs=1e-12)
 
 
 def test_as_many_samples_from_elsewhere_meet_their_own_faces():

@@ -17,7 +17,7 @@ from reference_sim.energies import (
     StretchSpring,
     StretchStVK,
 )
-from tests.reference_sim.meshes import grid, patch
+from tests.reference_sim.meshes import patch
 
 
 def bent_cloth(pins: tuple[int, ...] = ()) -> Cloth:
@@ -128,36 +128,6 @@ def test_leaving_a_term_out_takes_away_that_term_and_nothing_else():
         assert energy.name not in rest.terms(x)
 
 
-def test_prepare_reaches_every_term():
-    cloth = bent_cloth()
-    energy = Inertia(cloth, 0.01)
-    previous, velocity = crumpled(cloth), np.ones_like(cloth.rest_positions)
-    Potential([Gravity(cloth), energy]).prepare(Step(previous, velocity, previous, 0.01))
-    assert energy.x_hat == pytest.approx(previous + 0.01, rel=1e-15)
-
-
-def test_positions_need_not_be_contiguous_or_double():
-    cloth = bent_cloth()
-    potential, x = Potential(all_terms(cloth)), crumpled(cloth)
-    assert potential.value(np.asfortranarray(x)) == potential.value(x)
-    single = x.astype(np.float32)
-    assert potential.value(single) == potential.value(single.astype(np.float64))
-    assert potential.gradient(single).dtype == np.float64
-
-
-def test_energies_of_different_cloths_are_refused():
-    with pytest.raises(ValueError, match="'strain' and 'gravity' are of different cloths"):
-        Potential([StretchStVK(bent_cloth()), Gravity(bent_cloth())])
-
-
-def test_terms_of_equal_names_are_refused():
-    """In tables and files, where terms are found by name, one would hide the other."""
-    cloth = bent_cloth()
-    terms = [StretchStVK(cloth), Gravity(cloth), Gravity(cloth, acceleration=1.6)]
-    with pytest.raises(ValueError, match="two energies are named 'gravity': give each a name of its own"):
-        Potential(terms)
-
-
 def test_second_derivatives_of_another_shape_are_refused():
     class Flat(Gravity):
         def active_hessian_blocks(self, x, convexity=0.0):
@@ -168,13 +138,20 @@ def test_second_derivatives_of_another_shape_are_refused():
         Potential([Flat(cloth)]).hessian(cloth.rest_positions)
 
 
-def test_a_potential_without_terms_is_refused():
-    with pytest.raises(ValueError, match="at least one energy"):
-        Potential([])
-
-
-def test_contact_without_an_obstacle_is_refused_when_it_is_prepared():
-    x, faces = grid(2, 2)
-    cloth = Cloth(x, faces)
-    with pytest.raises(ValueError, match="needs an obstacle"):
-        Potential([ContactPenalty(cloth)]).prepare(Step(x, 0 * x, x, 0.1))
+@pytest.mark.parametrize(
+    ("terms", "message"),
+    [
+        ((), "at least one energy"),
+        (
+            (StretchStVK, lambda cloth: Gravity(bent_cloth())),
+            "'strain' and 'gravity' are of different cloths",
+        ),
+        ((Gravity, Gravity), "two energies are named 'gravity': give each a name of its own"),
+        ((ContactPenalty,), "needs an obstacle"),
+    ],
+)
+def test_terms_that_do_not_add_up_are_refused(terms, message):
+    cloth = bent_cloth()
+    x = cloth.rest_positions
+    with pytest.raises(ValueError, match=message):
+        Potential([make(cloth) for make in terms]).prepare(Step(x, 0 * x, x, 0.1))

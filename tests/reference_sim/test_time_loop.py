@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,7 +24,6 @@ from reference_sim.energies import (
     Gravity,
     StretchStVK,
 )
-from reference_sim.minimise.newton import Newton
 from reference_sim.simulate_command import summarise
 from tests.reference_sim.meshes import box, grid, random_rotation, sphere
 
@@ -197,14 +195,6 @@ def test_divergence_is_recorded_and_not_raised(tmp_path):
     assert loaded.status == "diverged" and loaded.frames == result.frames and loaded.reason == result.reason
 
 
-def test_a_divergence_is_not_hidden_by_frames_that_were_stopped_early():
-    cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    energies = [*terms_of(cloth), Poison(cloth)]
-    result = simulate(cloth, energies, frames=20, max_iterations=1, method="newton")
-    assert result.frame_fields["converged"][1] == 0 and result.frames < 20
-    assert result.status == "diverged" and result.reason.startswith(f"frame {result.frames}: ")
-
-
 class Cut(Exception):
     """Ends a run in the middle."""
 
@@ -236,16 +226,6 @@ def test_the_status_of_a_run_is_its_worst_and_the_reason_the_first_with_it():
     assert "\nstatus     timeout: frame 3: " in summarise(result, frames=5)
 
 
-def test_a_file_names_a_minimiser_with_its_arguments(tmp_path):
-    cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    result = simulate(
-        cloth, terms_of(cloth), frames=2, method=partial(Newton, reuse=True), path=tmp_path / "a.vtkhdf"
-    )
-    stored = Trajectory.load(tmp_path / "a.vtkhdf")
-    assert stored.provenance["options"]["method"] == ["Newton", {"reuse": True}]
-    np.testing.assert_array_equal(stored.positions, result.positions)
-
-
 def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
     cloth = Cloth(SHEET, FACES, pins=[0, 6])
     result = simulate(cloth, terms_of(cloth), frames=4, max_iterations=1)
@@ -253,18 +233,6 @@ def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
     assert result.reason.startswith("frame 1: ")
     assert (result.frame_fields["converged"][1:] == 0).all()
     assert (result.frame_fields["gradient_norm"][1:] > 1e-6).all()
-
-
-def test_a_residual_within_the_tolerance_up_to_round_off_alone_says_so():
-    """A hundred kilometres away the computed residual is small; round-off of positions may be 3e-6 of it."""
-    cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    trajectory = simulate(cloth, terms_of(cloth), start=SHEET + np.array([1e5, 0.0, 0.0]), frames=3)
-    residual, relaxed = (trajectory.frame_fields[name] for name in ("gradient_norm", "relaxed"))
-    hidden = 1 + int(np.flatnonzero(residual[1:] <= 1e-6)[0])
-    assert relaxed[1:].all() and trajectory.status == "converged" and residual[hidden] > 0.0
-    here = simulate(cloth, terms_of(cloth), frames=3)
-    assert not here.frame_fields["relaxed"].any() and here.reason == ""
-    assert re.match(r"frame 1: round-off: ", trajectory.reason)
 
 
 def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
@@ -309,18 +277,6 @@ def test_what_cannot_be_simulated_is_refused_before_any_file_is_written(options,
     with pytest.raises(ValueError, match=re.escape(message)):
         simulate(cloth, terms_of(cloth), **({"frames": 2, "path": tmp_path / "run"} | options))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_an_unknown_option_is_refused():
-    cloth = Cloth(SHEET, FACES)
-    with pytest.raises(TypeError, match="gravity"):
-        simulate(cloth, terms_of(cloth), gravity=9.81)
-
-
-def test_one_frame_is_the_start_alone():
-    cloth = Cloth(SHEET, FACES)
-    result = simulate(cloth, terms_of(cloth), frames=1)
-    assert result.frames == 1 and (result.positions[0] == SHEET).all() and result.status == "converged"
 
 
 def test_progress_in_a_log_is_a_few_lines(capsys):

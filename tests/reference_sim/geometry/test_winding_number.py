@@ -49,8 +49,3 @@ def test_two_parts_at_once_wind_twice_and_inside_out_winds_backwards():
     points = np.array([[0.75, 0.75, 0.75], [0.25, 0.25, 0.25], [1.25, 1.25, 1.25], [0.25, 1.25, 0.5]])
     assert winding_numbers(both, faces, points).tolist() == [2, 1, 1, 0]
     assert winding_numbers(both, faces[:, ::-1], points).tolist() == [-2, -1, -1, 0]
-
-
-def test_points_beyond_the_mesh_need_no_face():
-    assert winding_numbers(CUBE, CUBE_FACES, np.full((2, 3), 5.0)).tolist() == [0, 0]
-    assert winding_numbers(CUBE, CUBE_FACES, np.empty((0, 3))).tolist() == []

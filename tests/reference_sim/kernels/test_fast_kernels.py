@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import warnings
 from dataclasses import replace
 from typing import ClassVar
@@ -21,11 +20,9 @@ from reference_sim.energies import (
 )
 from reference_sim.kernels import fast_kernels
 from reference_sim.kernels.fast_kernels import (
-    USES,
     SlowPathWarning,
     fast_kernel,
     has_kernel,
-    step_terms,
     terms_without_kernel,
 )
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
@@ -65,13 +62,6 @@ def told_anew():
     fast_kernels._warn_once.cache_clear()
 
 
-def test_every_declared_function_is_there_and_takes_the_term():
-    for term in TERMS.values():
-        for use, function in vars(term).get("kernels", {}).items():
-            assert use in USES
-            assert next(iter(inspect.signature(function).parameters)) == "term"
-
-
 def test_what_a_class_inherits_is_not_its_own(cloth):
     assert has_kernel(Same(cloth), "float32_lanes") and not has_kernel(Softer(cloth), "float32_lanes")
     assert fast_kernel(Softer(cloth), "training_batch") is None
@@ -88,13 +78,6 @@ def test_an_unknown_use_is_named(cloth):
         has_kernel(Misspelt(cloth), "float32_lanes")
     with pytest.raises(ValueError, match=r"Named\.kernels: 'float32_lanes' is 'lanes': give the function"):
         has_kernel(Named(cloth), "float32_lanes")
-
-
-def test_weights_of_all_terms_add_up(cloth):
-    two = [Gravity(cloth), Gravity(cloth, acceleration=1.0)]
-    two[1].name = "a second gravity"
-    terms = step_terms(Potential([*two, Inertia(cloth, 0.1)]), "float32_lanes", "test")
-    assert terms.weights == pytest.approx(10.81 * cloth.masses) and terms.elements == ()
 
 
 def test_a_slow_minimisation_is_announced_once(cloth, told_anew):

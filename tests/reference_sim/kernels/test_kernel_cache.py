@@ -5,14 +5,11 @@ from __future__ import annotations
 import ast
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-
-from reference_sim.kernels.kernel_cache import KEPT
 
 ROOT = Path(__file__).resolve().parents[3]
 FILES = {
@@ -171,14 +168,6 @@ def test_an_edit_of_a_kernel_that_is_an_argument_is_seen(project, run):
     assert run(CALL_GIVEN, project) == ["25.0 0.0", "1"]
 
 
-@pytest.mark.slow
-def test_a_copy_takes_its_compiled_kernels_along(project, call):
-    call(project)
-    copy = project / "elsewhere" / "copy"
-    shutil.copytree(project, copy)
-    assert call(copy) == (640, True, copy / "__pycache__" / call(project)[2].name)
-
-
 def test_the_users_own_cache_folder_is_respected(project, call):
     _, _, place = call(project, NUMBA_CACHE_DIR=str(project / "mine"))
     assert place.is_relative_to(project / "mine") and not (project / "__pycache__").exists()
@@ -198,21 +187,6 @@ def test_without_any_folder_kernels_are_compiled_in_the_process(project, run):
     (project / "no").write_text("a file")
     code = "import caller\nprint(caller.outer(3), caller.outer.stats.cache_path)"
     assert run(code, project, NUMBA_CACHE_DIR=str(project / "no")) == ["640 None"]
-
-
-@pytest.mark.slow
-def test_old_folders_go_and_those_of_other_modules_stay(project, call):
-    for k in range(KEPT + 1):
-        (project / "constants.py").write_text(f"FACTOR = {k}\n")
-        call(project)
-    names = [path.name.rpartition("-")[0] for path in (project / "__pycache__").iterdir()]
-    assert sorted(names) == sorted(["bystander", "callee", "deep", "other"] + ["caller"] * KEPT)
-    assert call(project)[1]
-
-
-def test_the_setting_of_numba_is_left_as_it_was(project, run):
-    code = "import caller\nfrom numba import config\nprint([config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES])"
-    assert run(code, project) == ["['', '']"]
 
 
 def test_no_file_takes_a_decorator_from_numba_itself():

@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import open_assets
 from benchmarks.meshes import sphere, square_sheet
-from benchmarks.presets import find_preset
-from benchmarks.scene import BuiltScene
-from benchmarks.scenes import of_garment
-from benchmarks.scenes.long_motion import repeated_there_and_back
-from benchmarks.scenes.out_of_distribution import faster
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.cholesky import WIDTH, ScalarPattern, factorise, solve
 from reference_sim.energies import AreaBarrier, BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
-from reference_sim.minimise import compiled_lbfgs, lbfgs
+from reference_sim.minimise import lbfgs
 from reference_sim.minimise.compiled_lbfgs import ELEMENTS, CompiledLBFGS, evaluate
-from reference_sim.minimise.descent import Result
 from reference_sim.minimise.lbfgs import LBFGS
 from reference_sim.minimise.newton import Newton
-from snug.motion.library import make_motion
-from snug.motion.motion import Motion
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import patch
 
@@ -152,19 +141,6 @@ def test_many_iterations_end_at_the_minimum():
     assert potential.value(descent.positions) - least.energy < 1e-6 * (potential.value(guess) - least.energy)
 
 
-def test_a_pair_of_too_little_curvature_leaves_the_remembered_ones_whole(monkeypatch):
-    """The loop runs interpreted: a threshold makes such pairs frequent, also where the memory is full."""
-    potential, guess = pressed(0)
-    monkeypatch.setattr(compiled_lbfgs, "LEAST_CURVATURE", 0.2)
-    monkeypatch.setattr(compiled_lbfgs, "descend", compiled_lbfgs.descend.py_func)
-    for count in range(25, 35):
-        solver = CompiledLBFGS(potential, max_iterations=count)
-        assert solver.minimise(guess).iterations == count
-        memory = solver._memory
-        curvatures = np.einsum("ij,ij->i", memory.S.astype(float), memory.Y.astype(float))
-        assert memory.rho * curvatures == pytest.approx(np.ones(len(curvatures)), rel=1e-3)
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_what_begins_in_float32_ends_in_a_minimum_of_float64(seed, monkeypatch):
     potential, guess = pressed(seed)
@@ -211,14 +187,6 @@ def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
     assert np.array_equal(stopped.minimise(guess).positions, new)
 
 
-def test_the_time_of_the_whole_descent_has_a_name_of_its_own():
-    potential, guess = pressed(0)
-    assert set(CompiledLBFGS(potential, max_iterations=5).minimise(guess).seconds) == {
-        "assemble", "factorise", "descend",
-    }  # fmt: skip
-    assert LBFGS(potential).minimise(guess).seconds["descend"] > 0.0
-
-
 def test_it_says_why_it_ended():
     potential, guess = pressed(0)
     assert CompiledLBFGS(potential, max_iterations=3).minimise(guess).reason == "stopped after 3 iterations"
@@ -227,32 +195,6 @@ def test_it_says_why_it_ended():
     stuck = CompiledLBFGS(potential, max_iterations=10_000, tolerance=1e-30).minimise(guess)
     assert stuck.iterations < 10_000 and stuck.status == "max_iterations"
     assert stuck.reason.startswith("no step along the quasi-Newton direction lowers the energy, after ")
-
-
-def test_a_start_in_float32_that_is_refused_counts(monkeypatch):
-    potential, guess = pressed(0)
-    clock, cost = [0.0], {}
-
-    def raised(solver: CompiledLBFGS, x0: np.ndarray) -> Result:
-        clock[0] += cost["seconds"]
-        return Result(
-            positions=x0 + 0.1 * potential.cloth.free[:, None] * np.arange(len(x0))[:, None],
-            status="max_iterations", reason="", iterations=cost["iterations"], factorisations=1,
-            gradient_norm=1.0, energy=0.0, terms={}, seconds={"descend": cost["seconds"]},
-        )  # fmt: skip
-
-    monkeypatch.setattr(CompiledLBFGS, "minimise", raised)
-    monkeypatch.setattr("time.perf_counter", lambda: clock[0])
-    cost |= {"iterations": 0, "seconds": 0.0}
-    free = LBFGS(potential, timeout=50.0).minimise(guess)
-    cost |= {"iterations": 7, "seconds": 40.0}
-    paid = LBFGS(potential, timeout=50.0).minimise(guess)
-    assert free.status == paid.status == "converged" and np.array_equal(free.positions, paid.positions)
-    assert paid.iterations == free.iterations + 7 and paid.factorisations == free.factorisations
-    assert paid.seconds["descend"] == 40.0
-    cost |= {"seconds": 60.0}
-    late = LBFGS(potential, timeout=50.0).minimise(guess)
-    assert late.status == "timeout" and late.seconds["descend"] == 60.0
 
 
 def test_what_it_has_no_kernel_for_is_refused_by_name():
@@ -287,45 +229,3 @@ def test_whole_roll_outs_stay_beside_the_exact_ones(name):
     assert trajectory.frames == exact.frames == 10
     span = np.abs(exact.positions - exact.positions[0]).max()
     assert np.abs(trajectory.positions - exact.positions).max() < 0.01 * span
-
-
-def dressed_in_motion(motion: Motion) -> BuiltScene:
-    """A small T-shirt on the package's body in a motion."""
-    preset = replace(find_preset("smoke"), frames=motion.frames)
-    assets = open_assets(preset, [motion], ["tshirt"])
-    return of_garment("tshirt").scene(motion.name).at(preset).build(assets)
-
-
-def roll_out(scene: BuiltScene, obstacle: Obstacle, **options) -> np.ndarray:
-    """Positions (T, V, 3) [m] of ten iterations a step."""
-    trajectory = simulate(
-        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.settle(),
-        obstacle=obstacle, max_iterations=10, **options,
-    )  # fmt: skip
-    assert trajectory.frames == scene.frames, trajectory.reason
-    return trajectory.positions
-
-
-@pytest.mark.parametrize(
-    ("name", "times"),
-    [
-        pytest.param("run", 4, marks=pytest.mark.slow),
-        ("jumping_jack", 4),
-        pytest.param("spin_jump", 1000, marks=pytest.mark.slow),
-    ],
-)
-def test_no_limb_is_lost_in_hard_and_long_motions(name, times):
-    """Four times as fast; or there and back for 1,000 frames: depths and distances beside those of lbfgs."""
-    motion = make_motion(name)
-    motion = repeated_there_and_back(motion) if times == 1000 else faster(motion, times)
-    scene = dressed_in_motion(motion)
-    assert scene.obstacle is not None
-    exact = roll_out(scene, scene.obstacle, method="lbfgs", finish=False)
-    positions = roll_out(scene, scene.obstacle, method=CompiledLBFGS)
-    frames = range(1, scene.frames, max(scene.frames // 100, 1))
-    far = [np.array([scene.obstacle.signed_distance(x[f], f) for f in frames]) for x in (exact, positions)]
-    deep = [(d < -5e-3).mean() for d in far]
-    assert deep[1] < deep[0] + 0.01, deep
-    assert far[1].min() > 2 * far[0].min() - 5e-3 and far[1].max() < far[0].max() + 0.05
-    middle = len(frames) // 2  # nothing wears out
-    assert np.abs(far[1]).mean(axis=1)[middle:].mean() < 1.2 * np.abs(far[0]).mean(axis=1)[middle:].mean()

@@ -9,8 +9,7 @@ import torch
 from reference_sim import GRAVITY, Cloth, Material, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
 from reference_sim.minimise.descent import STATUSES
-from reference_sim.minimise.minimisers import MINIMISERS, make_minimiser
-from reference_sim.minimise.newton import NewtonRun
+from reference_sim.minimise.minimisers import MINIMISERS
 from tests.reference_sim.meshes import patch, random_rotation
 from tests.reference_sim.minimise.minima import (
     FACES,
@@ -99,19 +98,11 @@ def test_a_sheet_collapsed_to_a_point_is_no_answer(spread):
 @pytest.mark.parametrize("term", [BendHinge, StretchSpring])
 @both
 def test_a_state_without_energy_is_diverged_and_raises_nothing(method, term):
-    """All vertices at one point: a hinge has no normal there, a spring no direction."""
-    cloth = Cloth(SHEET, FACES)
-    result = minimise(Potential([term(cloth), Inertia(cloth, 0.01)]), np.zeros_like(SHEET), method)
-    assert result.status == "diverged" and "not finite" in result.reason
-
-
-@both
-def test_nan_at_the_start_is_diverged(method):
-    potential, x0 = hanging()
-    x0 = x0.copy()
-    x0[5, 1] = np.nan
-    result = minimise(potential, x0, method)
-    assert result.status == "diverged" and "not finite" in result.reason
+    """All vertices at one point: a hinge has no normal there, a spring no direction. Or a start of NaN."""
+    cloth, torn = Cloth(SHEET, FACES), np.where(np.arange(81)[:, None] == 5, np.nan, SHEET)
+    for start in (np.zeros_like(SHEET), torn):
+        result = minimise(Potential([term(cloth), Inertia(cloth, 0.01)]), start, method)
+        assert result.status == "diverged" and "not finite" in result.reason
 
 
 class Poisoned(Energy):
@@ -144,35 +135,11 @@ def test_too_few_iterations_is_said(method):
     assert "3 iterations" in result.reason and result.gradient_norm > TOLERANCE
 
 
-def test_few_iterations_assemble_no_hessian_that_nobody_uses(monkeypatch):
-    assembled = []
-    assemble = NewtonRun.assemble
-    monkeypatch.setattr(
-        NewtonRun, "assemble", lambda run, share: assembled.append(share) or assemble(run, share)
-    )
-    potential, x0 = crumpled()
-    results = [
-        minimise(potential, x0, max_iterations=1, start_projected=projected) for projected in (False, True)
-    ]
-    assert assembled == [0.0, 0.15, 0.3, 0.6, 1.0, 1.0]  # one after another until one will do; then that one
-    assert [result.factorisations for result in results] == [5, 1]
-    assert (results[0].positions == results[1].positions).all()
-    assert {result.status for result in results} == {"max_iterations"}
-    assert_minimum(potential, x0, minimise(potential, x0, start_projected=True))
-
-
 def test_converged_in_the_very_last_iteration_is_converged():
     potential, x0 = crumpled()
     iterations = minimise(potential, x0).iterations
     assert_minimum(potential, x0, minimise(potential, x0, max_iterations=iterations))
     assert minimise(potential, x0, max_iterations=iterations - 1).status == "max_iterations"
-
-
-@both
-def test_too_little_time_is_said(method):
-    potential, x0 = hanging()
-    result = minimise(potential, x0, method, timeout=0.0)
-    assert result.status == "timeout" and result.gradient_norm > TOLERANCE
 
 
 @both
@@ -213,28 +180,12 @@ def test_at_rest_there_is_nothing_to_do(method):
     assert np.abs(result.positions - SHEET).max() == 0
 
 
-@both
-def test_a_cloth_with_every_vertex_pinned_stays(method):
-    cloth = Cloth(SHEET, FACES, pins=range(len(SHEET)))
-    result = minimise(Potential([StretchStVK(cloth), Gravity(cloth)]), 1.1 * SHEET, method)
-    assert result.status == "converged" and (result.positions == 1.1 * SHEET).all()
-
-
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
 def test_the_tolerance_is_in_vertex_weights_whatever_the_stiffness(factor):
     material = Material(young_modulus=70e3 * factor)
     cloth = Cloth(SHEET, FACES, material, pins=SIDES)
     potential = Potential([StretchStVK(cloth), Gravity(cloth), Inertia(cloth, 1 / 30)])
     assert_minimum(potential, 1.2 * SHEET, minimise(potential, 1.2 * SHEET))
-
-
-def test_one_minimiser_serves_again_and_gives_the_same_bits():
-    potential, x0 = hanging()
-    newton = make_minimiser(potential)
-    first = newton.minimise(x0)
-    newton.minimise(x0 + 0.01)
-    again = newton.minimise(x0)
-    assert (again.positions == first.positions).all() and again.iterations == first.iterations
 
 
 def crumpled() -> tuple[Potential, np.ndarray]:
@@ -257,34 +208,6 @@ def test_a_factorisation_used_again_saves_others_and_ends_in_a_minimum(case):
     assert again.factorisations <= 0.9 * fresh.factorisations and again.iterations > again.factorisations
     assert len(kept) <= again.iterations + 1  # every step that was kept is an iteration
     assert (np.diff([potential.value(x) for x in kept]) <= 1e-12 * abs(again.energy)).all()
-
-
-def test_no_matrix_is_factorised_twice_and_no_step_measured_twice():
-    """A fence forbids the second half of every step, so that none is a full one."""
-
-    class Fence(Poisoned):
-        def largest_step(self, x, direction):
-            asked.append((x.tobytes(), direction.tobytes()))
-            return 0.5
-
-    potential, x0 = crumpled()
-    potential = Potential([*potential.energies, Fence(potential.cloth)])
-    newton, asked, factorised = make_minimiser(potential, max_iterations=25), [], []
-    factorise = newton.hessian._solver.factorise
-    newton.hessian._solver.factorise = lambda data: factorised.append(data.tobytes()) or factorise(data)
-    assert newton.minimise(x0).iterations == 25
-    assert len(set(factorised)) == len(factorised) > 25
-    assert len(set(asked)) == len(asked) >= 25
-
-
-def test_a_watchdog_ends_when_time_is_up(monkeypatch):
-    """A sheet 1e4 times as stiff as cotton goes up to 40 steps before it looks back."""
-    cloth = Cloth(SHEET, FACES, Material(young_modulus=7e8), pins=[0, 8])
-    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
-    x0 = SHEET + 1e-4 * np.random.default_rng(0).standard_normal(SHEET.shape)
-    monkeypatch.setattr(NewtonRun, "late", lambda self, timeout: self.iterations >= 45)
-    result = minimise(potential, x0)
-    assert result.status == "timeout" and result.iterations <= 46
 
 
 def test_unknown_names_are_refused():

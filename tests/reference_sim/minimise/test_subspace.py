@@ -141,10 +141,3 @@ def test_a_run_that_starts_again_gives_the_bits_of_the_first():
         runs.append([solver.minimise(SHEET).positions for _ in steps])
         solver.start_again()
     assert np.array_equal(*runs)
-
-
-def test_columns_that_others_express_are_left_out():
-    columns = np.random.default_rng(0).normal(size=(9, 3))
-    space = orthonormal(np.concatenate([columns, columns @ [[1.0], [2.0], [3.0]]], axis=1))
-    assert space.shape == (9, 3) and np.allclose(space.T @ space, np.eye(3))
-    assert np.allclose(space @ (space.T @ columns), columns)
