@@ -9,17 +9,3 @@ from .potential import Potential as Potential
 from .time_loop import simulate as simulate
 from .trajectory import Trajectory as Trajectory
 from .trajectory import TrajectoryError as TrajectoryError
-
-__all__ = [
-    "GRAVITY",
-    "Cloth",
-    "Material",
-    "MeshError",
-    "Obstacle",
-    "Potential",
-    "Result",
-    "Trajectory",
-    "TrajectoryError",
-    "minimise",
-    "simulate",
-]

@@ -11,7 +11,6 @@ from typing import Any
 
 GRAVITY = 9.81  # [m/s^2], downwards along -y
 LARGEST_FILE = 1 << 20  # [bytes]
-SMALLEST, LARGEST = 1e-60, 1e60  # of moduli and masses per area: squares and ratios of them are still numbers
 _LAME = ("lame_lambda_pa", "lame_mu_pa", "thickness", "areal_density", "bending_stiffness")
 
 
@@ -63,13 +62,6 @@ class Material:
             raise ValueError(
                 f"Material.bending_stiffness = {self.bending_stiffness!r}: must be finite, at least 0 [J]"
             )
-        for what, factor in (("stiffness E t [N/m]", "young_modulus"), ("mass rho t [kg/m^2]", "density")):
-            product = getattr(self, factor) * self.thickness
-            if not SMALLEST < product < LARGEST:
-                raise ValueError(
-                    f"Material.{factor} = {getattr(self, factor)!r}, thickness = {self.thickness!r}: their "
-                    f"{what} is {product:g}, beyond what can be computed with: check the units (SI)"
-                )
 
     @classmethod
     def from_file(cls, path: str | Path) -> Material:

@@ -69,14 +69,7 @@ def arctan2(y: np.float32, x: np.float32) -> np.float32:
 # The corners of an element are copied into one small array of known size and the result copied back: within
 # it the compiler knows that nothing overlaps, which for rows chosen by index it could not know.
 @njit(cache=True, fastmath=GUARDED, error_model="numpy")
-def _bending(
-    x: np.ndarray,
-    hinges: np.ndarray,
-    stiffness: np.ndarray,
-    rest: np.ndarray,
-    values: np.ndarray,
-    gradients: np.ndarray,
-) -> None:
+def _bending(x, hinges, stiffness, rest, values, gradients):
     """Set values [J] and add to gradients [N]; d theta / d x_a = +- w_a n / |n|^2, as in definition."""
     L = TRAINING_LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)

@@ -110,16 +110,7 @@ def batch(term: StretchStVK) -> BatchKernel:
 # The corners of an element are copied into one small array of known size and the result copied back: within
 # it the compiler knows that nothing overlaps, which for rows chosen by index it could not know.
 @njit(cache=True, fastmath=GUARDED, error_model="numpy")
-def _strain(
-    x: np.ndarray,
-    faces: np.ndarray,
-    Dm_inverse: np.ndarray,
-    areas: np.ndarray,
-    lam: np.float32,
-    mu: np.float32,
-    values: np.ndarray,
-    gradients: np.ndarray,
-) -> None:
+def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
     """Set values [J] and add dE/dx_a = A F S b_a to gradients [N], as in definition."""
     L = TRAINING_LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)

@@ -1,1 +1,1 @@
-"""Files of other programs (meshes, UV charts, arrays), and files that appear whole or not at all."""
+"""Files: arrays, meshes and rest charts of other programs; files that appear whole or not at all."""

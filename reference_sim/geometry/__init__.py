@@ -1,1 +1,1 @@
-"""Geometry of triangle meshes: edges, areas, normals, closest points, winding numbers."""
+"""Geometry of triangle meshes: edges and areas, normals and contact planes, closest points."""

@@ -1,1 +1,1 @@
-"""Foundations of all compiled kernels: their cache on disk, lanes of elements, kernels as arguments."""
+"""Foundations of compiled kernels: their cache on disk, layouts, and how terms declare them."""

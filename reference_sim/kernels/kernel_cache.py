@@ -3,8 +3,7 @@
 numba keeps on disk what it compiled, and compiles a kernel anew when the kernel's own file has changed. It
 does not see a change in another file: in a kernel that is called, or in a constant that is imported. So each
 module's kernels are kept in a folder whose name holds a digest of the file and of both. Processes with the
-same sources find the same folder. Of processes that want a kernel at the same time one compiles it, and the
-others wait for it.
+same sources find the same folder.
 
 The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR
 where that is set. No list of modules is kept: what counts for a kernel is what its module has imported.
@@ -32,7 +31,6 @@ import numba
 import numpy as np
 from numba import typeof
 from numba.core.caching import InTreeCacheLocator
-from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 from numba.extending import overload
@@ -46,7 +44,6 @@ USED = ".used"  # file whose date says when a folder was last asked for
 _config: Any = numba.config
 _digests: dict[str, str] = {}  # of modules that hold kernels, by name
 _folders: dict[str, Path | None] = {}
-_being_compiled: set[Path] = set()  # files of locks
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
@@ -63,32 +60,9 @@ def njit(**options: Any) -> Callable[[Any], Any]:
             _folders[module] = _folder(function, _digests[module])
         folder = _folders[module] if options.get("cache") else None
         with _locator_in_use():
-            kernel: Any = numba.njit(**(options | {"cache": folder is not None}))(function)
-        if folder is not None and hasattr(kernel, "compile"):  # NUMBA_DISABLE_JIT leaves a function
-            kernel.compile = _in_turn(kernel.compile, folder / f"{function.__name__}.lock")
-        return kernel
+            return numba.njit(**(options | {"cache": folder is not None}))(function)
 
     return decorate
-
-
-def _in_turn(compile_kernel: Callable[[Any], Any], file: Path) -> Callable[[Any], Any]:
-    """Return the method `compile` of a kernel, called by one process at a time, which looks on disk first.
-
-    numba's lock of threads is taken before that of processes, so two threads cannot wait for each other.
-    """
-
-    def compile_in_turn(signature: Any) -> Any:
-        with global_compiler_lock, contextlib.ExitStack() as held:
-            if file not in _being_compiled:  # by this process, which would wait for itself
-                _being_compiled.add(file)
-                held.callback(_being_compiled.remove, file)
-                with contextlib.suppress(ImportError, OSError):  # this system, or its disk, has no such locks
-                    import fcntl
-
-                    fcntl.flock(held.enter_context(file.open("ab")), fcntl.LOCK_EX)
-            return compile_kernel(signature)
-
-    return compile_in_turn
 
 
 class KernelLocator(InTreeCacheLocator):

@@ -60,14 +60,6 @@ def test_impossible_values_are_refused_by_name(wrong):
         Material(**wrong)
 
 
-@pytest.mark.parametrize(
-    "tiny", [{"thickness": 1e-300}, {"young_modulus": 1e-300}, {"density": 1e-300}, {"young_modulus": 1e300}]
-)
-def test_a_cloth_whose_stiffness_or_mass_is_lost_in_round_off_is_refused(tiny):
-    with pytest.raises(ValueError, match=rf"{next(iter(tiny))} = .*beyond what can be computed with"):
-        Material(**tiny)
-
-
 def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
     toml, json = tmp_path / "silk.toml", tmp_path / "silk.json"
     toml.write_text("young_modulus = 5e4  # Pa\ndensity = 300\n")

@@ -44,12 +44,6 @@ CALL_GIVEN = (
     "print(given.sums(((kernel, (2.0,)), (kernel, (3.0, 1))), 10.0), given.sums((), 1.0))\n"
     "print(sum(given.sums.stats.cache_hits.values()))"
 )
-CALL_IN_TWO = (
-    "import os\nread, write = os.pipe()\nchild = os.fork()\nimport caller\ncaller.outer(3)\n"
-    "misses = sum(caller.outer.stats.cache_misses.values())\nif child == 0:\n"
-    "    os.write(write, bytes([misses]))\n    os._exit(0)\n"
-    "os.wait()\nprint(misses + os.read(read, 1)[0])"
-)
 CALL = (
     "import bystander, caller\nprint(caller.outer(3))\n"
     "print(sum(caller.outer.stats.cache_hits.values()))\nprint(caller.outer.stats.cache_path)"
@@ -149,10 +143,6 @@ def test_every_edit_that_changes_the_result_is_seen_and_the_kernel_before_it_sta
         assert call(project)[:2] == (value, False), name
     edit(project / "caller.py", "return 1 + FACTOR", "return FACTOR")
     assert call(project)[:2] == (67500, True)
-
-
-def test_of_two_processes_that_want_a_kernel_one_compiles_it(project, run):
-    assert run(CALL_IN_TWO, project) == ["1"]
 
 
 def test_an_edit_of_a_file_that_the_kernel_does_not_import_costs_nothing(project, call):
