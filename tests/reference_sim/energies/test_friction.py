@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-
 import numpy as np
 import pytest
 
 from benchmarks.metrics.energies.energy import energy_series
 from benchmarks.metrics.energies.energy_gap import optimality
 from benchmarks.metrics.energies.replayed_step import copied_terms, freeze_step
-from benchmarks.metrics.motion.conservation import law_series
-from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene
-from benchmarks.scenes import find_scene
 from reference_sim import Cloth, Material, Obstacle, Potential, Trajectory, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, Gravity, Step, StretchStVK
 from tests.reference_sim.meshes import box
@@ -47,14 +41,6 @@ def on_a_belt() -> BuiltScene:
     )
 
 
-def on_a_sphere() -> BuiltScene:
-    preset = dataclasses.replace(find_preset("smoke"), sheet_cells=8, sheet_frames=FRAMES)
-    scene = find_scene("sheet_on_sphere").at(preset).build()
-    contact = scene.energies[-1]
-    assert isinstance(contact, ContactPenalty)
-    return dataclasses.replace(scene, energies=(*scene.energies, ContactFriction(contact)))
-
-
 def simulated(scene: BuiltScene) -> Trajectory:
     trajectory = simulate(
         scene.cloth,
@@ -69,18 +55,10 @@ def simulated(scene: BuiltScene) -> Trajectory:
     return trajectory
 
 
-SCENES = {"belt": on_a_belt, "sphere": on_a_sphere}
-
-
-@functools.cache
-def scene_and_simulation(kind: str) -> tuple[BuiltScene, Trajectory]:
-    scene = SCENES[kind]()
+@pytest.fixture(scope="module")
+def judged() -> tuple[BuiltScene, Trajectory]:
+    scene = on_a_belt()
     return scene, simulated(scene)
-
-
-@pytest.fixture(scope="module", params=SCENES)
-def judged(request) -> tuple[BuiltScene, Trajectory]:
-    return scene_and_simulation(request.param)
 
 
 def another(x: np.ndarray) -> np.ndarray:
@@ -97,26 +75,9 @@ def test_the_simulation_ends_each_step_in_its_minimum_also_where_frames_are_jump
     assert max(optimum.values["gap/local"]) <= 1e-12
 
 
-def test_laws_hold_for_the_simulation_beside_another(judged):
-    scene, trajectory = judged
-    x = trajectory.positions
-    _, series, _ = law_series(scene, [another(x), x, another(x)])
-    assert series.residual.max() <= 1e-6 and series.force.max() <= 2e-6 * series.weight
-
-
-def test_energies_beside_others_are_those_of_the_trajectory_alone(judged):
-    scene, trajectory = judged
-    x = trajectory.positions
-    (alone,) = energy_series(scene, [x])
-    _, beside, _ = energy_series(scene, [another(x), x, another(x)[:5]])
-    assert {name: list(series) for name, series in beside.items()} == {
-        name: list(series) for name, series in alone.items()
-    }
-
-
-def test_energies_on_a_plane_are_those_that_were_minimised():
+def test_energies_on_a_plane_are_those_that_were_minimised(judged):
     """A plane is the same wherever it was searched."""
-    scene, trajectory = scene_and_simulation("belt")
+    scene, trajectory = judged
     x = trajectory.positions
     _, series = energy_series(scene, [another(x), x])
     for term in set(scene.terms) - {"inertia"}:
@@ -136,17 +97,6 @@ def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
     at = np.ascontiguousarray(x[frame])
     assert jump.terms(at) == row.terms(at) and jump.terms(at)["friction"] > 0
     assert not np.shares_memory(jump.gradient(at), row.gradient(at))
-
-
-def test_own_terms_know_each_other_and_nothing_of_the_scenes():
-    scene = on_a_belt()
-    first, second = copied_terms(scene), copied_terms(scene)
-    assert [term.name for term in first] == list(scene.terms)
-    everyone = [*scene.energies, *first, *second]
-    assert len(set(map(id, everyone))) == len(everyone)
-    for terms in (scene.energies, first, second):
-        assert terms[3].contact is terms[2]
-    assert first[0].stencils is scene.energies[0].stencils  # nothing heavy is copied
 
 
 def test_friction_without_the_step_before_is_refused():
