@@ -3,7 +3,7 @@ from .cloth import MeshError as MeshError
 from .material import GRAVITY as GRAVITY
 from .material import Material as Material
 from .minimise.minimisers import minimise as minimise
-from .minimise.result import Result as Result
+from .minimise.descent import Result as Result
 from .obstacle import Obstacle as Obstacle
 from .potential import Potential as Potential
 from .time_loop import simulate as simulate
