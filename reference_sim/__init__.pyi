@@ -2,8 +2,8 @@ from .cloth import Cloth as Cloth
 from .cloth import MeshError as MeshError
 from .material import GRAVITY as GRAVITY
 from .material import Material as Material
-from .minimise.minimisers import minimise as minimise
 from .minimise.descent import Result as Result
+from .minimise.minimisers import minimise as minimise
 from .obstacle import Obstacle as Obstacle
 from .potential import Potential as Potential
 from .time_loop import simulate as simulate

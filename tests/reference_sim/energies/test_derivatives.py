@@ -246,7 +246,7 @@ def test_each_kind_of_contact_sample_carries_the_whole_area():
 
 def test_every_term_has_its_line_above():
     tested = {type(case()[0]).__name__ for case in CASES}
-    # Terms that are dynamic have no definition in torch; test_barrier.py holds theirs.
+    # Terms that are dynamic have no definition in torch; test_self_contact.py holds theirs.
     terms = {
         name
         for name in energies.__all__

@@ -1,11 +1,60 @@
-"""Normals of a mesh: those of a few faces' corners are those of the whole mesh."""
+"""Surfaces: winding numbers against libigl's sums of solid angles, normals of a few faces' corners."""
 
 from __future__ import annotations
 
+import igl
 import numpy as np
+import pytest
 
-from reference_sim.geometry.surface import faces_around, normals_of_corners, vertex_normals
+from reference_sim.geometry.surface import (
+    faces_around,
+    normals_of_corners,
+    vertex_normals,
+    winding_numbers,
+)
+from snug import Body
 from tests.reference_sim.meshes import sphere
+
+CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+SQUARES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+CUBE_FACES = np.array([corners for a, b, c, d in SQUARES for corners in ((a, b, c), (a, c, d))])
+
+
+def by_solid_angles(vertices, faces, points):
+    angles = igl.winding_number(*map(np.asfortranarray, (vertices, faces, points)))
+    return np.asarray(angles).ravel().round().astype(int)
+
+
+def test_a_body_winds_as_its_solid_angles_say():
+    body, random = Body.load(), np.random.default_rng(0)
+    x = body.template
+    near = x[random.integers(len(x), size=300)] + random.normal(0.0, 0.01, (300, 3))
+    points = np.concatenate([near, random.uniform(x.min(axis=0) - 0.1, x.max(axis=0) + 0.1, (200, 3))])
+    windings = winding_numbers(x, body.faces, points)
+    assert 0 < (windings > 0).sum() < len(windings)
+    assert windings.tolist() == by_solid_angles(x, body.faces, points).tolist()
+
+
+@pytest.mark.parametrize("longest", [0, 1, 2])
+def test_rays_through_sides_and_corners_count_once(longest):
+    # An octahedron, whose corners and sides lie before one another along every axis.
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([
+        [i, 1 + j, 2 + k] if (i + j + k) % 2 == 0 else [i, 2 + k, 1 + j]
+        for i in (0, 3) for j in (0, 3) for k in (0, 3)
+    ])  # fmt: skip
+    grid = np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, 9)], indexing="ij"), axis=-1).reshape(-1, 3)
+    grid = grid[np.abs(grid).sum(axis=1) != 1.0]  # a point on the surface is on neither side
+    scale = np.where(np.arange(3) == longest, 1.0, 0.5)
+    inside = np.abs(grid).sum(axis=1) < 1.0
+    assert winding_numbers(corners * scale, faces, grid * scale).tolist() == inside.astype(int).tolist()
+
+
+def test_two_parts_at_once_wind_twice_and_inside_out_winds_backwards():
+    both, faces = np.concatenate([CUBE, CUBE + 0.5]), np.concatenate([CUBE_FACES, CUBE_FACES + 8])
+    points = np.array([[0.75, 0.75, 0.75], [0.25, 0.25, 0.25], [1.25, 1.25, 1.25], [0.25, 1.25, 0.5]])
+    assert winding_numbers(both, faces, points).tolist() == [2, 1, 1, 0]
+    assert winding_numbers(both, faces[:, ::-1], points).tolist() == [-2, -1, -1, 0]
 
 
 def test_normals_of_some_corners_are_those_of_the_whole_mesh_to_the_bit() -> None:

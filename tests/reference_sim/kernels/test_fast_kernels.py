@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -27,8 +26,6 @@ from reference_sim.kernels.fast_kernels import (
 )
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from reference_sim.minimise.lbfgs import LBFGS
-from snug.recipes.recipe import Recipe
-from snug.training.losses.physics_loss import PhysicsLoss
 from tests.reference_sim.meshes import patch
 
 TERMS = {name: getattr(energies, name) for name in energies.__all__ if name not in ("Energy", "Step")}
@@ -88,17 +85,6 @@ def test_a_slow_minimisation_is_announced_once(cloth, told_anew):
         warnings.simplefilter("error")
         LBFGS(slow)
         LBFGS(Potential([StretchStVK(cloth), AreaBarrier(cloth)]))  # at rest there is no fast way
-
-
-def test_a_slow_training_is_announced_once(cloth, told_anew):
-    springs = Recipe(material="springs")
-    with pytest.warns(SlowPathWarning, match="^training: no batch kernel of StretchSpring: "):
-        PhysicsLoss(cloth, springs, dt=0.1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        PhysicsLoss(cloth, springs, dt=0.1)
-        PhysicsLoss(cloth, Recipe(), dt=0.1)
-        PhysicsLoss(cloth, replace(springs, terms=("bending", "area_barrier")), dt=0.1, kernels=False)
 
 
 @pytest.mark.parametrize("made", [StretchStVK, BendHinge])

@@ -145,12 +145,6 @@ def test_every_edit_that_changes_the_result_is_seen_and_the_kernel_before_it_sta
     assert call(project)[:2] == (67500, True)
 
 
-def test_an_edit_of_a_file_that_the_kernel_does_not_import_costs_nothing(project, call):
-    before = call(project)
-    edit(project / "bystander.py", "return x", "return 2 * x")
-    assert call(project) == (640, True, before[2])
-
-
 def test_an_edit_of_a_kernel_that_is_an_argument_is_seen(project, run):
     assert run(CALL_GIVEN, project) == ["50.0 0.0", "0"]
     assert run(CALL_GIVEN, project) == ["50.0 0.0", "2"]

@@ -118,21 +118,6 @@ def test_the_residual_of_a_minimum_is_that_of_automatic_differentiation():
     assert not run.factorise(run.assemble(0.0), -1e3)  # not positive definite
 
 
-def test_each_step_starts_from_the_last_ones_offsets():
-    first, second = placed(), Placement(placed().turns, SHEET + np.array([0.0, 0.0, 0.01]))
-    solver = SubspaceNewton(
-        potential(),
-        basis=basis(4),
-        placements=[first, second],
-        offsets=np.zeros((COUNT, 3)),
-        max_iterations=0,
-    )
-    before = solver.minimise(SHEET).positions
-    after = solver.minimise(SHEET).positions
-    free = potential().cloth.free
-    assert np.allclose((after - before)[free], [0.0, 0.0, 0.01], atol=1e-12)
-
-
 def test_a_run_that_starts_again_gives_the_bits_of_the_first():
     steps = [placed(), Placement(placed().turns, SHEET + np.array([0.0, 0.0, 0.01]))]
     solver = SubspaceNewton(potential(), basis=basis(4), placements=steps, offsets=np.zeros((COUNT, 3)))
