@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -93,9 +93,8 @@ def second_loop(
             p[i] += share * s[i]
 
 
-STATUSES = ("converged", "stalled", "max_iterations", "diverged", "timeout")
+STATUSES = {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}  # how bad
 TOLERANCE = 1e-6  # of the relative residual, by default
-_SEVERITY = {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,7 @@ class Result:
 
 def severity(status: str) -> int:
     """Return how bad the status of a minimisation is: 0 is good."""
-    return _SEVERITY[status]
+    return STATUSES[status]
 
 
 def check_tolerance(tolerance: float) -> None:
@@ -320,38 +319,18 @@ def approximate_wolfe(before: float, after: float, slope: float, end_slope: floa
     return flat and float(end_slope) <= (2 * SUFFICIENT_DECREASE - 1) * slope
 
 
-RunState = TypeVar("RunState", bound=Descent, contravariant=True)
-
-
 NOT_FINITE = Stop("diverged", "energy or gradient is not finite at the starting point")
 
 
-class Solver(Protocol[RunState]):
-    """One way to minimise a potential; what a minimisation changes is in its `run`.
+def iterate(solver: Any, run: Descent) -> Stop:
+    """Minimise from where `run` is; return why that ended.
 
-    Attributes:
-        max_iterations: iterations before the loop gives up.
-        timeout: seconds before it does, counted from the start of `run`.
+    Args:
+        solver: with limits max_iterations and timeout [s], and three functions of the run that return a Stop
+            to end: init prepares the first step, terminate asks whether the point reached is an answer or no
+            step can lead on from it, step takes one.
+        run: what the minimisation changes.
     """
-
-    max_iterations: int
-    timeout: float
-
-    def init(self, run: RunState) -> Stop | None:
-        """Prepare the first step; return a Stop if there cannot be one."""
-        ...
-
-    def terminate(self, run: RunState) -> Stop | None:
-        """Return a Stop if the point reached is an answer, or no step can lead on from it."""
-        ...
-
-    def step(self, run: RunState) -> Stop | None:
-        """Take one step; return a Stop if there is none."""
-        ...
-
-
-def iterate(solver: Solver[RunState], run: RunState) -> Stop:  # type: ignore[misc]
-    """Minimise from where `run` is; return why that ended. Limits give "max_iterations" and "timeout"."""
     if stop := solver.init(run):
         return stop
     run.show()

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,15 +26,6 @@ class Minimiser(Protocol):
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
-        ...
-
-
-@runtime_checkable
-class Restartable(Minimiser, Protocol):
-    """Minimiser that can serve run after run: after `start_again` it gives the bits of a new one."""
-
-    def start_again(self) -> None:
-        """Forget what earlier minimisations have taught."""
         ...
 
 
@@ -150,9 +141,9 @@ class StepMinimiser:
         A minimiser without `start_again` is made anew.
         """
         self.__dict__.pop("_rough_minimiser", None)
-        if isinstance(self._opening, Restartable):
+        if hasattr(self._opening, "start_again"):
             self._opening.start_again()
-        if isinstance(self._minimiser, Restartable):
+        if hasattr(self._minimiser, "start_again"):
             self._minimiser.start_again()
         else:
             self._minimiser = make_minimiser(self.potential, **self._ending)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from reference_sim import Cloth, Potential, energies
+from reference_sim import Cloth, Potential
 from reference_sim.energies import (
     AreaBarrier,
     BendHinge,
@@ -27,8 +27,6 @@ from reference_sim.kernels.fast_kernels import (
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from reference_sim.minimise.lbfgs import LBFGS
 from tests.reference_sim.meshes import patch
-
-TERMS = {name: getattr(energies, name) for name in energies.__all__ if name not in ("Energy", "Step")}
 
 
 class Softer(StretchStVK):
