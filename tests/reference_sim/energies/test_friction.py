@@ -99,6 +99,17 @@ def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
     assert not np.shares_memory(jump.gradient(at), row.gradient(at))
 
 
+def test_own_terms_know_each_other_and_nothing_of_the_scenes():
+    scene = on_a_belt()
+    first, second = copied_terms(scene), copied_terms(scene)
+    assert [term.name for term in first] == list(scene.terms)
+    everyone = [*scene.energies, *first, *second]
+    assert len(set(map(id, everyone))) == len(everyone)
+    for terms in (scene.energies, first, second):
+        assert terms[3].contact is terms[2]
+    assert first[0].stencils is scene.energies[0].stencils  # nothing heavy is copied
+
+
 def test_friction_without_the_step_before_is_refused():
     """A step may be prepared alone, since that after it needs no more; it has no energy."""
     scene = on_a_belt()
