@@ -8,12 +8,14 @@ from .metric import RollOut as RollOut
 from .scene import BuiltScene as BuiltScene
 from .scene import Scene as Scene
 from .training import Training as Training
+from .validation.case import Measurement as Measurement
 from .validation.case import known_answer as known_answer
 
 __all__ = [
     "BuiltScene",
     "DeclarationError",
     "Estimate",
+    "Measurement",
     "Method",
     "MethodEntry",
     "Metric",

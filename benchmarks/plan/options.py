@@ -209,7 +209,7 @@ def _parts_of(method: str, study: Study) -> str:
 
 
 def _cases(suite: str) -> list[tuple[str, str]]:
-    """Return the cases of a suite; those of an engine, which share a scene, in one line."""
+    """Return the cases of a suite; those that share a scene in one line."""
     by_scene: dict[str, list[str]] = {}
     for case in (case for case in CASES if case.suite == suite):
         by_scene.setdefault(f"{case.scene}/*" if case.scene else case.name, []).append(case.description)

@@ -42,13 +42,13 @@ RUNS = (
     SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
     "benchmarks/runner/isolated_process.py", "benchmarks/runner/cells.py",
 )  # fmt: skip
-SOLVERS = ("benchmarks/methods/solvers", "benchmarks/engines")
+SOLVERS = "benchmarks/methods/solvers"
 METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "snug")
 CASES = (
     "benchmarks/runner/cells.py",
     "benchmarks/validation",
     "benchmarks/assets",
-    *SOLVERS,
+    SOLVERS,
     *METRICS,
     *RUNS,
 )
@@ -135,7 +135,7 @@ def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
         folder = Path(file).parent
         code = (file if folder.name == "benchmarks" else folder.as_posix(),)
     if isinstance(entry, MethodEntry):
-        code = (*code, *SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
+        code = (*code, SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
     return code
 
 

@@ -7,7 +7,7 @@
 | known_surfaces | the curvature metric |
 | derivatives, minimisers | derivatives of all terms but friction and IPC's barrier; the minimisers |
 | extreme_steps | single steps that converge truly or fail and say so |
-| fabric, engines | textile tests of suite fabric; laws that any engine owes, of suite engines |
+| fabric | textile tests of suite fabric |
 
 >>> from benchmarks.validation import CASES
 >>> next(case for case in CASES if case.name == "membrane_pull").run().status

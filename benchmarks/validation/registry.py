@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from benchmarks.validation.case import Case, cases_of
-from benchmarks.validation.engines.cases import CASES as ENGINE_CASES
 from benchmarks.validation.fabric.cases import TEXTILE_TESTS
 
 MODULES = (
@@ -20,4 +19,4 @@ MODULES = (
 
 KNOWN_ANSWERS: tuple[Case, ...] = sum((cases_of(f"benchmarks.validation.{name}") for name in MODULES), ())
 STRESS_TESTS: tuple[Case, ...] = cases_of("benchmarks.validation.extreme_steps")
-CASES: tuple[Case, ...] = (*KNOWN_ANSWERS, *STRESS_TESTS, *TEXTILE_TESTS, *ENGINE_CASES)
+CASES: tuple[Case, ...] = (*KNOWN_ANSWERS, *STRESS_TESTS, *TEXTILE_TESTS)

@@ -11,7 +11,6 @@ from pathlib import Path
 from reports.run.finished_run import Run
 from reports.tables.ablations import ablation_effects, ablations
 from reports.tables.body_shapes import shapes
-from reports.tables.engines.audit import engine_audit, engine_laws
 from reports.tables.fabric.textile_tests import (
     fabric_bands,
     fabric_drape,
@@ -46,8 +45,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     fabric_order,
     fabric_drape,
     fabric_bands,
-    engine_audit,
-    engine_laws,
     validation,
     extremes,
     endings,

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("studies/*/*.md")])
 EXTEND, EXAMPLES = ROOT / "docs" / "extend.md", ROOT / "docs" / "examples"
 FILE = re.compile(r"File `([^`]+)`:$")
 # As written they are run by -m slow; in one run by TOGETHER.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
@@ -152,6 +153,34 @@ def test_a_planted_import_is_found(path, source):
 )
 def test_an_allowed_import_passes(path, source):
     assert not complaints(path, source)
+
+
+STUDIES = sorted((ROOT / "studies").glob("*/*.py"))
+# What a study may import of ours, as docs/extend.md promises: these, and names of the faces.
+DOOR = ("benchmarks.meshes", "reference_sim.energies", "reference_sim.time_step")
+
+
+def test_studies_enter_by_the_public_door():
+    faces = {
+        f"{layer}.{name}"
+        for layer in LAYERS
+        for name in re.findall(r" as (\w+)$", (ROOT / layer / "__init__.pyi").read_text(), re.M)
+    }
+    wrong = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in STUDIES
+        if not path.name.startswith("test_")
+        for _, name in imports(ast.parse(path.read_text(encoding="utf-8")), "")
+        if name.split(".")[0] in LAYERS and name not in faces and not within(name, DOOR)
+    ]
+    assert STUDIES and not wrong, "\n".join(wrong)
+
+
+def test_no_layer_imports_a_study():
+    studies = {"studies", *(path.stem for path in STUDIES)}
+    for source in (path for layer in LAYERS for path in files_of(layer)):
+        for line, name in imports(ast.parse(source.read_text(encoding="utf-8")), ""):
+            assert name.split(".")[0] not in studies, f"{source}:{line}"
 
 
 def demand_no_circle(sources: Mapping[str, str]) -> None:

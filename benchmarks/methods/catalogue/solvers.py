@@ -183,20 +183,6 @@ SOLVERS = (
         "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
         (10, 40, 160), module="benchmarks.methods.minimisers.xpbd",
     ),
-    *(
-        MethodEntry(
-            name=f"newton-{solver.lower()}",
-            label=f"newton's {solver}",
-            description=f"newton's {solver} on its own energies, {iterations} x {substeps} a frame",
-            module="benchmarks.methods.solvers.newton_physics",
-            options={"solver": solver, "iterations": iterations, "substeps": substeps},
-            dtype="float32",
-            needs_no_obstacle=True,
-            package="newton",
-            role="external",
-        )
-        for solver, iterations, substeps in (("VBD", 10, 20), ("XPBD", 1, 128))
-    ),
     *warm_started("skinning", "Skinning", "lbfgs"),
     *warm_started("skinning", "Skinning", "newton"),
     *warm_started("snug", "SNUG", "lbfgs"),
