@@ -14,9 +14,9 @@ import torch
 from torch import Tensor, nn
 
 import snug
-from snug.body import skin
-from snug.garments import find_template
-from snug.motion import make_motion
+from snug.body.skinning import skin
+from snug.garments.templates import find_template
+from snug.motion.library import make_motion
 
 
 class Frame(nn.Module):

@@ -8,8 +8,9 @@ from reference_sim import Obstacle, Potential
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Step, StretchStVK
 from snug import Body, DressedBody
 from snug.body.skinning import skin
-from snug.garments import find_template
-from snug.motion import Motion, make_motion
+from snug.garments.templates import find_template
+from snug.motion.library import make_motion
+from snug.motion.motion import Motion
 
 FRAMES = 8  # of an update
 

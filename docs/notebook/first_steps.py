@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from snug.body.parametric_body import Body
-from snug.garments import find_template
+from snug.garments.templates import find_template
 from snug.motion.library import TRAIN, make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipes.named import PAPER

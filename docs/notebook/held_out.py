@@ -15,7 +15,7 @@ import gc
 
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from snug.body.parametric_body import Body
-from snug.garments import find_template
+from snug.garments.templates import find_template
 from snug.motion.library import TRAIN, VALIDATION, make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.training.optimisation_step import Trainer

@@ -234,7 +234,7 @@ def test_no_two_rooms_import_each_other(layer):
 def test_a_planted_circle_of_rooms_is_found():
     sources = {
         "snug.body": "",
-        "snug.body.skin": "def f():\n    from snug.motion.clip import g",
+        "snug.body.skinning.skin": "def f():\n    from snug.motion.clip import g",
         "snug.motion": "",
         "snug.motion.clip": "from snug.body.bones import h",
     }

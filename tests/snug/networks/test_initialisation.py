@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from snug.garments import find_template
+from snug.garments.templates import find_template
 from snug.networks.architectures import ARCHITECTURES, make_network
 from snug.networks.dressed_body import DressedBody
 from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES

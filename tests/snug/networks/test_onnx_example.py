@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snug.garments import find_template
-from snug.motion import make_motion
+from snug.garments.templates import find_template
+from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
