@@ -235,7 +235,7 @@ def skinned(group: SceneRollOuts) -> np.ndarray | None:
     if group.scene.dressed is None:
         return None
     from snug.networks.dressed_body import DressedBody  # loads torch
-    from snug.recipes.recipe import DEFAULT
+    from snug.recipe import DEFAULT
 
     dressed, kept = group.scene.dressed, group.scene.kept
     motion = dressed.motion

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from snug.recipes.recipe import Recipe
+    from snug.recipe import Recipe
 
 
 @dataclass(frozen=True)
@@ -19,9 +19,9 @@ class Simulated:
 
     Attributes:
         mixed: frames of augmented clips for each original frame, up to 20,000. The clips are the same for
-            every training and seed, see snug.training.augmentation.mixed_clips.make_shared_clips.
+            every training and seed, see snug.training.augmentation.make_shared_clips.
         method: name of the method that simulates.
-        swinging: whether the clips turn to and fro and stop, see snug.training.augmentation.swinging_clips.
+        swinging: whether the clips turn to and fro and stop, see snug.training.augmentation.
     """
 
     mixed: int = 0

@@ -16,7 +16,7 @@ A small top of the chest's own skin, a static network trained for two steps, and
 
 >>> import numpy as np
 >>> import snug
->>> from snug.recipes.recipe import Recipe
+>>> from snug.recipe import Recipe
 >>> body = snug.Body.load()
 >>> chest = body.skinning_weights[:, 9] > 0.9
 >>> vertices, faces = np.unique(body.faces[chest[body.faces].all(axis=1)], return_inverse=True)

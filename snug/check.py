@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reference_sim.command_line import Parser, command
-from snug.garments.options import GarmentFile, add_garment_options, make_garment_file
+from snug.file_options import GarmentFile, add_garment_options, make_garment_file
 
 if TYPE_CHECKING:
     from snug.garments.fit import DressForm

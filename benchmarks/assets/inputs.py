@@ -15,10 +15,9 @@ from benchmarks.provenance import digest
 
 if TYPE_CHECKING:
     from snug.body.parametric_body import Body
+    from snug.file_options import GarmentFile, MotionFileOptions
     from snug.garments.garment import Garment
-    from snug.garments.options import GarmentFile
     from snug.motion.motion import Motion
-    from snug.motion.options import MotionFileOptions
 
 LIBRARY = "library"  # in place of a path: the embedded motions
 FEWEST_FRAMES = 3  # of a motion: inertia needs two before the one that is evaluated
@@ -122,8 +121,8 @@ def _read_motions(paths: Sequence[str], options: MotionFileOptions | None) -> di
     if not files:
         return motions
     from snug.motion.files import load_motions  # its readers are slow to load
+    from snug.motion.library import CLIPS
     from snug.motion.library import LIBRARY as MADE
-    from snug.motion.recorded.table import CLIPS
 
     for path in files:
         for motion in load_motions(path, options=options):

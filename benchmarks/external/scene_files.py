@@ -104,7 +104,7 @@ def write_motion(part: Path, worn: Dressed) -> FileList:
     """Write the poses in two layouts and the skinning of the garment; return what was written."""
     body, motion, garment = worn.body, worn.motion, worn.garment
     from snug.networks.dressed_body import DressedBody
-    from snug.recipes.recipe import DEFAULT
+    from snug.recipe import DEFAULT
 
     joints = body.joints(worn.betas)
     betas = np.zeros(body.shape_count) if worn.betas is None else np.asarray(worn.betas)

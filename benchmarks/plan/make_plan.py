@@ -24,7 +24,7 @@ from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
-from snug.garments.options import GarmentFile, demand_usable_name
+from snug.file_options import GarmentFile, demand_usable_name
 
 if TYPE_CHECKING:
     from benchmarks.fabrics.fabric import Fabric

@@ -79,8 +79,15 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     Raises:
         StudyError: a name that no motion has, or a split without motions.
     """
-    from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION
-    from snug.motion.recorded.table import clip_of
+    from snug.motion.library import (
+        DYNAMIC_TEST,
+        DYNAMIC_VALIDATION,
+        LIBRARY,
+        TEST,
+        TRAIN,
+        VALIDATION,
+        clip_of,
+    )
 
     test_names, validation_names = study.test_motions, study.validation_motions
     with_library = "library" in study.motions or not files

@@ -163,8 +163,7 @@ def list_names(study: Study) -> str:
     Every scene and method can be named in every study. Those that take part without being named are those of
     the given study.
     """
-    from snug.motion.library import CONTROL, DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
-    from snug.motion.recorded.table import CLIPS
+    from snug.motion.library import CLIPS, CONTROL, DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
 
     swinging = dict.fromkeys(DYNAMIC_TEST, "test") | dict.fromkeys(DYNAMIC_VALIDATION, "validation")
     roles = dict.fromkeys(TEST, "test") | dict.fromkeys(VALIDATION, "validation") | swinging

@@ -17,8 +17,7 @@ from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
 from benchmarks.assets.inputs import FEWEST_FRAMES, LIBRARY
 from benchmarks.external.roll_out_option import RollOutOption, roll_out_of
 from benchmarks.presets import PRESETS, Preset, find_preset
-from snug.garments.options import GarmentFile
-from snug.motion.options import MotionFileOptions
+from snug.file_options import GarmentFile, MotionFileOptions
 from snug.trained import FOLDER
 
 PARTS = ("garments", "speed", "validation", "extremes", "shapes")  # that reports know

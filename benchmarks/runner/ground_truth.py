@@ -156,7 +156,7 @@ class SimulateClips(Task):
         """Simulate the clips and write the vertices of those that are whole and converged."""
         import numpy as np
 
-        from snug.training.augmentation.mixed_clips import make_shared_clips
+        from snug.training.augmentation import make_shared_clips
 
         assets, run, garment = context.assets, context.folder, self.scene.garment
         assert assets is not None

@@ -179,7 +179,7 @@ class TrainNetwork(Task):
     ) -> tuple[list[Motion], dict[str, np.ndarray]]:
         """Return the augmented clips that were simulated, and their vertices (T,V,3) [m] by name."""
         from reference_sim.files.array_file import read_arrays
-        from snug.training.augmentation.mixed_clips import make_shared_clips
+        from snug.training.augmentation import make_shared_clips
 
         vertices_of: dict[str, np.ndarray] = {}
         for id in self.clips:

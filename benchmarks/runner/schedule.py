@@ -28,14 +28,14 @@ from benchmarks.runner.task import Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
 from benchmarks.training import Simulated
-from snug.motion.recorded.table import CLIPS
+from snug.motion.library import CLIPS
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
 SIMULATOR = "reference_sim"
 DRESSING = ("snug/data", "snug/body", "snug/motion", "snug/garments", "benchmarks/assets")
-MIXING = ("snug/training/augmentation", "snug/recipes")  # that are mixed from motions, to be simulated
+MIXING = ("snug/training/augmentation.py", "snug/recipe.py", "snug/named_recipes.py")  # that are mixed from motions, to be simulated
 NETWORKS = ("snug", "benchmarks/assets")
 SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py", "benchmarks/fabrics")
 RUNS = (

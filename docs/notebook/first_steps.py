@@ -17,8 +17,8 @@ import numpy as np
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
 from snug.motion.library import TRAIN, make_motion
+from snug.named_recipes import PAPER
 from snug.networks.dressed_body import DressedBody
-from snug.recipes.named import PAPER
 from snug.training.optimisation_step import Trainer
 
 SHOWN = (1, 20, 100, 280, 300, 1000, 2000, 3000, 4000, 5000, 5300)

@@ -37,7 +37,7 @@ from benchmarks.methods.catalogue.networks import network
 from benchmarks.presets import find_preset
 from benchmarks.runner import networks as training
 from benchmarks.training import Training
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 
 find_preset("smoke").steps["snug"] = {steps}
 training.CHECKPOINT_MINUTES = {interval} / 60.0

@@ -20,9 +20,9 @@ from benchmarks import MethodEntry
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.scene import BuiltScene
 from reference_sim.energies import ContactPenalty
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import DEFAULT
-from snug.training.losses.physics_loss import make_contact
+from snug.named_recipes import PAPER
+from snug.recipe import DEFAULT
+from snug.training.physics_loss import make_contact
 
 KEPT = "recipe's contact"
 REPLACED = {

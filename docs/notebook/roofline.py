@@ -18,8 +18,8 @@ from benchmarks.assets.assets import embedded_motions
 from benchmarks.performance.microbenchmarks import dressed_body
 from benchmarks.timing import one_thread
 from snug.motion.library import TRAIN
+from snug.named_recipes import RECIPE_OF_KIND
 from snug.networks.roll_out import prepare_frames
-from snug.recipes.named import RECIPE_OF_KIND
 from snug.training.train_network import untrained_model
 
 KINDS = ("snug", "pbns", "handles-20", "handles-40", "handles-80", "ncs", "ncs-static", "tailornet")

@@ -9,3 +9,17 @@ from .gravity import Gravity as Gravity
 from .inertia import Inertia as Inertia
 from .stretch_spring import StretchSpring as StretchSpring
 from .stretch_stvk import StretchStVK as StretchStVK
+
+__all__ = [
+    "AreaBarrier",
+    "BendHinge",
+    "ContactBarrier",
+    "ContactFriction",
+    "ContactPenalty",
+    "Energy",
+    "Gravity",
+    "Inertia",
+    "Step",
+    "StretchSpring",
+    "StretchStVK",
+]

@@ -141,7 +141,7 @@ class StepMinimiser:
         A minimiser without `start_again` is made anew.
         """
         self.__dict__.pop("_rough_minimiser", None)
-        if hasattr(self._opening, "start_again"):
+        if self._opening is not None and hasattr(self._opening, "start_again"):
             self._opening.start_again()
         if hasattr(self._minimiser, "start_again"):
             self._minimiser.start_again()

@@ -12,7 +12,7 @@ from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
-from snug.recipes.named import RECIPES
+from snug.named_recipes import RECIPES
 
 Rows = list[tuple[str, ...]]
 ALL = 10_000  # frames or more: whole motions
@@ -115,7 +115,7 @@ def recipe_rows(names: str) -> Rows:
     if unknown := [name for name in chosen if name not in RECIPES]:
         raise ValueError(f"no recipe '{unknown[0]}'; choose from {', '.join(RECIPES)}")
     rows: Rows = []
-    for option, meaning in attribute_rows("snug.recipes.recipe.Recipe")[2:]:
+    for option, meaning in attribute_rows("snug.recipe.Recipe")[2:]:
         values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
         if len(set(values)) > 1:
             rows.append((option, *(_setting(value) for value in values), meaning.partition(". ")[0]))

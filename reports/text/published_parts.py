@@ -30,7 +30,7 @@ from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstrin
 from reports.text.front_sentences import front_sentences
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
-from snug.motion.composition import clip_rows, distance_rows, source_rows
+from snug.motion.library import clip_rows, distance_rows, source_rows
 
 FORMS = (
     "front of RUN; table NAME of RUN; COLUMN, ...; METHOD, ...; claims primary of RUN, ...; claims "

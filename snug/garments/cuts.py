@@ -8,8 +8,13 @@ from numpy.typing import NDArray
 
 from reference_sim.geometry.topology import boundary_loops
 from snug.body.parametric_body import Body
-from snug.garments.implicit_surface import ImplicitSurface
-from snug.garments.landmarks import SHIRT_BONES, TORSO_BONES, joint_position, skin_following
+from snug.garments.implicit_surface import (
+    SHIRT_BONES,
+    TORSO_BONES,
+    ImplicitSurface,
+    joint_position,
+    skin_following,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

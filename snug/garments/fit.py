@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
-from snug.garments.landmarks import skin_following
+from snug.garments.implicit_surface import skin_following
 
 Array = NDArray[np.float64]
 

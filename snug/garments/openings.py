@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from reference_sim.geometry.topology import boundary_loops, edge_uses
 from snug.body.parametric_body import Body
-from snug.garments.landmarks import joint_position
+from snug.garments.implicit_surface import joint_position
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

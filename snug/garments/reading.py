@@ -18,11 +18,10 @@ from reference_sim.files.uv_chart import flattened, join_seams, rest_chart, stre
 from reference_sim.geometry.topology import corner_angles
 from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
+from snug.file_options import OPTION, GarmentFile
 from snug.garments.fit import DressForm, find_placement, pose_in_file
-from snug.garments.garment import Garment, GarmentError, smooth_weights
+from snug.garments.garment import Garment, GarmentError, find_weights, read_authored_weights, smooth_weights
 from snug.garments.openings import name_openings, open_seam, piece_of_faces
-from snug.garments.options import OPTION, GarmentFile
-from snug.garments.weights import find_weights, read_authored_weights
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

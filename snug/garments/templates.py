@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from snug.body.parametric_body import Body
-from snug.garments.assembly import assemble_garment
 from snug.garments.cuts import SEAM_CUT, CutPlane, armhole_cut, level_cut, neck_cut
 from snug.garments.garment import SKIRT_SMOOTHING, Garment, GarmentError
-from snug.garments.implicit_surface import legs_part
-from snug.garments.landmarks import SHIRT_BONES, joint_position
+from snug.garments.implicit_surface import SHIRT_BONES, joint_position, legs_part
+from snug.garments.meshing import assemble_garment
 
 TSHIRT = "tshirt"  # the garment that a command takes where none is named
 

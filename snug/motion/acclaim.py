@@ -16,8 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import LEG_LENGTH
+from snug.file_options import MotionFileOptions
 from snug.motion.motion import MotionError
-from snug.motion.options import MotionFileOptions
 from snug.motion.raw_motion import Line, RawMotion, check_frame_count, frame_rate, read_lines
 from snug.motion.retarget import FEET, HINGES, LIMBS, retarget
 

@@ -15,11 +15,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import LEG_LENGTH
-from snug.motion.joint_names import match_joints, way_up
+from snug.file_options import MotionFileOptions
 from snug.motion.motion import MotionError
-from snug.motion.options import MotionFileOptions
 from snug.motion.raw_motion import Line, RawMotion, check_frame_count, frame_rate, read_lines
-from snug.motion.retarget import FEET, LIMBS, retarget
+from snug.motion.retarget import FEET, LIMBS, match_joints, retarget, way_up
 
 MAX_ROTATIONS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second
 CHANNELS = {f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}

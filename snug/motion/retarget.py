@@ -4,23 +4,25 @@ Our joint j turns in the world by G_j = G_b A_j. Theirs turns by G_b from the ze
 resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t_j = G_b d_b. How a limb is
 twisted about itself follows from its hinge where the file has one. Else A_j is the smallest turn, and the
 zero pose must be a T or A pose.
+
+Joints of a foreign skeleton matched with ours: from a file, or guessed from common names.
+
+Limbs are found by name; pelvis, spine and neck by place: the pelvis is where the legs meet, the spine leads
+from there to where the arms meet, and the neck from there to the head.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 
-from snug.body.skeleton import (
-    JOINT,
-    JOINT_NAMES,
-    PARENTS,
-    REST_JOINTS,
-    axis_angles,
-    rotation_matrices,
-)
+from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, REST_JOINTS, axis_angles, rotation_matrices
 from snug.motion.motion import MotionError
 
 # Joints whose limb points to the next joint.
@@ -109,3 +111,149 @@ def _frame(along: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     second = hinge - first * (first @ hinge)
     second /= np.linalg.norm(second)
     return np.stack((first, second, np.cross(first, second)), axis=1)
+
+
+# Joints of a side, from the trunk outwards; those of NEEDED a skeleton must have.
+LIMB_CHAINS = (("hip", "knee", "ankle", "foot"), ("collar", "shoulder", "elbow", "wrist", "hand"))
+NEEDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+# What common skeletons call them: after joints (ours, Biovision), or after bones (Mixamo, CMU's clips as BVH,
+# Unity, Unreal, 3ds Max, Daz). Arms and legs are each named in the style that fits best.
+STYLES: tuple[dict[str, tuple[str, ...]], ...] = (
+    {joint: (joint,) for limb in LIMB_CHAINS for joint in limb}
+    | {"ankle": ("ankle", "foot"), "foot": ("toe", "toes", "foot"), "wrist": ("wrist", "hand")},
+    {
+        "hip": ("upleg", "upperleg", "thigh"), "knee": ("leg", "lowleg", "lowerleg", "shin", "calf"),
+        "ankle": ("foot",), "foot": ("toebase", "toe", "toes", "toe0", "ball"),
+        "collar": ("shoulder", "collar", "clavicle"), "shoulder": ("arm", "uparm", "upperarm", "shldr"),
+        "elbow": ("forearm", "lowarm", "lowerarm"), "wrist": ("hand",), "hand": (),
+    },
+)  # fmt: skip
+SIDES = ("left", "right")
+SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
+_BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+
+
+def match_joints(
+    path: Path, names: Sequence[str], parents: Sequence[int], given: Path | None
+) -> dict[str, int]:
+    """Return our joint names with the indices of their joints; optional ones that they lack are left out.
+
+    Args:
+        path: of the motion, for messages.
+        names: of their joints, empty for end sites.
+        parents: indices, -1 for the root, parents first.
+        given: a TOML file, our name = theirs, which goes before all guesses.
+
+    Raises:
+        MotionError: a needed joint is missing or hangs elsewhere; names the joint.
+    """
+    matches = _limbs(names) | _given(given, path, names)
+    for ours in (f"{side}_{joint}" for side in SIDES for joint in NEEDED):
+        if ours not in matches:
+            known = ", ".join(filter(None, names))
+            raise MotionError(
+                f"{path}: no joint is known as '{ours}'; name it by --joint-map (there are {known[:300]})"
+            )
+    matches = _trunk(path, names, parents, matches) | matches
+    above = {
+        f"{side}_{joint}": f"{side}_{before}"
+        for side in SIDES
+        for limb in LIMB_CHAINS
+        for before, joint in pairwise(limb)
+    }
+    for ours, theirs in matches.items():
+        upper = above.get(ours, "pelvis")
+        if upper in matches and ours != "pelvis" and matches[upper] not in way_up(parents, theirs)[1:]:
+            raise MotionError(
+                f"{path}: '{names[theirs]}' taken for {ours} does not hang below '{names[matches[upper]]}' "
+                f"taken for {upper}; name them by --joint-map"
+            )
+    return matches
+
+
+def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, int]:
+    """Return the joints that a file names, by ours."""
+    if file is None:
+        return {}
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        reason = " ".join(str(problem).split())[:200]
+        raise MotionError(f'{file}: not a TOML file ({reason}); write lines as left_hip = "LHip"') from None
+    for ours, theirs in table.items():
+        if ours not in JOINT_NAMES:
+            known = ", ".join(JOINT_NAMES)
+            raise MotionError(f"{file}: '{ours[:40]}' is none of our joints; they are {known}")
+        if not theirs or theirs not in names:
+            near = get_close_matches(str(theirs), filter(None, names), n=3)
+            hint = f"did you mean {' or '.join(near)}?" if near else "look into its hierarchy"
+            raise MotionError(f"{file}: {path.name} has no joint '{str(theirs)[:40]}' for {ours}; {hint}")
+    return {ours: names.index(theirs) for ours, theirs in table.items()}
+
+
+def _limbs(names: Sequence[str]) -> dict[str, int]:
+    """Return the joints of legs and arms, each in the style that names most of those needed."""
+    sided: dict[tuple[str, str], int] = {}
+    for index, name in enumerate(names):
+        sided.setdefault(_side(name), index)
+    matches: dict[str, int] = {}
+    for limb in LIMB_CHAINS:
+        guesses: list[dict[str, int]] = []
+        for style in STYLES:
+            guess: dict[str, int] = {}
+            for side, joint in product(SIDES, limb):
+                places = [sided[side, base] for base in style[joint] if (side, base) in sided]
+                if places and places[0] not in guess.values():  # none stands for two of ours
+                    guess[f"{side}_{joint}"] = places[0]
+            guesses.append(guess)
+        best = max(guesses, key=lambda guess: sum(ours.partition("_")[2] in NEEDED for ours in guess))
+        matches.update(best)
+    return matches
+
+
+def _side(name: str) -> tuple[str, str]:
+    """Split a name into side and the rest, in small letters.
+
+    Such as "mixamorig:LeftUpLeg", "lThigh", "thigh_l", "Bip01 L Thigh".
+    """
+    parts = [word.lower() for word in _BREAKS.split(name.rpartition(":")[2]) if word]
+    for place, rest in ((0, parts[1:]), (-1, parts[:-1]), (1, parts[2:])):
+        if rest and parts[place] in SIDE_WORDS:
+            return SIDE_WORDS[parts[place]], "".join(rest)
+    return "", "".join(parts)
+
+
+def _trunk(
+    path: Path, names: Sequence[str], parents: Sequence[int], matches: Mapping[str, int]
+) -> dict[str, int]:
+    """Match pelvis, spine, neck and head by their places; the spine may have one or any number of joints."""
+    pelvis = matches.get("pelvis", _meet(parents, matches["left_hip"], matches["right_hip"]))
+    chest = _meet(parents, matches["left_shoulder"], matches["right_shoulder"])
+    heads = [index for index, name in enumerate(names) if _side(name)[1].endswith("head")]
+    head = matches.get("head", heads[0] if heads else None)
+    if head is None:
+        raise MotionError(f"{path}: no joint is known as 'head'; name it by --joint-map")
+    trunk = {"pelvis": pelvis, "head": head}
+    spine = [joint for joint in reversed(way_up(parents, chest)) if pelvis in way_up(parents, joint)[1:]]
+    if spine:
+        trunk["spine1"] = spine[0]
+    if len(spine) > 1:
+        trunk["spine3"] = spine[-1]
+    if len(spine) > 2:
+        trunk["spine2"] = spine[len(spine) // 2]
+    neck = [joint for joint in way_up(parents, head)[1:] if chest in way_up(parents, joint)[1:]]
+    return trunk | ({"neck": neck[0]} if neck else {})
+
+
+def way_up(parents: Sequence[int], joint: int) -> list[int]:
+    """Return the joint and all above it, upwards."""
+    way = [joint]
+    while parents[way[-1]] >= 0:
+        way.append(parents[way[-1]])
+    return way
+
+
+def _meet(parents: Sequence[int], one: int, other: int) -> int:
+    """Return the lowest joint above both."""
+    above = set(way_up(parents, other))
+    return next(joint for joint in way_up(parents, one) if joint in above)

@@ -8,16 +8,14 @@ import torch
 from torch import Tensor, nn
 
 from snug.networks.fitted import NearestPoses, PoseRegression
-from snug.networks.garment_network import GarmentNetwork
-from snug.networks.handles.network import DynamicHandles80, Handles20, Handles40, Handles80
-from snug.networks.initialisation import initialise, seeded
-from snug.networks.motion_perceptron import MotionPerceptron
-from snug.networks.ncs.network import StaticBranch, TwoBranches
+from snug.networks.garment_network import GarmentNetwork, initialise, seeded
+from snug.networks.handles import DynamicHandles80, Handles20, Handles40, Handles80
+from snug.networks.ncs import StaticBranch, TwoBranches
 from snug.networks.pbns import PoseSpaceDeformation
-from snug.networks.regressor import Regressor
+from snug.networks.regressor import MotionPerceptron, Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
 from snug.networks.tailornet import FrequencyMixture
-from snug.recipes.recipe import Recipe
+from snug.recipe import Recipe
 
 ARCHITECTURES: dict[str, type[GarmentNetwork]] = {
     "snug": Regressor,
@@ -65,7 +63,7 @@ def make_network(
         ValueError: for an unknown kind.
 
     Example:
-        >>> from snug.recipes.recipe import DEFAULT
+        >>> from snug.recipe import DEFAULT
         >>> network = make_network("pbns", 141, 4, DEFAULT, seed=0)
         >>> offsets, state = network(torch.zeros(2, 3, 141))
         >>> tuple(offsets.shape), state

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 import torch
 from torch import Tensor, nn
 
-from snug.networks.garment_network import GarmentNetwork
-from snug.networks.initialisation import seeded
+from snug.networks.garment_network import GarmentNetwork, seeded
 from snug.networks.pbns import PoseSpaceDeformation
 
 if TYPE_CHECKING:

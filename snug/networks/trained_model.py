@@ -14,7 +14,7 @@ from torch import Tensor
 from snug.networks.architectures import make_network
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
-from snug.recipes.recipe import Recipe
+from snug.recipe import Recipe
 from snug.trained import trained_networks
 
 MODEL_FORMAT = "snug-model-9"
@@ -52,7 +52,7 @@ class TrainedModel:
             depends on, see benchmarks.runner.networks; empty where nobody noted it.
 
     Example:
-        >>> from snug.recipes.recipe import DEFAULT
+        >>> from snug.recipe import DEFAULT
         >>> model = TrainedModel("pbns", make_network("pbns", 141, 4, DEFAULT, seed=0), DEFAULT)
         >>> import tempfile
         >>> with tempfile.TemporaryDirectory() as folder:

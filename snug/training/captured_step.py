@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.training.contact.cache_torch import first_places
+from snug.training.contact_cache_torch import first_places
 from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from snug.networks.architectures import ARCHITECTURES, find_architecture
 from snug.networks.garment_network import GarmentNetwork
-from snug.training.losses.vertex_targets import BandTargets, VertexTargets
+from snug.training.vertex_targets import BandTargets, VertexTargets
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Kind:
         network: its architecture.
         targets: the form in which it learns simulated vertices; None if it learns from the energies.
         past: whether inertia is that of a simulation's previous frames, see
-            snug.training.losses.simulated_past.
+            snug.training.simulated_data.
         closed_form: whether it trains faster by snug.kernels.gru.
     """
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, cast
 
 import numpy as np
@@ -19,22 +20,64 @@ from snug.kernels.skinning import FastSkin
 from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
-from snug.networks.motion_perceptron import MotionPerceptron
+from snug.networks.regressor import MotionPerceptron
 from snug.networks.tensor_file import select_tensors
-from snug.recipes.recipe import Recipe
-from snug.training.augmentation.augmented_set import make_training_set, varies_shape
+from snug.recipe import Recipe
+from snug.training.augmentation import make_training_set, varies_shape
 from snug.training.captured_step import CapturedStep
-from snug.training.contact.planes import Posed, TrainingContact
+from snug.training.contact_planes import Posed, TrainingContact
 from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
-from snug.training.hidden_state_cache import HiddenStateCache
 from snug.training.kinds import find_kind
-from snug.training.losses.physics_loss import PhysicsLoss
-from snug.training.losses.simulated_past import SimulatedPast
-from snug.training.losses.vertex_targets import Targets, VertexTargets
+from snug.training.physics_loss import PhysicsLoss
 from snug.training.process_group import ALONE, Group, GroupError
-from snug.training.stopwatch import Stopwatch
-from snug.training.training_set import Batch, TrainingError, TrainingSet
+from snug.training.simulated_data import SimulatedPast
+from snug.training.training_set import Batch, HiddenStateCache, TrainingError, TrainingSet
+from snug.training.vertex_targets import Targets, VertexTargets
+
+# On a GPU "captured" is all from the windows to the gradients; see snug.training.captured_step.
+PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "captured", "optimiser", "requery")
+
+WATCH_EVERY = 10  # steps, on a GPU
+
+
+class Stopwatch:
+    """Wall time by part of a step.
+
+    On a GPU it must wait for the work of each part to end, so there it watches one step in WATCH_EVERY.
+    """
+
+    def __init__(self, device: torch.device) -> None:
+        self._waits = device.type == "cuda"
+        self.device, self._live, self.steps = device, True, 0
+        self._seconds = dict.fromkeys(PARTS, 0.0)
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Count the time of the block for the part of that name (one of PARTS)."""
+        if not self._live:
+            yield
+            return
+        start = self._now()
+        yield
+        self._seconds[name] += self._now() - start
+
+    def _now(self) -> float:
+        if self._waits:
+            torch.cuda.current_stream(self.device).synchronize()
+        return time.perf_counter()
+
+    def step_begins(self, number: int) -> None:
+        """Begin step `number`."""
+        self._live = not self._waits or number % WATCH_EVERY == 0
+        self.steps += self._live
+
+    def taken(self) -> dict[str, float]:
+        """Return the mean seconds a step of each part since the last call, and start anew."""
+        means = {name: s / self.steps for name, s in self._seconds.items() if s and self.steps}
+        self._seconds, self.steps = dict.fromkeys(PARTS, 0.0), 0
+        return means
+
 
 DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search

@@ -15,16 +15,16 @@ from snug.motion.motion import Motion
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
 from snug.networks.trained_model import TrainedModel, digest_of_triangles
-from snug.recipes.recipe import Recipe
+from snug.recipe import Recipe
 from snug.training.checkpoint import Checkpoint
 from snug.training.device import find_device
 from snug.training.kinds import find_kind
-from snug.training.losses.vertex_targets import Targets, load_relative, match_targets, vertex_loss
 from snug.training.optimisation_step import Trainer
 from snug.training.process_group import ALONE, Group
 from snug.training.training_loop import TrainingLoop
 from snug.training.training_set import TrainingSet
 from snug.training.validation import Validation
+from snug.training.vertex_targets import Targets, load_relative, match_targets, vertex_loss
 
 DAMPING = 0.01  # of the offsets that fitted networks learn, see unskin_damped
 PIECE = 256  # frames whose loss is taken at once
@@ -63,7 +63,7 @@ def train_network(
         seed: of everything random.
         trajectories: for kinds that learn from a simulation, motion name -> simulated world vertices
             (T, V, 3) [m], or where they are stored.
-        recipe: options of network and training; None: those of the kind (snug.recipes.named.RECIPE_OF_KIND).
+        recipe: options of network and training; None: those of the kind (snug.named_recipes.RECIPE_OF_KIND).
         log: called with each row of the history, every `every` steps.
         progress: whether a bar is shown on standard error.
         every: steps between two rows of the history.
@@ -107,7 +107,7 @@ def _own_recipe(model_kind: str) -> Recipe:
     """Return the recipe that a kind of network has where none is given."""
     # By the name of its module: a task of benchmarks is given its recipe, and another recipe in the list of
     # all would put it out of date if its code imported them.
-    recipe: Recipe = import_module("snug.recipes.named").RECIPE_OF_KIND[model_kind]
+    recipe: Recipe = import_module("snug.named_recipes").RECIPE_OF_KIND[model_kind]
     return recipe
 
 

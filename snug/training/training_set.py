@@ -1,4 +1,12 @@
-"""All frames of the training motions in a row, and the sub-sequences cut from them."""
+"""All frames of the training motions in a row, and the sub-sequences cut from them.
+
+Cache of a recurrent network's state after each training frame, which windows start from.
+
+A window of three frames says nothing of the state before it. Drawn from noise alone it is unlike any state of
+a roll-out, and the network learns to shake it off; cached when the frame before last ended a window,
+it is that of a roll-out, but for what the network has learned since. (With windows of three there are three
+such roll-outs of a motion, from its first, its second and its third frame.)
+"""
 
 from __future__ import annotations
 
@@ -13,8 +21,9 @@ from torch import Tensor
 from snug.body.skinning import joint_transforms
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.recipes.recipe import Recipe
+from snug.recipe import Recipe
 from snug.training.device import CPU, compiled
+from snug.training.process_group import ALONE, Group
 
 # Smallest spread by which an input is divided: rotations are numbers up to 1 in size, and one that hardly
 # moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
@@ -211,3 +220,34 @@ def _ahead(pelvis: np.ndarray) -> Tensor:
 def _behind(pelvis: np.ndarray) -> Tensor:
     """Return p_{t-1} - p_t of each frame, (T, 3) [m]; zero in the first."""
     return torch.as_tensor(-np.diff(pelvis, axis=0, prepend=pelvis[:1]), dtype=torch.float32)
+
+
+class HiddenStateCache:
+    """States (L, F + 1, H) after each frame, zero where it never ended a window.
+
+    The last row stands for the time before a motion, when a roll-out has a state of zero.
+
+    Args:
+        first: rows at which motions begin, and the number of all frames at the end (TrainingSet.first).
+        shape: layers L and width H of a state.
+        device: where the states lie.
+    """
+
+    def __init__(self, first: np.ndarray, shape: tuple[int, int], device: torch.device) -> None:
+        frames = int(first[-1])
+        before = np.arange(frames) - 1
+        before[first[:-1]] = frames
+        self.before = torch.as_tensor(before, device=device)
+        self.states = torch.zeros(shape[0], frames + 1, shape[1], device=device)
+
+    def at(self, frames: np.ndarray) -> Tensor:
+        """Return the states (L, N, H) before frames (N,)."""
+        return self.states[:, self.before[torch.as_tensor(frames, device=self.before.device)]]
+
+    def keep(self, frames: np.ndarray, states: Tensor, group: Group = ALONE) -> None:
+        """Cache states (L, N, H) after frames (N,); in a group each process gives its own."""
+        rows = group.gathered(torch.as_tensor(frames, device=self.before.device)).cpu().numpy()
+        # Of a frame that comes twice the first: which of two writes lands last is not a GPU's to choose.
+        once = torch.as_tensor(np.unique(rows, return_index=True)[1], device=states.device)
+        after = group.gathered(states.detach().transpose(0, 1)).transpose(0, 1)
+        self.states[:, torch.as_tensor(rows, device=states.device)[once]] = after[:, once]

@@ -21,8 +21,8 @@ from snug.motion.motion import Motion
 from snug.training.training_set import Batch, TrainingError, TrainingSet
 
 if TYPE_CHECKING:
-    from snug.training.losses.vertex_targets import Targets
     from snug.training.optimisation_step import Trainer
+    from snug.training.vertex_targets import Targets
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -104,7 +104,7 @@ def _materials() -> dict[str, Any]:
 def _motions() -> dict[str, Any]:
     """Roles, and the content of every motion of the library; of whole recorded clips their frozen digests."""
     from snug.motion import library
-    from snug.motion.recorded.table import CLIPS, SEGMENTS
+    from snug.motion.library import CLIPS, SEGMENTS
 
     roles = ("TRAIN", "VALIDATION", "TEST", "DYNAMIC_VALIDATION", "DYNAMIC_TEST")
     made = (library.make_motion(name) for name in library.LIBRARY if name not in CLIPS)
@@ -149,7 +149,7 @@ def _sampling() -> dict[str, Any]:
 
 def _reference() -> dict[str, Any]:
     from benchmarks.runner import ground_truth
-    from snug.recipes.recipe import DEFAULT
+    from snug.recipe import DEFAULT
 
     return {
         "ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": Newton.__init__.__kwdefaults__["tolerance"],

@@ -24,7 +24,7 @@ from benchmarks.runner.task import Context
 from benchmarks.validation.dead_load import DeadLoad
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring
-from snug.garments.options import GarmentFile
+from snug.file_options import GarmentFile
 from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
 
@@ -232,7 +232,7 @@ from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.make_plan import check_garment_name
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring
-from snug.garments.options import GarmentFile
+from snug.file_options import GarmentFile
 
 METHODS = (MethodEntry(name="bound", label="Bound", description="", role="solver"),)
 

@@ -44,10 +44,10 @@ EXCEPTIONS = {
     ("reports/text/code_parts.py", "benchmarks.plan.study.PACKAGED"),
     ("reports/text/code_parts.py", "benchmarks.plan.study.read_study"),
     ("reports/text/code_parts.py", "benchmarks.presets.PRESETS"),
-    ("reports/text/code_parts.py", "snug.recipes.named.RECIPES"),
-    ("reports/text/published_parts.py", "snug.motion.composition.clip_rows"),
-    ("reports/text/published_parts.py", "snug.motion.composition.distance_rows"),
-    ("reports/text/published_parts.py", "snug.motion.composition.source_rows"),
+    ("reports/text/code_parts.py", "snug.named_recipes.RECIPES"),
+    ("reports/text/published_parts.py", "snug.motion.library.clip_rows"),
+    ("reports/text/published_parts.py", "snug.motion.library.distance_rows"),
+    ("reports/text/published_parts.py", "snug.motion.library.source_rows"),
 }
 # Headline geometry must not share an error with the physics.
 PURE = ("benchmarks/metrics/surface/curvature.py", "benchmarks/metrics/surface/penetration_and_distances.py")

@@ -9,7 +9,7 @@ import pytest
 
 from reference_sim import Cloth, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Gravity, StretchStVK
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from snug.training.checkpoint import Checkpoint
 from snug.training.train_network import train_network
 from tests.project.own_memory import needs_proc, own_memory, slope

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from benchmarks.methods.catalogue.networks import network
-from snug.recipes.deviations import DEVIATIONS
-from snug.recipes.named import ABLATIONS
+from snug.named_recipes import ABLATIONS, DEVIATIONS
 
 _LABELS = {
     "no-noise": "first states of zero",

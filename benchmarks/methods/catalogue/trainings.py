@@ -7,9 +7,8 @@ finished network out of date.
 from __future__ import annotations
 
 from benchmarks.training import Simulated, Training
-from snug.recipes.deviations import exchange_deviations
-from snug.recipes.named import ABLATIONS, DYNAMIC, PAPER, PBNS_SPRINGS, RECIPE_OF_KIND
-from snug.recipes.recipe import DEFAULT
+from snug.named_recipes import ABLATIONS, DYNAMIC, PAPER, PBNS_SPRINGS, RECIPE_OF_KIND, exchange_deviations
+from snug.recipe import DEFAULT
 
 LEARN_FROM_SIMULATIONS = ("supervised", "santesteban2019", "tailornet", "nearest-poses", "pose-regression")
 TRAININGS = {

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference_sim.geometry.surface import vertex_normals
-from snug.training.contact.cache import Patch
+from snug.training.contact_cache import Patch
 
 MARGIN = 2e-3  # [m]
 

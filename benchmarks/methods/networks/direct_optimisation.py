@@ -30,7 +30,7 @@ from reference_sim.minimise.minimisers import make_minimiser
 from reference_sim.potential import Potential
 from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 
 ROUNDS, ITERATIONS, MEMORY = 40, 50, 20
 FALL = 1e-4  # a round that lowers the sum by a smaller share is the last

@@ -16,7 +16,7 @@ from benchmarks.scene import BuiltScene
 from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import collect_frames, prepare_frame_inputs, prepare_skinned_frames
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 
 
 class Skinning(Method):

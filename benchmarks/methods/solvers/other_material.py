@@ -17,7 +17,7 @@ from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.stretch_spring import StretchSpring
 from reference_sim.energies.stretch_stvk import StretchStVK
-from snug.training.losses.pbns_material import BENDING
+from snug.training.physics_loss import BENDING
 
 
 @dataclass(kw_only=True)

@@ -25,9 +25,9 @@ from benchmarks.scene import BuiltScene
 from reference_sim.minimise.subspace import Placement, SubspaceNewton, nearest_offsets, orthonormal
 from reference_sim.potential import Potential
 from snug.networks.dressed_body import DressedBody
-from snug.networks.handles.shape_functions import shape_functions, span
+from snug.networks.handles import shape_functions, span
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 
 Space = tuple[np.ndarray, np.ndarray, int]  # U (3 V, K), m (3 V,) [m], sweeps over the skinning weights
 

@@ -23,7 +23,7 @@ from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 
 SKINNING = "skinning"
 SHARE = 0.6  # of the last residual

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from snug.motion.clips import actions, strikes, unseen
-from snug.motion.clips.gait import RUN, START_SECONDS, WALK, Stride, gait_motion
+from snug.motion.clips import actions, unseen
 from snug.motion.clips.posture import LIBRARY_FPS, RATE, poses_from_angles, root_path
-from snug.motion.clips.turns import STOPS
+from snug.motion.clips.walks import RUN, START_SECONDS, STOPS, WALK, Stride, gait_motion
 from snug.motion.motion import Motion, smoothstep
 
-ACTIONS = {**actions.ACTIONS, **strikes.ACTIONS, **unseen.ACTIONS}
+ACTIONS = {**actions.ACTIONS, **actions.STRIKES, **unseen.ACTIONS}
 # name: (kind, stride, seconds, pace as a share of the stride's normal rate, time at which it stops or None)
 GAITS: dict[str, tuple[str, Stride, float, float, float | None]] = {
     "walk": ("walk", WALK, 4.0, 1.0, None),

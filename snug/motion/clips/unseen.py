@@ -6,7 +6,7 @@ Nobody chooses a recipe by them, nor looks into what a method does on one frame 
 from __future__ import annotations
 
 from snug.motion.clips.actions import ARM, Action
-from snug.motion.clips.gait import Stride
+from snug.motion.clips.walks import Stride
 
 ACTIONS: dict[str, Action] = {}
 

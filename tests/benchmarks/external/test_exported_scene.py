@@ -25,8 +25,8 @@ from benchmarks.runner.measurements import measured
 from benchmarks.scene import Dressed
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
+from snug.file_options import MotionFileOptions
 from snug.motion.files import read_motion
-from snug.motion.options import MotionFileOptions
 from snug.networks.dressed_body import DressedBody
 from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, small_scene
 from tests.snug.training.dressing import swaying, tube_dress

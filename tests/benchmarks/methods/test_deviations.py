@@ -10,7 +10,7 @@ from benchmarks.plan.motions import split_motions
 from benchmarks.plan.study import StudyError, read_study
 from benchmarks.presets import find_preset
 from snug.motion.library import TEST, VALIDATION
-from snug.recipes.deviations import DEVIATIONS
+from snug.named_recipes import DEVIATIONS
 from tests.benchmarks.plan.planned import planned, study_with
 
 NAMES = {

@@ -11,10 +11,10 @@ from benchmarks.plan.choose_cells import matching
 from benchmarks.plan.study import read_study
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
+from snug.named_recipes import ABLATIONS, RECIPES
 from snug.networks.architectures import ARCHITECTURES
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import ABLATIONS, RECIPES
-from snug.recipes.recipe import TERMS
+from snug.recipe import TERMS
 from snug.training.kinds import KINDS
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training

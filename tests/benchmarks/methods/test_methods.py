@@ -30,8 +30,8 @@ from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
 from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
-from snug.recipes.named import RECIPES
-from snug.training.losses.physics_loss import static_terms
+from snug.named_recipes import RECIPES
+from snug.training.physics_loss import static_terms
 from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, small_scene
 from tests.benchmarks.runner.test_cell_tasks import plan_of
 

@@ -16,9 +16,9 @@ from reference_sim import Potential, minimise
 from snug.body.skinning import unskin
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
-from snug.networks.handles.shape_functions import shape_functions, span
+from snug.networks.handles import shape_functions, span
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene
 from tests.snug.training.dressing import swaying, tube_dress
 

@@ -19,7 +19,7 @@ from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.runner.task import Context, Task
 from benchmarks.training import Simulated, Training
 from snug.motion.library import make_motion
-from snug.recipes.recipe import DEFAULT, TERMS
+from snug.recipe import DEFAULT, TERMS
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
 from tests.benchmarks.runner.test_cell_tasks import plan_of
 

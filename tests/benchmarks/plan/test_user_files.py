@@ -26,7 +26,7 @@ from benchmarks.scenes import of_garment
 from benchmarks.training import Training
 from benchmarks.validation.registry import CASES
 from reference_sim import Trajectory
-from snug.recipes.recipe import DEFAULT, RecipeError
+from snug.recipe import DEFAULT, RecipeError
 from tests.benchmarks.plan.outside_files import (
     HELPER,
     METHOD,

@@ -138,9 +138,9 @@ def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
         name: name.replace(".", "/") for name in loaded if name.split(".")[0] in ("reference_sim", "snug")
     }
     for name in (
-        "snug.recipes.recipe",
-        "snug.recipes.named",
-        "snug.recipes.deviations",
+        "snug.recipe",
+        "snug.named_recipes",
+        "snug.named_recipes",
     ):  # names of trainings, in the list of methods
         files.pop(name, None)
     places = tuple(f"{place.removesuffix('.py')}/" for place in known)

@@ -22,8 +22,8 @@ from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
 from snug.motion.library import TRAIN
 from snug.networks.dressed_body import DressedBody
-from snug.recipes.recipe import DEFAULT
-from snug.training.augmentation.mixed_clips import CLIP_FRAMES, augment, make_shared_clips
+from snug.recipe import DEFAULT
+from snug.training.augmentation import CLIP_FRAMES, augment, make_shared_clips
 from snug.training.simulated_data import DataSet
 from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, context, dressed_scene, training
 from tests.benchmarks.runner.test_cell_tasks import plan_of

@@ -31,8 +31,8 @@ from benchmarks.runner.schedule import TRAINING, Schedule, tasks_of
 from benchmarks.runner.task import Outcome
 from benchmarks.training import Training
 from snug import trained
+from snug.named_recipes import PBNS
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import PBNS
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, dressed_scene
 from tests.benchmarks.runner.test_cell_tasks import TINY, plan_of
 from tests.snug.training.dressing import swaying, tube_dress

@@ -9,8 +9,7 @@ from benchmarks.scenes import of_garment
 from reference_sim.time_loop import simulate
 from snug.body.parametric_body import Body
 from snug.garments.templates import TSHIRT, find_template
-from snug.motion.library import make_motion
-from snug.motion.recorded.table import CLIPS, SEGMENTS
+from snug.motion.library import CLIPS, SEGMENTS, make_motion
 
 
 @pytest.fixture(scope="module")

@@ -35,12 +35,11 @@ from reference_sim.trajectory import read_point_cache
 from snug.body.parametric_body import Body
 from snug.body.skeleton import BodyError
 from snug.body.smpl_files import read_body
+from snug.file_options import GarmentFile, MotionFileOptions
 from snug.garments.garment import GarmentError
-from snug.garments.options import GarmentFile
 from snug.garments.reading import read_garment
 from snug.motion.files import load_motions
 from snug.motion.motion import MotionError
-from snug.motion.options import MotionFileOptions
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from tests.project.fuzzing import samples

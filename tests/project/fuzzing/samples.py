@@ -20,7 +20,7 @@ from snug.garments.templates import find_template
 from snug.networks.architectures import make_network
 from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from tests.reports.report_folder import SCENES, all_rows, declaration
 from tests.snug.motion.cmu_clips import amc_frame, cmu_like
 from tests.snug.motion.motion_forms import bvh

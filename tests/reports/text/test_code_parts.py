@@ -14,9 +14,9 @@ from benchmarks.results.row import COLUMNS
 from benchmarks.scene import BuiltScene
 from reports.text.code_parts import PARTS, attribute_rows, docstring_rows, option_rows, recipe_rows
 from snug.body.smpl_files import SYNONYMS
-from snug.motion.smpl_arrays import ARRAY_NAMES
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import DEFAULT
+from snug.motion.files import ARRAY_NAMES
+from snug.named_recipes import PAPER
+from snug.recipe import DEFAULT
 
 
 def test_every_option_of_a_command_but_help_has_a_row_with_its_default():
@@ -77,7 +77,7 @@ def test_recipes_are_compared_in_the_options_that_differ():
     ("module", "names"),
     [
         ("snug.body.smpl_files", [name for names in SYNONYMS.values() for name in names]),
-        ("snug.motion.smpl_arrays", ARRAY_NAMES),
+        ("snug.motion.files", ARRAY_NAMES),
         ("benchmarks.external.roll_out_files", KEYS),
     ],
 )
@@ -87,6 +87,6 @@ def test_tables_of_files_have_every_array_that_is_read(module, names):
 
 
 def test_a_module_without_a_table_is_refused():
-    for module in ("snug.body.plain_files", "snug.recipes.recipe"):
+    for module in ("snug.body.plain_files", "snug.recipe"):
         with pytest.raises(ValueError, match=module):
             docstring_rows(module)

@@ -20,8 +20,7 @@ from reports.text.published_parts import (
     library_file,
     published_part,
 )
-from snug.motion.library import TEST
-from snug.motion.recorded.table import CLIPS, clip_of
+from snug.motion.library import CLIPS, TEST, clip_of
 
 JUDGED = "quick, paper_text, ablations, equal_data"  # as in the documents: what has been judged is kept
 

@@ -17,14 +17,14 @@ from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
+from snug.file_options import GarmentFile, add_garment_options, demand_garment_file, make_garment_file
 from snug.garments.fit import DressForm, pose_in_file
 from snug.garments.garment import GarmentError
-from snug.garments.options import GarmentFile, add_garment_options, demand_garment_file, make_garment_file
 from snug.garments.reading import examine_file, read_garment
 from snug.garments.templates import find_template
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.training.command import train_to_file
+from snug.training import train_to_file
 from tests.snug.body.other_bodies import lowered, plain_arrays, read_again
 from tests.snug.garments.garment_files import doubled_along, own_chart, saved, z_up
 from tests.snug.training.dressing import tube_dress

@@ -18,7 +18,7 @@ from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from snug.training.train_network import train_network, untrained_model
 from tests.benchmarks.runner.tasks_by_hand import context, dressed_scene
 from tests.reference_sim.meshes import edge_counts, girth

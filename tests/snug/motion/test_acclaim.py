@@ -16,10 +16,10 @@ from snug.body.skeleton import (
     rotation_matrices,
     sole_points,
 )
+from snug.file_options import MotionFileOptions
 from snug.motion.acclaim import CMU_RATE, JOINT_BONES, read_amc, read_asf, read_asf_amc, world_turns
 from snug.motion.files import load_motions, read_motion
 from snug.motion.motion import MotionError
-from snug.motion.options import MotionFileOptions
 from snug.motion.retarget import LIMBS
 from tests.snug.motion.cmu_clips import CHAIN, METRES, amc_frame, cmu_like, write_clip
 

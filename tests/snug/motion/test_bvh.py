@@ -7,12 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, REST_JOINTS, joint_positions
+from snug.file_options import MotionFileOptions
 from snug.motion.bvh import read_clip, shift_of, turns_of
 from snug.motion.files import read_motion
-from snug.motion.joint_names import NEEDED, _side, match_joints
 from snug.motion.library import make_motion
 from snug.motion.motion import MotionError
-from snug.motion.options import MotionFileOptions
+from snug.motion.retarget import NEEDED, _side, match_joints
 from tests.snug.motion.motion_forms import MIXAMO, bvh
 
 WALK = make_motion("walk").cut(20, 40)

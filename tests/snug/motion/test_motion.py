@@ -16,7 +16,7 @@ from snug.body.skeleton import (
 )
 from snug.motion.clips.make_clip import ACTIONS, GAITS, STOPS
 from snug.motion.clips.posture import poses_from_angles
-from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TEST, VALIDATION, make_motion
+from snug.motion.library import CLIPS, CONTROL, DYNAMIC_VALIDATION, TEST, VALIDATION, clip_of, make_motion
 from snug.motion.motion import (
     ARMS_CLEAR,
     Motion,
@@ -31,7 +31,6 @@ from snug.motion.motion import (
     transition,
     turn_about_vertical,
 )
-from snug.motion.recorded.table import CLIPS, clip_of
 from tests.snug.motion.joint_speeds import joint_speeds
 
 # Those made by code; tests of recorded clips are in test_recorded.

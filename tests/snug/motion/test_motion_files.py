@@ -8,10 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT
+from snug.file_options import MotionFileOptions
 from snug.motion.files import HAND_DAMPING, HANDS, load_motions, read_motion
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, MotionError, clear_arms, place, resample, transition
-from snug.motion.options import MotionFileOptions
 from tests.snug.motion.cmu_clips import amc_frame, write_clip
 from tests.snug.motion.motion_forms import TO_Z_UP, Y_UP, of_root, write_forms
 

@@ -12,19 +12,22 @@ import pytest
 from benchmarks.presets import find_preset
 from snug.body.skeleton import rotation_matrices, sole_points
 from snug.motion.library import (
+    CLIPS,
+    CLIPS_FILE,
     CONTROL,
     DYNAMIC_TEST,
     DYNAMIC_VALIDATION,
     LIBRARY,
+    SEGMENTS,
+    SEGMENTS_OF,
     TEST,
     TRAIN,
     VALIDATION,
+    clip_of,
     make_motion,
 )
 from snug.motion.motion import arm_clearance
-from snug.motion.raw_motion import RawMotion
-from snug.motion.recorded.table import CLIPS, CLIPS_FILE, SEGMENTS, SEGMENTS_OF, clip_of
-from snug.motion.recording_errors import MAX_TURN_SPEED, remove_recording_errors
+from snug.motion.raw_motion import MAX_TURN_SPEED, RawMotion, remove_recording_errors
 from tests.snug.motion.joint_speeds import joint_speeds
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -9,16 +9,15 @@ import pytest
 import torch
 
 from snug.body.skinning import skin, unskin
+from snug.named_recipes import ABLATIONS, RECIPE_OF_KIND
 from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.tailornet import DROPOUT, FrequencyMixture
-from snug.recipes.named import ABLATIONS, RECIPE_OF_KIND
-from snug.recipes.recipe import DEFAULT
-from snug.training.losses.pbns_material import SquaredContact, spring_terms
-from snug.training.losses.physics_loss import PhysicsLoss
-from snug.training.losses.vertex_targets import smooth_offsets
+from snug.recipe import DEFAULT
+from snug.training.physics_loss import PhysicsLoss, SquaredContact, spring_terms
 from snug.training.train_network import train_network
+from snug.training.vertex_targets import smooth_offsets
 from tests.snug.training.dressing import swaying, tube_dress
 
 
@@ -145,7 +144,7 @@ def test_the_springs_of_pbns_by_hand():
 
 @pytest.mark.parametrize("recipe", ABLATIONS, ids=lambda recipe: recipe.name)
 def test_an_ablation_leaves_out_what_it_says_and_never_evaluates_it(recipe, monkeypatch):
-    from snug.training.losses import physics_loss as module
+    from snug.training import physics_loss as module
 
     asked = []
     plain = module.evaluate

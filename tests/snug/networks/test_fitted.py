@@ -9,12 +9,12 @@ import pytest
 import torch
 
 from snug.body.skinning import skin, unskin_damped
+from snug.named_recipes import RECIPE_OF_KIND
 from snug.networks.fitted import COMPONENTS, NEIGHBOURS, NearestPoses, PoseRegression
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import RECIPE_OF_KIND
-from snug.training.losses.vertex_targets import TargetError
 from snug.training.train_network import train_network
+from snug.training.vertex_targets import TargetError
 from tests.snug.training.dressing import swaying, tube_dress
 
 KINDS = ("nearest-poses", "pose-regression")

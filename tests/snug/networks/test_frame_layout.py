@@ -6,11 +6,11 @@ import torch
 
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
+from snug.named_recipes import RECIPE_OF_KIND
 from snug.networks.architectures import ARCHITECTURES, make_network
 from snug.networks.frame_layout import CompiledFrame
 from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import RECIPE_OF_KIND
 from tests.snug.training.dressing import swaying, tube_dress
 
 PINS = (3, 77)

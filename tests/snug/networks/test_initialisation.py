@@ -10,11 +10,11 @@ import pytest
 import torch
 
 from snug.garments.templates import find_template
+from snug.named_recipes import PAPER, RECIPE_OF_KIND
 from snug.networks.architectures import ARCHITECTURES, make_network
 from snug.networks.dressed_body import DressedBody
-from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES
-from snug.recipes.named import PAPER, RECIPE_OF_KIND
-from snug.recipes.recipe import DEFAULT
+from snug.networks.ncs import DESCRIBED, POSE_NUMBERS, RATES
+from snug.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
 from tests.snug.training.dressing import swaying
 

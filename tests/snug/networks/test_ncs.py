@@ -7,12 +7,11 @@ import pytest
 import torch
 
 from snug.motion.motion import Motion
+from snug.named_recipes import NCS
 from snug.networks.architectures import make_network
-from snug.networks.ncs.joint_motion import DESCRIBED, POSE_NUMBERS, RATES, joint_motion
-from snug.networks.ncs.network import LEAD
+from snug.networks.ncs import DESCRIBED, LEAD, POSE_NUMBERS, RATES, joint_motion
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import NCS
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network
 from tests.snug.networks.test_regressor import turned

@@ -9,13 +9,12 @@ from snug.body.skeleton import axis_angles, rotation_matrices
 from snug.garments.garment import smooth_weights
 from snug.kernels import gru as fast_network
 from snug.motion.motion import Motion
+from snug.named_recipes import PAPER, RECIPES, find_recipe
 from snug.networks.architectures import make_network
-from snug.networks.motion_perceptron import MotionPerceptron
 from snug.networks.pbns import PoseSpaceDeformation
-from snug.networks.regressor import Regressor
+from snug.networks.regressor import MotionPerceptron, Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
-from snug.recipes.named import PAPER, RECIPES, find_recipe
-from snug.recipes.recipe import DEFAULT, Recipe, RecipeError
+from snug.recipe import DEFAULT, Recipe, RecipeError
 from snug.training.training_set import TrainingSet
 from tests.snug.training.dressing import leaning, swaying, tube_dress
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from snug.named_recipes import PAPER, RECIPE_OF_KIND
 from snug.networks.architectures import make_network
 from snug.networks.roll_out import (
     RollOutError,
@@ -16,8 +17,7 @@ from snug.networks.roll_out import (
     roll_out,
 )
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import PAPER, RECIPE_OF_KIND
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from snug.training.train_network import untrained_model
 from tests.snug.training.dressing import swaying, tube_dress
 

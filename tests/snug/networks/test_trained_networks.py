@@ -11,7 +11,7 @@ from snug import trained
 from snug.networks.architectures import make_network
 from snug.networks.tensor_file import read_header
 from snug.networks.trained_model import ModelFileError, TrainedModel
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 
 PACKAGE = Path(trained.FOLDER).parents[1]
 LARGEST = 60e6  # bytes of the whole package

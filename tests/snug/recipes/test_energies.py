@@ -11,9 +11,8 @@ import pytest
 import torch
 
 from reference_sim import energies
-from snug.recipes.energies import find_energy
-from snug.recipes.recipe import TERMS, Recipe, RecipeError
-from snug.training.losses.physics_loss import PhysicsLoss, has_closed_form
+from snug.recipe import TERMS, Recipe, RecipeError, find_energy
+from snug.training.physics_loss import PhysicsLoss, has_closed_form
 from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from snug.recipes.deviations import DEVIATIONS, exchange_deviations
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import DEFAULT, Recipe
+from snug.named_recipes import DEVIATIONS, PAPER, exchange_deviations
+from snug.recipe import DEFAULT, Recipe
 
 
 def differing(a: Recipe, b: Recipe) -> set[str]:

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 
 from snug.body.parametric_body import Body
-from snug.garments.assembly import nearest_body_vertices
 from snug.garments.garment import Garment
+from snug.garments.meshing import nearest_body_vertices
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.training.contact.cache import PARTS
+from snug.training.contact_cache import PARTS
 
 AROUND, RINGS = 15, 10
 

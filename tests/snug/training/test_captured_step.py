@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import DEFAULT
+from snug.named_recipes import PAPER
+from snug.recipe import DEFAULT
 from snug.training.captured_step import UNCAPTURED, CapturedStep
 from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING

@@ -12,17 +12,17 @@ import pytest
 import torch
 
 from reference_sim import Material
+from snug.named_recipes import DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
 from snug.networks import tensor_file
 from snug.networks.dressed_body import DressedBody
 from snug.networks.tensor_file import TensorFileError, read_tensors
 from snug.networks.trained_model import TrainedModel
-from snug.recipes.named import DYNAMIC, PAPER, SANTESTEBAN2019, SUPERVISED, TAILORNET
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from snug.training import checkpoint as checkpoints
+from snug.training import train_to_file
 from snug.training.checkpoint import Checkpoint
-from snug.training.command import choices
-from snug.training.command.train_to_file import digest_inputs
 from snug.training.train_network import train_network
+from snug.training.train_to_file import digest_inputs
 from snug.training.training_loop import Interrupted
 from snug.training.validation import Validation
 from tests.snug.training.dressing import swaying, tube_dress
@@ -219,7 +219,7 @@ def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatc
     out = tmp_path / "small.safetensors"
     arguments = ["--vertices", "200", "--steps", "8", "-o", str(out), "--resume"]
     library = [swaying(20), swaying(16, name="held")]
-    monkeypatch.setattr(choices, "choose_motions", lambda options, data: (library[:1], library[1:]))
+    monkeypatch.setattr(train_to_file, "choose_motions", lambda options, data: (library[:1], library[1:]))
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
     assert module.main(arguments) == 130
     assert "step 1 of 8" in capsys.readouterr().err
@@ -248,9 +248,9 @@ def test_command_resumes_what_it_interrupted(tailored_once, tmp_path, monkeypatc
         error = refused("small.safetensors: of another ", module.main, [*arguments, f"--{name}", value])
         assert f"of another {name}" in error.replace("number of ", "")
     for other in ([swaying(21)], [swaying(16, name="held")]), ([swaying(20)], []):
-        monkeypatch.setattr(choices, "choose_motions", lambda options, data, other=other: other)
+        monkeypatch.setattr(train_to_file, "choose_motions", lambda options, data, other=other: other)
         refused("of another body, garment or motions", module.main, arguments)
-    monkeypatch.setattr(choices, "choose_motions", lambda options, data: (library[:1], library[1:]))
+    monkeypatch.setattr(train_to_file, "choose_motions", lambda options, data: (library[:1], library[1:]))
     assert out.read_bytes() == before
     monkeypatch.setattr(module._StopRequest, "__call__", lambda self: True)
     assert module.main([*arguments[:-1], "--seed", "1"]) == 130
@@ -263,7 +263,7 @@ def test_garments_are_trained_one_after_another_and_those_that_ended_stay(
 ):
     from snug import train as module
 
-    monkeypatch.setattr(choices, "choose_motions", lambda options, data: ([swaying(20)], []))
+    monkeypatch.setattr(train_to_file, "choose_motions", lambda options, data: ([swaying(20)], []))
     arguments = ["--vertices", "200", "--steps", "3", "-o", str(tmp_path / "mine.safetensors"), "--resume"]
     arguments += ["--garment", "tshirt", "--garment", "tunic"]
     asked = iter([False, False, False, True])  # in the first step of the second

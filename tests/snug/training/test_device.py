@@ -13,13 +13,13 @@ from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchSt
 from reference_sim.kernels.fast_kernels import fast_kernel
 from snug.body.skinning import skin
 from snug.kernels.skinning import from_lanes, to_lanes
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import DEFAULT
-from snug.training.contact.cache import PARTS, ContactCache, Patch
-from snug.training.contact.cache_torch import TensorContactCache
+from snug.named_recipes import PAPER
+from snug.recipe import DEFAULT
+from snug.training.contact_cache import PARTS, ContactCache, Patch
+from snug.training.contact_cache_torch import TensorContactCache
 from snug.training.device import CPU, DeviceError, find_device
-from snug.training.losses.physics_loss import STATIC, on_device
 from snug.training.optimisation_step import Trainer
+from snug.training.physics_loss import STATIC, on_device
 from snug.training.training_set import TrainingSet
 from tests.snug.training.dressing import planes_of, swaying, tube_dress
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import DEFAULT
+from snug.named_recipes import PAPER
+from snug.recipe import DEFAULT
 from snug.training.divergence_guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
 from snug.training.optimisation_step import Trainer
 from snug.training.training_loop import TrainingLoop

@@ -7,11 +7,10 @@ import torch
 
 from reference_sim import Obstacle
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
+from snug.named_recipes import SUPERVISED
 from snug.networks.roll_out import roll_out
-from snug.recipes.named import SUPERVISED
-from snug.recipes.recipe import DEFAULT
-from snug.training.optimisation_step import Trainer
-from snug.training.stopwatch import PARTS
+from snug.recipe import DEFAULT
+from snug.training.optimisation_step import PARTS, Trainer
 from snug.training.train_network import train_network
 from snug.training.training_loop import TrainingLoop
 from snug.training.training_set import TrainingError

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from snug.recipes.named import SUPERVISED
-from snug.recipes.recipe import DEFAULT
-from snug.training.hidden_state_cache import HiddenStateCache
+from snug.named_recipes import SUPERVISED
+from snug.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
+from snug.training.training_set import HiddenStateCache
 from tests.snug.training.dressing import swaying, tube_dress
 
 RECIPE = replace(DEFAULT, mixed=0.0, h0_sigma=0.0)

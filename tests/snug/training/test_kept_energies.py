@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from snug.recipes.recipe import DEFAULT
-from snug.training.losses import physics_loss
+from snug.recipe import DEFAULT
+from snug.training import physics_loss
 from snug.training.optimisation_step import Trainer
 from tests.snug.training.dressing import swaying, tube_dress
 

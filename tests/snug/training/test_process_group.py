@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import torch
 
+from snug.named_recipes import PAPER
 from snug.networks.tensor_file import read_tensors, write_tensors
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from snug.training.device import find_device
 from snug.training.optimisation_step import Trainer
 from snug.training.process_group import ALONE, Group, GroupError, join_group

@@ -14,10 +14,10 @@ import pytest
 from snug import train as train_command
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion
+from snug.named_recipes import RECIPE_OF_KIND
 from snug.networks.tensor_file import TensorFileError
-from snug.recipes.named import RECIPE_OF_KIND
+from snug.training import train_to_file
 from snug.training.checkpoint import Checkpoint
-from snug.training.command import choices
 from snug.training.simulated_data import DataSet, settings_of, write_data_set
 from snug.training.train_network import train_network
 from snug.training.training_loop import Interrupted
@@ -129,7 +129,7 @@ def test_the_command_learns_from_the_file(built, tmp_path, capsys, refused, monk
     given = ["--dataset", str(built), "--steps", "2", "-o", str(out), "--model", "supervised"]
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     refused("garment: tube there, tshirt here", train_command.main, [*given, "--vertices", "300"])
-    monkeypatch.setattr(choices, "_tailored_garment", lambda name: choices.ChosenGarment(
+    monkeypatch.setattr(train_to_file, "_tailored_garment", lambda name: train_to_file.ChosenGarment(
         "tube", "a tube", lambda body, vertices: tube_dress().garment))  # fmt: skip
     assert train_command.main(given) == 0
     assert out.is_file() and "3 motions, 54 frames, recipe supervised" in capsys.readouterr().out

@@ -11,18 +11,18 @@ import torch
 
 from reference_sim.energies import StretchStVK
 from snug.body.skinning import skin
+from snug.named_recipes import PAPER, RECIPE_OF_KIND, SUPERVISED
 from snug.networks import trained_model
 from snug.networks.architectures import ARCHITECTURES
 from snug.networks.roll_out import roll_out
 from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
-from snug.recipes.named import PAPER, RECIPE_OF_KIND, SUPERVISED
-from snug.recipes.recipe import DEFAULT, RecipeError
-from snug.training.augmentation.mixed_clips import augment
-from snug.training.losses.vertex_targets import TargetError, vertex_loss
+from snug.recipe import DEFAULT, RecipeError
+from snug.training.augmentation import augment
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network, untrained_model
 from snug.training.training_set import TrainingError, TrainingSet
+from snug.training.vertex_targets import TargetError, vertex_loss
 from tests.snug.training.dressing import leaning, swaying, tube_dress
 
 PLAIN = replace(DEFAULT, mixed=0.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from snug.body.skeleton import JOINT
 from snug.motion.motion import Motion
-from snug.recipes.recipe import DEFAULT
+from snug.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
 from snug.training.training_set import TrainingSet
 from tests.snug.training.dressing import swaying, tube_dress

@@ -8,8 +8,8 @@ import pytest
 from snug.body.skeleton import JOINT, joint_positions
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, arm_clearance, lap_clearance, mirror_motion
-from snug.recipes.recipe import DEFAULT
-from snug.training.augmentation.mixed_clips import augment, hang_arms, make_mixed_clips
+from snug.recipe import DEFAULT
+from snug.training.augmentation import augment, hang_arms, make_mixed_clips
 from tests.snug.motion.joint_speeds import joint_speeds
 
 

@@ -4,14 +4,13 @@ import numpy as np
 
 from snug.motion.library import TRAIN
 from snug.motion.motion import Motion
-from snug.recipes.recipe import DEFAULT, Recipe
+from snug.recipe import DEFAULT, Recipe
 from tests.snug.training.dressing import swaying
 
 
 def test_command_line_refuses_a_wrong_path(refused, tmp_path):
-    from snug.train import main
-    from snug.training.command.choices import choose_motions
-    from snug.training.command.options import parse_options
+    from snug.train import main, parse_options
+    from snug.training.train_to_file import choose_motions
 
     out = tmp_path / "model.safetensors"
     refused("nowhere", main, ["--motions", str(tmp_path / "nowhere"), "-o", str(out)])
@@ -46,7 +45,7 @@ def test_command_line_refuses_what_it_could_not_do_before_any_work(refused, tmp_
 
 
 def test_each_model_has_a_file_of_its_own():
-    from snug.training.command.options import parse_options
+    from snug.train import parse_options
 
     assert parse_options([]).out == "snug.safetensors"
     assert parse_options(["--model", "pbns"]).out == "pbns.safetensors"

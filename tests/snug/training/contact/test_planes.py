@@ -11,11 +11,10 @@ import torch
 from snug.body.skeleton import JOINT
 from snug.body.skinning import skin
 from snug.kernels.contact import triangle_adjacency
-from snug.recipes.recipe import DEFAULT
-from snug.training.augmentation.mixed_clips import augment
-from snug.training.contact.body_patches import MARKED
-from snug.training.contact.cache import ContactCache, Patch
-from snug.training.contact.planes import FIRST_NEAR, FIRST_REACH, NEAR, REACH
+from snug.recipe import DEFAULT
+from snug.training.augmentation import augment
+from snug.training.contact_cache import ContactCache, Patch
+from snug.training.contact_planes import FIRST_NEAR, FIRST_REACH, MARKED, NEAR, REACH
 from snug.training.optimisation_step import Trainer
 from tests.reference_sim.meshes import sphere
 from tests.snug.training.dressing import swaying, tube_dress
@@ -46,7 +45,7 @@ def test_a_sample_far_from_the_body_at_rest_may_meet_all_of_it():
 
 def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
     monkeypatch.setattr(
-        "snug.training.contact.cache.EXACT", 1.0
+        "snug.training.contact_cache.EXACT", 1.0
     )  # the dress hangs 2 cm off the skin: a search would change nothing
     searched = []
     requery = ContactCache.requery

@@ -12,10 +12,10 @@ from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchSt
 from reference_sim.energies.bend_hinge import dihedral_angles
 from snug.body.skinning import skin
 from snug.kernels.skinning import from_lanes, to_lanes
-from snug.recipes.named import PAPER, PBNS_SPRINGS, RECIPES
-from snug.recipes.recipe import DEFAULT, Recipe
-from snug.training.contact.cache import EXACT, PARTS, ContactCache, Patch, quantise
-from snug.training.losses.physics_loss import PhysicsLoss, evaluate, make_contact, static_terms
+from snug.named_recipes import PAPER, PBNS_SPRINGS, RECIPES
+from snug.recipe import DEFAULT, Recipe
+from snug.training.contact_cache import EXACT, PARTS, ContactCache, Patch, quantise
+from snug.training.physics_loss import PhysicsLoss, evaluate, make_contact, static_terms
 from tests.snug.training.dressing import planes_of, swaying, tube_dress
 
 DT = 1 / 30

@@ -10,22 +10,23 @@ import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.motion.motion import Motion, turn_about_vertical
-from snug.networks.motion_features import HISTORY, RATED_JOINTS, motion_history, motion_rates
+from snug.named_recipes import DYNAMIC
+from snug.networks.dressed_body import HISTORY, RATED_JOINTS, motion_history, motion_rates
 from snug.networks.roll_out import roll_out
-from snug.recipes.named import DYNAMIC
-from snug.training.augmentation.mixed_clips import make_mixed_clips, make_shared_clips
-from snug.training.augmentation.swinging_clips import (
+from snug.training.augmentation import (
     HELD_FRAMES,
     MAX_DEGREE_HERTZ,
     SPEEDS,
     TRANSITION_FRAMES,
+    make_mixed_clips,
+    make_shared_clips,
     make_swinging_motion,
 )
-from snug.training.losses.simulated_past import NEARNESS, SimulatedPast
-from snug.training.losses.vertex_targets import TargetError
 from snug.training.optimisation_step import Trainer
+from snug.training.simulated_data import NEARNESS, SimulatedPast
 from snug.training.train_network import train_network
 from snug.training.training_set import TrainingSet
+from snug.training.vertex_targets import TargetError
 from tests.snug.motion.joint_speeds import joint_speeds
 from tests.snug.training.dressing import swaying, tube_dress
 

@@ -9,9 +9,9 @@ import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
-from snug.recipes.named import PAPER
-from snug.recipes.recipe import INERTIA_FORMS, Recipe
-from snug.training.losses.physics_loss import PhysicsLoss
+from snug.named_recipes import PAPER
+from snug.recipe import INERTIA_FORMS, Recipe
+from snug.training.physics_loss import PhysicsLoss
 from tests.snug.training.dressing import swaying, tube_dress
 
 DT = 1 / 30

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from reference_sim.geometry.surface import faces_around
 from snug.kernels.contact import CROSSINGS, WALK_SLACK
-from snug.training.contact.cache import PARTS, ContactCache, Patch
+from snug.training.contact_cache import PARTS, ContactCache, Patch
 from snug.training.device import CudaGraph, compiled
 
 Anchors = tuple[Tensor, Tensor]  # faces (N, S) and barycentric coordinates (N, S, 2)
@@ -176,7 +176,7 @@ def first_places(frames: np.ndarray) -> np.ndarray:
 
 
 def quantise_tensors(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
-    """Round anchors as snug.training.contact.cache.quantise does: faces (..., S), barycentric (..., S, 2)."""
+    """Round anchors as snug.training.contact_cache.quantise does: faces (..., S), barycentric (..., S, 2)."""
     second = (PARTS * barycentric[..., :1]).round()
     third = torch.minimum((PARTS * barycentric[..., 1:]).round(), PARTS - second)
     return faces.to(kind), torch.cat([second, third], -1).to(torch.uint8)

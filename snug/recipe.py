@@ -1,14 +1,25 @@
-"""Recipe: every choice of a training run in one frozen place. The named ones are in snug.recipes.named.
+"""Recipe: every choice of a training run in one frozen place. The named ones are in snug.named_recipes.
 
 No recipe holds a balancing weight between the energies: there is none. Imports nothing heavy,
 so that a command can list recipes without loading torch.
+
+Energies of the simulator as terms of the training loss, found by the name that each gives itself.
+
+Whatever `reference_sim.energies` names, and every other subclass of Energy that
+has been imported, can be named in `Recipe.terms`, if the rest state of the garment is all that it needs. No
+list has to be edited: a term that declares no kernel "training_batch" is trained more slowly, and one line
+says so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import inspect
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, fields
 from typing import Any
+
+from reference_sim import energies
+from reference_sim.energies import Energy
 
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
 INITIALISATIONS = ("torch", "keras")
@@ -32,7 +43,7 @@ class Recipe:
         smoothing: sweeps of neighbour averaging over the borrowed skinning weights, at 1000 vertices (see
             DressedBody.weights).
         initialisation: rules by which the random weights are drawn, `torch` or `keras`, see
-            snug.networks.initialisation.
+            snug.networks.garment_network.
         zero_last_layer: start at the skinned template instead of at centimetres of noise.
         output_scale: factor on the predicted offsets.
         learning_rate: of Adam.
@@ -44,7 +55,7 @@ class Recipe:
         drop_after_epochs: see `schedule`.
         h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
         remembered: add that noise to the state which the network last had after the frame before (see
-            snug.training.hidden_state_cache), instead of to zero. Not for networks that learn simulated
+            snug.training.training_set), instead of to zero. Not for networks that learn simulated
             vertices, nor where each window gets its own shape (`shape_of`); of little use where
             `window_stride` is no divisor of `window`, for then few frames before a window ever end one.
         window: frames of a sub-sequence.
@@ -64,12 +75,12 @@ class Recipe:
         contact_margin: of ContactPenalty; None takes the simulator's default.
         contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most
             one of each window; in between anchors walk with the cloth.
-        mixed: frames of augmented motions (snug.training.augmentation.mixed_clips) for each frame of a
+        mixed: frames of augmented motions (snug.training.augmentation) for each frame of a
             training motion, up to 20,000; not for networks that learn simulated vertices.
         mixed_turn: standard deviation of their added turns [rad].
         mixed_lift: share of their thighs that are lifted.
         terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
-            snug.recipes.energies. Leaving one out is an ablation, and it is then never evaluated.
+            snug.recipe. Leaving one out is an ablation, and it is then never evaluated.
         inertia_form: `equation_5` (the inertia of each frame with two before it in its window, through
             which its gradient reaches all three), `detached_past` (the same without a gradient to the two
             frames before, as in Neural Cloth Simulation and GAPS) or `two_transitions` (the published code of
@@ -77,11 +88,11 @@ class Recipe:
             A window's inertia is the mean over the frames that have one.
         material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or
             `pbns` (edges, hinges, uniform mass and squared contact of PBNS, see
-            snug.training.losses.pbns_material, with its own stiffness and margin of contact).
+            snug.training.physics_loss, with its own stiffness and margin of contact).
         bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints
             them; without effect with material `pbns`.
         pretraining: updates before those by the energies, for a network that learns from a simulated past,
-            see snug.training.losses.simulated_past.
+            see snug.training.simulated_data.
         spike: a window above this many joules a frame is named and counted, and its step's gradient clipped;
             further measures: see snug.training.divergence_guard.
         gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
@@ -163,8 +174,6 @@ class Recipe:
     def _demand_known(terms: Iterable[str]) -> None:
         """Raise RecipeError unless all terms are energies of the simulator that can be trained on."""
         for term in terms:
-            from snug.recipes.energies import find_energy
-
             try:
                 find_energy(term)
             except ValueError as error:
@@ -197,3 +206,50 @@ _READ_AS: dict[type, tuple[type, ...]] = {
     float: (float, int), tuple: (tuple, list), type(None): (type(None), float, int),
 }  # fmt: skip
 DEFAULT = Recipe()
+
+
+def find_energy(name: str) -> Callable[..., Energy]:
+    """Return the function that makes the energy of that name from a Cloth, its options at their defaults.
+
+    Raises:
+        ValueError: an unknown name, one that two have, or an energy that cannot be trained: it is made of
+            more than a cloth, must be prepared for each step of a simulation (Energy.prepare), or finds its
+            stencils anew as vertices move (Energy.dynamic).
+
+    >>> find_energy("gravity").__name__
+    'Gravity'
+    """
+    for class_name in energies.__all__:
+        getattr(energies, class_name)  # imported by it
+    terms = [term for term in _subclasses(Energy) if hasattr(term, "name")]
+    named = [term for term in terms if term.name == name]
+    if not named:
+        known = sorted({term.name for term in terms if not _reason_against(term)})
+        raise ValueError(
+            f"unknown energy {name!r}: use one of {', '.join(known)}, or import the file of your own"
+        )
+    fit = {(term.__module__, term.__qualname__): term for term in named if not _reason_against(term)}
+    if len(fit) > 1:
+        places = " and ".join(module for module, _ in fit)
+        raise ValueError(f"energy {name!r} is defined in {places}: give yours a name of its own")
+    if fit:
+        return next(iter(fit.values()))
+    raise ValueError(f"energy {name!r} cannot be trained: {_reason_against(named[0])}")
+
+
+def _subclasses(of: type[Energy]) -> Iterator[type[Energy]]:
+    for term in of.__subclasses__():
+        yield term
+        yield from _subclasses(term)
+
+
+def _reason_against(term: type[Energy]) -> str:
+    """Say why a term cannot be part of a loss; empty if it can."""
+    parameters = inspect.signature(term).parameters.values()
+    variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    needed = [p.name for p in parameters if p.default is p.empty and p.kind not in variadic]
+    if needed != ["cloth"]:
+        return f"it is made of {', '.join(needed)}, a garment has its cloth alone"
+    if term.prepare is not Energy.prepare:
+        return "it must be prepared for each step of a simulation"
+    return "its stencils change as vertices move" if term.dynamic else ""

@@ -1,4 +1,6 @@
-"""Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
+"""The training set of a recipe: original motions and augmented clips, each on its body.
+
+Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
 
 Self-supervision needs no simulation, so a training set is not bound to what was recorded. Recorded clips show
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
@@ -8,6 +10,15 @@ axis, lifts some thighs, hangs each arm at a random distance from the torso, and
 comes too near to it. Legs that always come as a pair show no lunge; a network that has met no thigh as high
 as in a squat lets it through the hem; and people, unlike tables of angles, let their arms hang close to the
 torso and turned in their sockets. Every part stays continuous in time, so velocities keep their meaning.
+
+Training motions with turns and stops, which give a garment secondary motion, joined into one.
+
+Secondary motion shows after a turn and a stop, and few motions have either. Each clip is played at
+another speed; its trunk turns to and fro about the vertical, a random share of it from the pelvis; at a
+random frame the body stops dead and holds still for up to a second. Joined into one long motion they need one
+settled start, and the ways between them are motions too. Half of the clips are pieces of the original
+motions: mixed ones alone hardly come near a pose that people take, and there the network then stretches the
+cloth.
 """
 
 from __future__ import annotations
@@ -17,11 +28,102 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
-from snug.motion.motion import Motion, arm_clearance, lap_clearance, mirror_motion
-from snug.recipes.recipe import DEFAULT, Recipe
-from snug.training.augmentation.swinging_clips import make_swinging_motion
+from snug.motion.clips.posture import SPINE_SHARES
+from snug.motion.motion import (
+    Motion,
+    arm_clearance,
+    heading,
+    lap_clearance,
+    mirror_motion,
+    resample,
+    smoothstep,
+    transition,
+    turn_about_vertical,
+)
+from snug.networks.dressed_body import DressedBody
+from snug.recipe import DEFAULT, Recipe
+from snug.training.kinds import Kind
+from snug.training.training_set import TrainingSet
+
+ORIGINAL_SHARE = 0.5  # of the clips: pieces of the original motions
+SPEEDS = (0.6, 1.5)
+SWING_HERTZ = (0.35, 1.8)  # of the turns
+MAX_DEGREES, MAX_DEGREE_HERTZ = 65.0, 60.0  # to one side; and that times the frequency of the turns
+HELD_FRAMES = 40  # frames, at most
+TRANSITION_FRAMES = 16  # frames from one clip to the next
+VERTICAL = np.array([0.0, 1.0, 0.0])
+
+
+def make_swinging_motion(
+    clips: Sequence[Motion], name: str, *, seed: int, originals: Sequence[Motion] = ()
+) -> Motion:
+    """Join the clips, changed so, to one motion; deterministic for a seed. 60 frames become some 80.
+
+    Args:
+        clips: mixed clips.
+        name: of the motion.
+        seed: of all random choices.
+        originals: motions of which pieces take the place of a share ORIGINAL_SHARE of the clips.
+    """
+    random = np.random.default_rng(seed)
+    joined = _swing(_choose_clip(clips[0], originals, random), random)
+    for clip in clips[1:]:
+        after = _swing(_choose_clip(clip, originals, random), random)
+        height = after.translations[0] * VERTICAL
+        # Each goes on the way the last one faced: to turn about on the spot in half a second is no motion.
+        after = turn_about_vertical(after, heading(joined.poses[-1]) - heading(after.poses[0]))
+        way = transition(joined.poses[-1], after.poses[0], TRANSITION_FRAMES + 1)[1:-1]
+        # Horizontally it goes on where it was; it rises and falls with the timing of the joints.
+        goal = joined.translations[-1] * [1.0, 0.0, 1.0] + height
+        rise = goal - joined.translations[-1]
+        s = np.linspace(0.0, 1.0, TRANSITION_FRAMES + 1)[1:-1, None]
+        lifted = joined.translations[-1] + rise * smoothstep(s)
+        joined = joined.followed_by(
+            replace(
+                after,
+                poses=np.concatenate([way, after.poses]),
+                translations=np.concatenate([lifted, after.translations + goal]),
+            )
+        )
+    return replace(joined, name=name, kind="swinging")
+
+
+def _choose_clip(clip: Motion, originals: Sequence[Motion], random: np.random.Generator) -> Motion:
+    """Return the clip or, with probability ORIGINAL_SHARE, a piece of an original motion.
+
+    The piece is mirrored half of the time.
+    """
+    if not originals or random.random() >= ORIGINAL_SHARE:
+        return clip
+    source = originals[int(random.integers(len(originals)))]
+    if random.random() < 0.5:
+        source = mirror_motion(source)
+    start = int(random.integers(max(1, source.frames - clip.frames + 1)))
+    return source.cut(start, start + clip.frames)
+
+
+def _swing(clip: Motion, random: np.random.Generator) -> Motion:
+    """Play a clip at another speed, turn its trunk to and fro, stop it at some frame and hold it."""
+    clip = resample(replace(clip, fps=clip.fps * _draw_between(SPEEDS, random)), clip.fps)
+    poses, hertz = clip.poses.copy(), _draw_between(SWING_HERTZ, random)
+    degrees = min(MAX_DEGREES, MAX_DEGREE_HERTZ / hertz) * random.uniform(-1.0, 1.0)
+    phase = 2 * np.pi * (hertz * np.arange(clip.frames) / clip.fps + random.random())
+    hips = random.random()
+    for joint, share in (("pelvis", hips), *((name, (1.0 - hips) * share) for name, share in SPINE_SHARES)):
+        turn = rotation_matrices(share * np.deg2rad(degrees) * np.sin(phase)[:, None] * VERTICAL)
+        poses[:, JOINT[joint]] = axis_angles(turn @ rotation_matrices(poses[:, JOINT[joint]]))
+    stop = int(random.integers(clip.frames // 4, clip.frames))
+    frames = np.minimum(np.arange(stop + 1 + random.integers(HELD_FRAMES + 1)), stop)
+    return replace(clip, poses=poses[frames], translations=clip.translations[frames])
+
+
+def _draw_between(limits: tuple[float, float], random: np.random.Generator) -> float:
+    """Draw a number within limits, uniform in its logarithm."""
+    return float(np.exp(random.uniform(*np.log(limits))))
+
 
 BODY_PARTS: tuple[tuple[str, ...], ...] = (
     ("pelvis",),
@@ -80,7 +182,7 @@ def make_shared_clips(
         share: augmented frames for each original one. The clips of a smaller share are the first of a larger.
         vertices: number of the garment's vertices.
         swinging: join the clips of each share, and pieces of the original motions, to one motion
-            (snug.training.augmentation.swinging_clips).
+            (snug.training.augmentation).
     """
     clips = augment(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
     if not swinging:
@@ -185,3 +287,31 @@ def open_hips(motion: Motion) -> Motion:
             poses[:, hip] = axis_angles(back @ rotation_matrices(poses[:, hip]))
         motion = replace(motion, poses=poses)
     return motion
+
+
+def varies_shape(kind: Kind, dressed: DressedBody, recipe: Recipe) -> bool:
+    """Return whether the network is trained on bodies of several shapes."""
+    reads_shape = kind.physics and kind.network.feature_set == "motion"
+    return bool(recipe.shape_range and dressed.body.shape_count and reads_shape)
+
+
+def make_training_set(
+    kind: Kind,
+    dressed: DressedBody,
+    motions: Sequence[Motion],
+    recipe: Recipe,
+    *,
+    seed: int,
+    device: torch.device,
+) -> TrainingSet:
+    """Make the training set: the motions and, if the energies teach the network, augmented clips."""
+    clips = augment(motions, recipe, vertices=dressed.vertices, seed=seed) if kind.physics else []
+    shapes = None
+    if varies_shape(kind, dressed, recipe) and recipe.shape_of == "clip":
+        mean = np.zeros((len(motions), dressed.body.shape_count))
+        of_clips = draw_clip_shapes(len(clips), dressed.body.shape_count, recipe, seed=seed)
+        shapes = np.concatenate([mean, of_clips])
+    return TrainingSet(
+        dressed, [*motions, *clips], recipe, features=kind.network.feature_set,
+        sequences=kind.network.sequential, device=device, shapes=shapes,
+    )  # fmt: skip

@@ -1,1 +1,0 @@
-"""Recipes: every option of a training in one frozen place."""

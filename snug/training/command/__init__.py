@@ -1,1 +1,0 @@
-"""The parts of the command `python -m snug.train`: options, choices, one training, curves."""

@@ -1,1 +1,0 @@
-"""Contact planes for training: cached anchors, queried anew as the network learns."""

@@ -1,1 +1,0 @@
-"""Losses: energies of the simulator, distances from simulated vertices, PBNS's own material."""
