@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from benchmarks.assets.assets import Assets
+from benchmarks.assets import Assets
 from benchmarks.contract import PrepareCell, watched_method, watched_scene
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import MethodEntry

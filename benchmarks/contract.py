@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.assets.inputs import FEWEST_FRAMES
+from benchmarks.assets import FEWEST_FRAMES
 from benchmarks.declarations import raised_at
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.plan import TaskId
@@ -30,7 +30,7 @@ from reference_sim import Potential, Trajectory
 from reference_sim.energies import Energy, Step
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
 
 PLACE_TOLERANCE = 1e-6  # [m] of what should be in its place; times a frame's length in float32
 CLOCK_SLACK = 1.1  # of the clock: what frames say of themselves may be more by so much, in all

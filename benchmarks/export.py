@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     plan = plan_scene(study_of(options), options.scene)
     try:
         scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
-        from benchmarks.external.exported_scene import write_scene  # loads the simulator
+        from benchmarks.external.scene_files import write_scene  # loads the simulator
 
         chosen = ["--scene", options.scene, *scene_arguments(options)]
         line = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])

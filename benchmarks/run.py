@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.declarations import DeclarationError
-from benchmarks.external.roll_out_option import RollOutFileError
+from benchmarks.external.roll_out_files import RollOutFileError
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import PROGRAM, make_parser, split, study_of
 from benchmarks.plan.plan import Plan

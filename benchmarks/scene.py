@@ -12,7 +12,7 @@ from benchmarks.declarations import DeclarationError, by_name, load
 if TYPE_CHECKING:
     import numpy as np
 
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
     from benchmarks.presets import Preset
     from reference_sim.cloth import Cloth
     from reference_sim.energies.energy import Energy

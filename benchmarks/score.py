@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from benchmarks.external.roll_out_option import (
+from benchmarks.external.roll_out_files import (
     FileConventions,
     RollOutFileError,
     RollOutOption,

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import StoredRollOut
-from benchmarks.external.roll_out_option import FileConventions, RollOutFileError
+from benchmarks.external.roll_out_files import FileConventions, RollOutFileError, StoredRollOut
 from benchmarks.external.vertex_correspondence import nearest_order, same_faces, same_topology
 from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.assets.assets import embedded_motions
+from benchmarks.assets import embedded_motions
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge import BendHinge

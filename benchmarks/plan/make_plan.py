@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.assets.inputs import Inputs, read_inputs
+from benchmarks.assets import Inputs, read_inputs
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import installed
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method

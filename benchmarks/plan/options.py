@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from benchmarks.declarations import attributes_of
-from benchmarks.external.roll_out_option import parse_roll_out
+from benchmarks.external.roll_out_files import parse_roll_out
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.motions import split_motions

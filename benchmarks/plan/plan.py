@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.assets.inputs import Inputs
-from benchmarks.external.roll_out_option import MODULE as STORED
+from benchmarks.assets import Inputs
+from benchmarks.external.roll_out_files import MODULE as STORED
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.plan.motions import Motions
@@ -22,7 +22,7 @@ from benchmarks.scenes import all_scenes
 from benchmarks.training import Training
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
     from benchmarks.validation.case import Case
 
 TaskId = tuple[str, str]  # kind and name of a task
@@ -190,7 +190,7 @@ class Plan:
 
     def open_assets(self) -> Assets:
         """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
-        from benchmarks.assets.assets import embedded_motions, open_assets  # loads numpy
+        from benchmarks.assets import embedded_motions, open_assets  # loads numpy
 
         names = [name for garment in self.garments for name in self.motions_of(garment)]
         if self.networks:

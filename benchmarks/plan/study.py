@@ -14,8 +14,8 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
 
-from benchmarks.assets.inputs import FEWEST_FRAMES, LIBRARY
-from benchmarks.external.roll_out_option import RollOutOption, roll_out_of
+from benchmarks.assets import FEWEST_FRAMES, LIBRARY
+from benchmarks.external.roll_out_files import RollOutOption, roll_out_of
 from benchmarks.presets import PRESETS, Preset, find_preset
 from snug.file_options import GarmentFile, MotionFileOptions
 from snug.trained import FOLDER

@@ -24,7 +24,7 @@ from benchmarks.timing import Reading, clocked, peak_memory
 if TYPE_CHECKING:
     import numpy as np
 
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
     from benchmarks.validation.case import Case
     from reference_sim import Trajectory
 

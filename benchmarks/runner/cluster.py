@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks import provenance
-from benchmarks.assets.assets import Assets
+from benchmarks.assets import Assets
 from benchmarks.provenance import damaged, digest_of_file, software
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import CellTask

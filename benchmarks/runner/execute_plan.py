@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.external.roll_out_option import MODULE, RollOutFileError
+from benchmarks.external.roll_out_files import MODULE, RollOutFileError
 from benchmarks.plan.plan import STATES, Plan, runs
 from benchmarks.results.row import DECLARED, Row
 from benchmarks.results.run_folder import RunFolder
@@ -25,7 +25,7 @@ from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Outcome, RunRefused, RunStopped
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
 
 ABLATIONS = "--methods 'simulation,skinning,snug,snug-no-*'"
 

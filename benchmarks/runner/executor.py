@@ -17,7 +17,7 @@ from contextlib import suppress
 from multiprocessing.queues import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
 
-from benchmarks.assets.assets import Assets
+from benchmarks.assets import Assets
 from benchmarks.plan.plan import TaskId
 from benchmarks.provenance import damaged
 from benchmarks.results.run_folder import RunFolder

@@ -15,10 +15,9 @@ from benchmarks.declarations import load
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
 from benchmarks.plan.plan import Cell, TaskId
-from benchmarks.results.frame_energies import SECONDS
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import SECONDS, RunFolder
 from benchmarks.runner.cells import build_scene
 from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.task import Context, Outcome, Task

@@ -21,7 +21,7 @@ from snug.trained import FOLDER, SUFFIX, network_name
 if TYPE_CHECKING:
     import numpy as np
 
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
     from benchmarks.training import Training
     from snug.motion.motion import Motion
     from snug.networks.trained_model import TrainedModel

@@ -15,7 +15,7 @@ from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.provenance import digest, digest_of_file
-from benchmarks.results import frame_energies
+from benchmarks.results import run_folder
 from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import OF_TRAINING, Row, with_provenance
 from benchmarks.results.run_folder import RunFolder
@@ -24,7 +24,7 @@ from benchmarks.runner.loop import Runner
 from snug.trained import FOLDER
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
 
 KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
 OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks", "cells", "outdated")
@@ -149,7 +149,7 @@ class RunLog:
         ]
         self.count_look()
         self.folder.write_rows(self.rows)
-        frame_energies.write(self.folder, self.rows)
+        run_folder.write(self.folder, self.rows)
         self.config |= described(self.plan, self.rows)
         written = (self.folder.rows_path, self.folder.frame_energies_path)
         self.config["digests"] = {path.name: digest_of_file(path) for path in written if path.is_file()}

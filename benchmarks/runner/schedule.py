@@ -34,9 +34,13 @@ if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
 SIMULATOR = "reference_sim"
-DRESSING = ("snug/data", "snug/body", "snug/motion", "snug/garments", "benchmarks/assets")
-MIXING = ("snug/training/augmentation.py", "snug/recipe.py", "snug/named_recipes.py")  # that are mixed from motions, to be simulated
-NETWORKS = ("snug", "benchmarks/assets")
+DRESSING = ("snug/data", "snug/body", "snug/motion", "snug/garments", "benchmarks/assets.py")
+MIXING = (
+    "snug/training/augmentation.py",
+    "snug/recipe.py",
+    "snug/named_recipes.py",
+)  # that are mixed from motions, to be simulated
+NETWORKS = ("snug", "benchmarks/assets.py")
 SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py", "benchmarks/fabrics")
 RUNS = (
     SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
@@ -47,7 +51,7 @@ METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "
 CASES = (
     "benchmarks/runner/cells.py",
     "benchmarks/validation",
-    "benchmarks/assets",
+    "benchmarks/assets.py",
     SOLVERS,
     *METRICS,
     *RUNS,

@@ -14,7 +14,7 @@ from benchmarks.plan.plan import TaskId
 from benchmarks.runner.isolated_process import WorkerDied, one_line
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
     from benchmarks.results.row import Row
     from benchmarks.results.run_folder import RunFolder
 

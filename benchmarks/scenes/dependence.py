@@ -15,7 +15,7 @@ from snug.garments.templates import find_template
 from snug.motion.library import make_motion
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
     from benchmarks.presets import Dependence
 
 WARM_UP = 2  # it starts at rest, and few frames are simulated

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.assets.assets import Assets
+from benchmarks.assets import Assets
 from benchmarks.scene import BuiltScene, Dressed, Scene
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge import BendHinge

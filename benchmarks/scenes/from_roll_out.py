@@ -9,8 +9,7 @@ import sys
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import read_rest_mesh, read_roll_out
-from benchmarks.external.roll_out_option import RollOutFileError, RollOutOption
+from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, read_rest_mesh, read_roll_out
 from benchmarks.external.scene_fit import LONGEST_STRETCH, mean_stretch
 from benchmarks.provenance import digest
 from benchmarks.scene import BuiltScene, Scene

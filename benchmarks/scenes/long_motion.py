@@ -20,7 +20,7 @@ from snug.motion.library import make_motion
 from snug.motion.motion import Motion, transition
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
 
 FRAMES, ENDS = 1000, 100  # there and back: at least so many in all, and at either end
 LOOP_BLEND = 10  # frames from a loop's end to its start

@@ -19,7 +19,7 @@ from snug.motion.library import make_motion
 from snug.motion.motion import Motion, transition
 
 if TYPE_CHECKING:
-    from benchmarks.assets.assets import Assets
+    from benchmarks.assets import Assets
 
 ORDINARY_FRAMES = 44  # frames of the walk that the others are compared with
 APPROACH = 12  # frames from the walk's first pose to another

@@ -10,8 +10,14 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.external.roll_out_files import first_not_finite, read_roll_out
-from benchmarks.external.roll_out_option import PLACE, FileConventions, RollOutFileError, RollOutOption
+from benchmarks.external.roll_out_files import (
+    PLACE,
+    FileConventions,
+    RollOutFileError,
+    RollOutOption,
+    first_not_finite,
+    read_roll_out,
+)
 from benchmarks.methods.outside.stored_roll_out import Stored
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import Plan

@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.meshes import cylinder_patch, icosphere, rectangle, torus
 from benchmarks.metrics.surface.curvature import boundary_mask, mean_curvature
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.convergence import fitted_order
+from benchmarks.validation.equilibrium import fitted_order
 
 SECOND_ORDER = known_answer(expected=2.0, tolerance=0.1, reason="mixed Voronoi areas are second order there")
 

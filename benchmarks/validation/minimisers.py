@@ -7,7 +7,7 @@ import numpy as np
 import reference_sim as sim
 from benchmarks.meshes import in_space, jittered_patch, lying, right_grid
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.convergence import demand_converged, fitted_order
+from benchmarks.validation.equilibrium import demand_converged, fitted_order
 from reference_sim import energies
 
 LBFGS_STEPS = 60

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metrics.energies.energy import energy_series
 from benchmarks.presets import find_preset

@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.assets.assets import embedded_motions
+from benchmarks.assets import embedded_motions
 from benchmarks.performance.microbenchmarks import dressed_body
 from benchmarks.timing import one_thread
 from snug.motion.library import TRAIN

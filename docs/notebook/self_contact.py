@@ -14,7 +14,7 @@ import time
 import ipctk
 import numpy as np
 
-from benchmarks.assets.assets import open_assets
+from benchmarks.assets import open_assets
 from benchmarks.methods.solvers.simulation import Simulation
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment

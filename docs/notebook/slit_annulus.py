@@ -12,9 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.validation.case import slow_paths_allowed
-from benchmarks.validation.shells.gaussian_curvature import GaussianCurvature
-from benchmarks.validation.shells.plates import plate_stiffness
-from benchmarks.validation.shells.slit_annulus import MATERIAL, SZE, D, annulus, lift
+from benchmarks.validation.large_bending import ANNULUS_MATERIAL, SZE, D, annulus, lift
+from benchmarks.validation.plates import GaussianCurvature, plate_stiffness
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.stretch_stvk import StretchStVK
@@ -25,8 +24,8 @@ EXACT = np.array(SZE)
 def measure(rows: int, *, zero: bool, family: str = "equilateral", bend: float = 1.0, stretch: float = 1.0):
     """Print the lifts: nu = 0 if `zero`, else that of hinges; factors on bending and membrane stiffness."""
     stiffness = bend * D / plate_stiffness(family, "length_area")[0]
-    young = stretch * MATERIAL.young_modulus
-    material = replace(MATERIAL, young_modulus=young, bending_stiffness=stiffness)
+    young = stretch * ANNULUS_MATERIAL.young_modulus
+    material = replace(ANNULUS_MATERIAL, young_modulus=young, bending_stiffness=stiffness)
     plate = annulus(rows, material, family)
     terms: list[Energy] = [StretchStVK(plate.cloth), BendHinge(plate.cloth)]
     if zero:

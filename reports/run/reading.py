@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.results import frame_energies
+from benchmarks.results import run_folder
 from benchmarks.results.protocol import one_protocol
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder, model_path
@@ -46,10 +46,10 @@ def read_run(folder: RunFolder) -> Run:
 
 
 def _read_frame_energies(path: Path) -> pd.DataFrame:
-    """Return the lines of frame_energies.csv, none without the file. Raises ResultsError."""
+    """Return the lines of run_folder.csv, none without the file. Raises ResultsError."""
     if not path.is_file():
         return pd.DataFrame()
-    columns, lines = frame_energies.read(path)
+    columns, lines = run_folder.read(path)
     return pd.DataFrame(lines, columns=columns)
 
 

@@ -21,7 +21,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import BatchCell, RunCell
 from benchmarks.runner.ground_truth import SettleStart
 from benchmarks.runner.task import Context
-from benchmarks.validation.dead_load import DeadLoad
+from benchmarks.validation.equilibrium import DeadLoad
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring
 from snug.file_options import GarmentFile

@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks.results import frame_energies
+from benchmarks.results import run_folder
 from benchmarks.results.protocol import NUMBER, OWN
 from benchmarks.results.row import COLUMNS, ResultsError, Row, with_provenance
 from benchmarks.results.run_folder import FORMAT, RunFolder
@@ -217,13 +217,13 @@ def test_energies_of_frames_that_are_broken_are_refused_by_line_and_column(tmp_p
     path = RunFolder(tmp_path).frame_energies_path
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(ResultsError, match=word) as refused:
-        frame_energies.read(path)
+        run_folder.read(path)
     assert str(path) in str(refused.value)
 
 
 def test_an_energy_that_a_scene_does_not_have_is_not_a_number(tmp_path):
     path = RunFolder(tmp_path).frame_energies_path
     path.write_text(HEAD + "kick,snug,2,0.1,,2.5\n")
-    columns, ((scene, method, seed, seconds, strain, total),) = frame_energies.read(path)
+    columns, ((scene, method, seed, seconds, strain, total),) = run_folder.read(path)
     assert (scene, method, seed, seconds, total) == ("kick", "snug", 2, 0.1, 2.5) and strain != strain
     assert columns[4:] == ["strain", "total"]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.declarations import DeclarationError
-from benchmarks.external.roll_out_option import FileConventions
+from benchmarks.external.roll_out_files import FileConventions
 from benchmarks.external.scene_files import facts_of, write_scene_files
 from benchmarks.method import MethodEntry, WorkerDied
 from benchmarks.methods.outside.stored_roll_out import Stored

@@ -8,8 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import first_not_finite, read_roll_out
-from benchmarks.external.roll_out_option import MODULE, FileConventions, RollOutFileError, RollOutOption
+from benchmarks.external.roll_out_files import (
+    MODULE,
+    FileConventions,
+    RollOutFileError,
+    RollOutOption,
+    first_not_finite,
+    read_roll_out,
+)
 from benchmarks.external.scene_fit import fit_to_scene
 from benchmarks.method import Method, MethodEntry
 from benchmarks.provenance import digest

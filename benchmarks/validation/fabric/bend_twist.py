@@ -28,18 +28,25 @@ from numpy.polynomial import legendre
 from scipy.linalg import eigh
 
 from benchmarks.meshes import ROW, in_space, rectangle
-from benchmarks.validation.convergence import demand_converged
-from benchmarks.validation.dead_load import DeadLoad
-from benchmarks.validation.shells.lateral_buckling import MATERIAL, ROWS, K, buckling_factor
-from benchmarks.validation.shells.plates import NU
+from benchmarks.validation.equilibrium import DeadLoad, demand_converged
+from benchmarks.validation.large_bending import (
+    BUCKLING_MATERIAL,
+    BUCKLING_ROWS,
+    BUCKLING_STIFFNESS,
+    buckling_factor,
+)
+from benchmarks.validation.plates import NU
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.minimise.minimisers import minimise
 from reference_sim.potential import Potential
 
-BENDING, TWIST = K / 4 * (1 - NU**2), K / 2 * (1 - NU)  # EI and GJ of a narrow strip, over its width [J]
-RIGID = replace(MATERIAL, young_modulus=100 * MATERIAL.young_modulus)  # on edge
+BENDING, TWIST = (
+    BUCKLING_STIFFNESS / 4 * (1 - NU**2),
+    BUCKLING_STIFFNESS / 2 * (1 - NU),
+)  # EI and GJ of a narrow strip, over its width [J]
+RIGID = replace(BUCKLING_MATERIAL, young_modulus=100 * BUCKLING_MATERIAL.young_modulus)  # on edge
 PUSH, RESOLVED = 0.02, 0.03  # out of the plane at the start, over the square of the distance; of a weight
 DEGREE, POINTS = 16, 60  # of the polynomials; of Gauss's quadrature
 
@@ -83,7 +90,7 @@ def hanging_arc(curvature: float) -> float:
 
     The free edges lack half a hinge, an error of first order in the cell: two meshes are extrapolated.
     """
-    cloths = (arc(rows, curvature, 0.02) for rows in ROWS)
+    cloths = (arc(rows, curvature, 0.02) for rows in BUCKLING_ROWS)
     coarse, fine = (buckling_factor(cloth, _weight(cloth, curvature)) for cloth in cloths)
     return 2 * fine - coarse
 
@@ -95,7 +102,7 @@ def leaves_plane(curvature: float) -> float:
 
     Raises RuntimeError where an arc does not come to rest.
     """
-    cloth = arc(ROWS[0], curvature, 0.04)
+    cloth = arc(BUCKLING_ROWS[0], curvature, 0.04)
     weight = _weight(cloth, curvature)
     weight *= buckling_factor(cloth, weight)
     start = cloth.rest_positions.copy()

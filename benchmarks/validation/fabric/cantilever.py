@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.fabrics.elastica import exact_elastica
 from benchmarks.fabrics.fabric import find_fabric
 from benchmarks.fabrics.strip import BENDING_LENGTH, OVERHANG, cantilever
-from benchmarks.validation.convergence import demand_converged
+from benchmarks.validation.equilibrium import demand_converged
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.integrate import solve_bvp
 
 from benchmarks.fabrics.strip import FAMILY, clamped_strip
-from benchmarks.validation.convergence import demand_converged
-from benchmarks.validation.shells.elastica import MATERIAL
+from benchmarks.validation.equilibrium import demand_converged
+from benchmarks.validation.large_bending import ELASTICA_MATERIAL
 from reference_sim.energies.bend_hinge import BendHinge, dihedral_angles
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK
@@ -69,17 +69,17 @@ def tip_distance(curvature: float, gamma: float) -> float:
 
 def _tip(curvature: float, gamma: float, columns: int) -> np.ndarray:
     """Return where the tip of the simulated strip comes to rest (3,), over the length."""
-    strip = clamped_strip(FAMILY, columns, 1.0, MATERIAL)
+    strip = clamped_strip(FAMILY, columns, 1.0, ELASTICA_MATERIAL)
     cloth, length = strip.cloth, strip.length
     flat = cloth.rest_positions
     angle = curvature / length * flat[:, 0]
     rolled = np.stack([1 - np.cos(angle), -np.sin(angle), flat[:, 2] * curvature / length], axis=1)
     bend = BendHinge(cloth, rest_angles=dihedral_angles(rolled, cloth.hinges))
-    acceleration = gamma * strip.stiffness / length**3 / MATERIAL.areal_density
+    acceleration = gamma * strip.stiffness / length**3 / ELASTICA_MATERIAL.areal_density
     potential = Potential([StretchStVK(cloth), bend, Gravity(cloth, acceleration=acceleration)])
     start = strip.hanging_along(*exact(curvature, gamma))
     start[cloth.free, 2] += PUSH * ((flat[cloth.free, 0] - strip.clamp) / length) ** 2
-    strength = (curvature**2 + gamma) * strip.stiffness / MATERIAL.areal_density / GRAVITY
+    strength = (curvature**2 + gamma) * strip.stiffness / ELASTICA_MATERIAL.areal_density / GRAVITY
     rest = demand_converged(minimise(potential, start, tolerance=1e-6 * strength), "the curled strip")
     tip = rest.positions[strip.tip].mean(axis=0) - flat[strip.tip].mean(axis=0) * [0, 0, 1]
     return tip / length

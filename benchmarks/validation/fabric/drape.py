@@ -9,8 +9,8 @@ import numpy as np
 
 from benchmarks.fabrics.disc import DRAPE, Disc, disc
 from benchmarks.fabrics.fabric import find_fabric, isotropic
-from benchmarks.validation.convergence import demand_converged
-from benchmarks.validation.shells.gaussian_curvature import GaussianCurvature
+from benchmarks.validation.equilibrium import demand_converged
+from benchmarks.validation.plates import GaussianCurvature
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity

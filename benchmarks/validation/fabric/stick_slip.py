@@ -21,9 +21,9 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
 from benchmarks.fabrics.strip import FAMILY, Strip, clamped_strip
-from benchmarks.validation.convergence import demand_converged
-from benchmarks.validation.motion.resting_sheet import box
-from benchmarks.validation.shells.elastica import MATERIAL
+from benchmarks.validation.contact import box
+from benchmarks.validation.equilibrium import demand_converged
+from benchmarks.validation.large_bending import ELASTICA_MATERIAL
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_friction import ContactFriction
 from reference_sim.energies.contact_penalty import ContactPenalty
@@ -103,7 +103,7 @@ class Pressed:
     """Strip of 1 m upright over a floor, in the plane z = 0."""
 
     def __init__(self) -> None:
-        self.strip: Strip = clamped_strip(FAMILY, COLUMNS, 1.0, MATERIAL)
+        self.strip: Strip = clamped_strip(FAMILY, COLUMNS, 1.0, ELASTICA_MATERIAL)
         self.energies = [StretchStVK(self.strip.cloth), BendHinge(self.strip.cloth)]
 
     def lowered(self, strain: float, mu: float, frames: int, step: float = 0.0) -> Trajectory:

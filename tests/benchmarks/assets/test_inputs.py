@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.assets.inputs import InputError, read_inputs
+from benchmarks.assets import InputError, read_inputs
 from benchmarks.plan.study import read_study
 from benchmarks.runner.execute_plan import check_roll_outs
 from benchmarks.score import plan_score

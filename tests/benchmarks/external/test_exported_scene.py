@@ -12,9 +12,8 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks import export, score
-from benchmarks.external.exported_scene import readme, write_scene
-from benchmarks.external.roll_out_option import FileConventions, RollOutOption
-from benchmarks.external.scene_files import facts_of, write_motion, write_obj
+from benchmarks.external.roll_out_files import FileConventions, RollOutOption
+from benchmarks.external.scene_files import facts_of, readme, write_motion, write_obj, write_scene
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.outside.stored_roll_out import entry_of

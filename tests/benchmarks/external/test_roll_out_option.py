@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.external.roll_out_option import (
+from benchmarks.external.roll_out_files import (
     FileConventions,
     RollOutFileError,
     RollOutOption,

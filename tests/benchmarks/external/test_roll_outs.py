@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from benchmarks.external import roll_out_files as files
-from benchmarks.external.roll_out_files import read_roll_out
-from benchmarks.external.roll_out_option import (
+from benchmarks.external.roll_out_files import (
     FileConventions,
     RollOutFileError,
     RollOutOption,
+    read_roll_out,
 )
 from benchmarks.external.scene_fit import MIRRORS, _check_sides
 from benchmarks.methods.catalogue.all_methods import find_method

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.assets.assets import open_assets
+from benchmarks.assets import open_assets
 from benchmarks.methods.networks.direct_optimisation import ClipInertia, DirectOptimisation
 from benchmarks.metrics.energies.energy import energy_series
 from benchmarks.presets import find_preset

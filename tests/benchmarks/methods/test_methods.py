@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks import timing
-from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.method import Method
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
@@ -18,7 +18,7 @@ from benchmarks.metrics.motion.dynamics import shares_quasi_static
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Cell
 from benchmarks.presets import find_preset
-from benchmarks.results import frame_energies
+from benchmarks.results import run_folder
 from benchmarks.results.protocol import LEAST_MEMBERS, is_member
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -301,8 +301,8 @@ def test_every_method_has_the_whole_protocol(tmp_path):
 def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks(run, rows, scenes, tmp_path):
     folder, scene = run[1].cache.folder, scenes[BODY]
     assert not folder.frame_energies_path.is_file()
-    frame_energies.write(folder, rows)
-    columns, lines = frame_energies.read(folder.frame_energies_path)
+    run_folder.write(folder, rows)
+    columns, lines = run_folder.read(folder.frame_energies_path)
     assert columns == ["scene", "method", "seed", "seconds", *scene.terms, "total"]
     kept = {entry.name for entry in FEWER_METHODS if entry.role in ("reference", "baseline", "network")}
     assert {line[1] for line in lines} == kept and {line[0] for line in lines} == {BODY}
@@ -317,7 +317,7 @@ def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks
                 means[method, f"energy/{term}"], rel=1e-4, abs=1e-9
             )
     other = dataclasses.replace(rows[0], suite="speed")
-    frame_energies.write(folder, [other])  # nothing takes part any more
+    run_folder.write(folder, [other])  # nothing takes part any more
     assert not folder.frame_energies_path.is_file()
 
 

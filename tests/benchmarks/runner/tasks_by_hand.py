@@ -9,7 +9,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import Assets
+from benchmarks.assets import Assets
 from benchmarks.methods.catalogue.trainings import TRAININGS
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder

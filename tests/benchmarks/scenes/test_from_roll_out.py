@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.external.roll_out_option import FileConventions, RollOutFileError, RollOutOption
+from benchmarks.external.roll_out_files import FileConventions, RollOutFileError, RollOutOption
 from benchmarks.external.scene_files import write_obj
 from benchmarks.scenes.from_roll_out import declared
 from tests.benchmarks.runner.tasks_by_hand import small_scene

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.presets import find_preset
 from benchmarks.scenes import SCENES, of_garment
 from reference_sim import Cloth, Material, Potential, minimise, simulate

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import Assets
+from benchmarks.assets import Assets
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 from reference_sim.time_loop import simulate

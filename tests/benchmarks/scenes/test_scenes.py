@@ -9,9 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import embedded_motions, open_assets
-from benchmarks.assets.inputs import read_inputs
-from benchmarks.assets.liveliest_part import joint_speeds, liveliest_part
+from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets, read_inputs
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metrics.surface import body_shape

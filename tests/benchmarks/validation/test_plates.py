@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import rectangle
-from benchmarks.validation.shells.gaussian_curvature import GaussianCurvature
-from benchmarks.validation.shells.plates import NU, hinges, patch_energy
-from benchmarks.validation.shells.slit_annulus import INNER, OUTER, annulus
+from benchmarks.validation.large_bending import INNER, OUTER, annulus
+from benchmarks.validation.plates import NU, GaussianCurvature, hinges, patch_energy
 from reference_sim.cloth import Cloth
 from reference_sim.geometry.topology import corner_angles
 from reference_sim.material import Material

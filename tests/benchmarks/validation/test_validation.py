@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.validation.case import Case, cases_of, known_answer
-from benchmarks.validation.convergence import fitted_order
-from benchmarks.validation.motion.time_step_orders import VISCOSITY, Viscosity, halving_order
+from benchmarks.validation.equilibrium import fitted_order
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
+from benchmarks.validation.time_steps import VISCOSITY, Viscosity, halving_order
 from reference_sim import Cloth, Material, Potential
 from reference_sim.energies import Step
 from tests.benchmarks.plan.planned import planned

@@ -22,8 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.external.roll_out_files import read_roll_out
-from benchmarks.external.roll_out_option import RollOutFileError
+from benchmarks.external.roll_out_files import RollOutFileError, read_roll_out
 from benchmarks.results.row import ResultsError, read_json
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.timing import peak_memory

@@ -8,7 +8,7 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 from reference_sim.geometry.closest_point import FaceSearch

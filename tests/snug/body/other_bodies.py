@@ -10,7 +10,7 @@ from typing import Any
 import igl
 import numpy as np
 
-from benchmarks.assets.assets import Assets, embedded_motions
+from benchmarks.assets import Assets, embedded_motions
 from benchmarks.scenes import of_garment
 from reference_sim import Trajectory, simulate
 from snug.body.parametric_body import Body

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import embedded_motions, open_assets
-from benchmarks.assets.inputs import read_inputs
+from benchmarks.assets import embedded_motions, open_assets, read_inputs
 from benchmarks.plan.make_plan import scenes_of_file
 from benchmarks.presets import find_preset
 from reference_sim.energies import BendHinge, StretchStVK

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.assets.assets import embedded_motions, open_assets
+from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.assets.assets import Assets
+from benchmarks.assets import Assets
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts, skinned
 from benchmarks.metrics.motion import long_roll_out as metric

@@ -1,4 +1,13 @@
-"""Order in dt of whole sheets: where backward Euler has its first order, and what it takes to see it.
+"""Known answers of time integration: few vertices that scipy solves, and the order of whole sheets in dt.
+
+Motions of so few vertices that scipy solves backward Euler, for comparison with the simulator.
+
+Pendulum: one triangle hangs by its base; by symmetry its third vertex stays half-way between the two pins,
+at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) G^2, G = ((r/h)^2 - 1)/2. So
+it is an elastic pendulum in a plane. Rotor: six triangles around a free vertex; every one is stretched by r/R
+alike, E = A 2 (lambda + mu) G^2 with the area A of all six.
+
+Order in dt of whole sheets: where backward Euler has its first order, and what it takes to see it.
 
 The membrane is held against its exact motion. Elsewhere there is none, and the order is that of the distance
 between the positions with dt and with dt/2: it is that of the distance to the limit, where there is a limit.
@@ -14,15 +23,133 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import sheet, square_sheet
+from benchmarks.meshes import random_rotation, sheet, square_sheet
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.convergence import demand_converged, fitted_order
-from benchmarks.validation.motion.discrete_laws import HANGING, stretched_membrane
-from benchmarks.validation.motion.round_bodies import RoundBody
+from benchmarks.validation.contact import RoundBody
+from benchmarks.validation.discrete_laws import HANGING, stretched_membrane
+from benchmarks.validation.equilibrium import demand_converged, fitted_order
 from reference_sim import energies
 
 if TYPE_CHECKING:
     from reference_sim.obstacle import Planes
+
+SOFT = sim.Material(young_modulus=7e3)
+HEIGHT, BASE = 0.5, 0.4  # [m] of the triangle
+RADIUS = 0.2  # [m] of the rotor
+MASS = SOFT.areal_density * HEIGHT * BASE / 2 / 3
+RIGIDITY = HEIGHT * BASE / 2 * (SOFT.lame_lambda / 2 + SOFT.lame_mu)  # [J] A (lambda/2 + mu)
+
+
+def _pull(r: float) -> float:
+    """Return dE/dr of the pendulum [N]."""
+    return RIGIDITY * ((r / HEIGHT) ** 2 - 1) * r / HEIGHT**2
+
+
+def _simulated_pendulum(
+    start: np.ndarray, dt: float, frames: int, *, gravity: float = sim.GRAVITY
+) -> np.ndarray:
+    """Return the path (frames, 2) [m] of the free vertex across the base, from `start` (2,), at rest."""
+    rest = np.array([[0.0, 0.0, -BASE / 2], [0.0, 0.0, BASE / 2], [HEIGHT, 0.0, 0.0]])
+    cloth = sim.Cloth(rest, np.array([[0, 1, 2]]), SOFT, pins=[0, 1])
+    x = rest.copy()
+    x[2, :2] = start
+    terms = [energies.StretchStVK(cloth), energies.Gravity(cloth, acceleration=gravity)]
+    trajectory = sim.simulate(cloth, terms, dt=dt, frames=frames, start=x, tolerance=1e-11)
+    return demand_converged(trajectory, "the simulation").positions[:, 2, :2]
+
+
+@known_answer(unit="m", expected=0.0, tolerance=1e-10, reason="scipy's tolerance, 1e-12 a step, summed twice")
+def pendulum() -> float:
+    """Return the largest distance of an elastic pendulum to its discrete steps solved by scipy, 60 steps."""
+    from scipy.optimize import fsolve
+
+    dt, start = 1 / 30, np.array([0.52, 0.1])
+
+    def balance(q, before, last):
+        r = np.hypot(*q)
+        return (q - 2 * last + before) / dt**2 + _pull(r) / MASS * q / r + [0.0, sim.GRAVITY]
+
+    path = [start, start]  # the one before the start: no velocity
+    for _ in range(60):
+        path.append(fsolve(balance, 2 * path[-1] - path[-2], (path[-2], path[-1]), xtol=1e-12))
+    simulated = _simulated_pendulum(start, dt, 61)
+    return float(np.linalg.norm(simulated - path[1:], axis=1).max())
+
+
+@known_answer(expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/480 s")
+def time_step_order() -> float:
+    """Return the order in dt of the pendulum's place after half a second; scipy integrates the reference."""
+    from scipy.integrate import solve_ivp
+
+    start, end = np.array([0.52, 0.1]), 0.5
+
+    def rate(_, state):
+        q, v = state[:2], state[2:]
+        r = np.hypot(*q)
+        return np.concatenate([v, -_pull(r) / MASS * q / r - [0.0, sim.GRAVITY]])
+
+    exact = solve_ivp(rate, (0, end), [*start, 0.0, 0.0], rtol=1e-10, atol=1e-12).y[:2, -1]
+    steps = (240, 480, 960)
+    ends = [_simulated_pendulum(start, end / n, n + 1)[-1] for n in steps]
+    return fitted_order([float(np.linalg.norm(at - exact)) for at in ends], [end / n for n in steps])
+
+
+@known_answer(
+    {"numerical_damping_10": {"frequency": 10.0}, "numerical_damping_20": {"frequency": 20.0}},
+    tolerance=1e-5, reason="amplitude 1e-5: what is not linear in it",
+)  # fmt: skip
+def numerical_damping(frequency: float) -> tuple[float, float]:
+    """Return the amplitude left after 1 s at 30 steps a second of a swing at `frequency` [rad/s], and exact.
+
+    Backward Euler multiplies x + i v/omega by 1/(1 + i omega dt) in each step. The pendulum of a fitting
+    length swings along itself, weightless, by a hundred thousandth.
+    """
+    dt, amplitude = 1 / 30, 1e-5 * HEIGHT
+    # omega^2 = 2 A (lambda/2 + mu)/(m h^2): made to fit by the step instead of the length.
+    natural = np.sqrt(2 * RIGIDITY / MASS) / HEIGHT
+    fitted_dt = dt * frequency / natural
+    path = _simulated_pendulum(np.array([HEIGHT + amplitude, 0.0]), fitted_dt, 31, gravity=0.0)[:, 0] - HEIGHT
+    velocity = np.diff(path)[-1] / fitted_dt
+    left = np.hypot(path[-1], velocity / natural) / amplitude
+    return float(left), float((1 + (frequency * dt) ** 2) ** -15)
+
+
+@known_answer(unit="m", expected=0.0, tolerance=1e-11, reason="round-off of 60 steps, summed twice")
+def rotor() -> float:
+    """Return the largest distance of a turning hexagon to its exact discrete steps, 60 steps.
+
+    The force is along z' itself, so z' (1 + dt^2 f(|z'|)) = 2 z - z_before: the direction is that of the
+    right side, and the radius the root of one equation.
+    """
+    from scipy.optimize import brentq
+
+    dt, spin = 1 / 30, 4.0
+    angle = np.arange(6) * np.pi / 3
+    ring = RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    flat = np.concatenate([[[0.0, 0.0]], ring])
+    turn = random_rotation(3)[:, :2]
+    faces = np.array([[0, 1 + i, 1 + (i + 1) % 6] for i in range(6)])
+    cloth = sim.Cloth(flat @ turn.T, faces, SOFT)
+    velocity = spin * np.stack([-flat[:, 1], flat[:, 0]], axis=1)
+    trajectory = sim.simulate(
+        cloth, [energies.StretchStVK(cloth)], dt=dt, frames=61, velocity=velocity @ turn.T, tolerance=1e-11
+    )
+    demand_converged(trajectory, "the simulation")
+    area = cloth.areas.sum()
+    rigidity = 2 * (SOFT.lame_lambda + SOFT.lame_mu) * area / 6  # for each vertex of the ring
+    mass = SOFT.areal_density * area / 9  # two thirds of a triangle
+
+    def too_long(r: float, straight: float) -> float:
+        return r + dt**2 / mass * rigidity * ((r / RADIUS) ** 2 - 1) * r / RADIUS**2 - straight
+
+    z = [complex(*ring[0]) - dt * spin * 1j * complex(*ring[0]), complex(*ring[0])]
+    for _ in range(60):
+        straight = 2 * z[-1] - z[-2]
+        r = brentq(too_long, 0.0, 10 * abs(straight), (abs(straight),), xtol=1e-15, rtol=1e-14)
+        z.append(r * straight / abs(straight))
+    exact = np.outer(np.real(z[1:]), turn[:, 0]) + np.outer(np.imag(z[1:]), turn[:, 1])
+    return float(np.linalg.norm(trajectory.positions[:, 1] - exact, axis=1).max())
+
 
 VISCOSITY = 0.25  # [N s/m] of an edge: waves faster than about 100 rad/s do not swing
 BALL = 0.1  # [m] radius

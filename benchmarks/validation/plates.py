@@ -1,4 +1,15 @@
-"""Hinges as a plate: the stiffness that they stand for on each family of triangles.
+"""Hinges as bending: folded strips, Gaussian curvature, plates.
+
+Gaussian curvature as an energy: the part of a plate's bending that Poisson's ratio decides.
+
+Kirchhoff's plate has the energy D/2 [tr(S)^2 - 2 (1 - nu) det(S)] per area, S the curvature tensor. So plates
+of one D that differ in nu differ by a multiple of the total curvature, the integral of K = det(S). On a mesh
+that is the sum of the angle defects of inner vertices (Descartes), and therefore a function of the border
+alone (Gauss and Bonnet):
+
+    sum of defects = 2 pi (inner vertices) - pi (faces) + sum of the face angles at border vertices
+
+Hinges as a plate: the stiffness that they stand for on each family of triangles.
 
 Kirchhoff's plate has the energy D/2 [(w_xx + w_yy)^2 - 2 (1 - nu) (w_xx w_yy - w_xy^2)]. Hinges are no such
 plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles, and on
@@ -20,17 +31,87 @@ Alternating diagonals are the same tiling turned by 45 degrees: 3/4 again, and 5
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import ROW, in_space, rectangle
+from benchmarks.meshes import ROW, in_space, random_rotation, rectangle, right_grid
 from benchmarks.validation.case import known_answer
 from reference_sim import energies
+from reference_sim.geometry.topology import boundary_loops, corner_angles
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
+    from torch import Tensor
+
+COLUMNS, ROWS, CELL, DEPTH = 6, 4, 0.1, 0.7
+
+
+@known_answer(
+    {
+        "hinges_folded_unscaled": {"scaling": "none", "fold": 0.3},
+        "hinges_folded_scaled": {"scaling": "length_area", "fold": -1.2},
+    },
+    expected=1.0, tolerance=1e-12, reason="round-off",
+)  # fmt: skip
+def folded(scaling: str, fold: float) -> float:
+    """Return the energy of a strip folded by `fold` [rad] at each column, over its closed form.
+
+    Each of (COLUMNS - 1) ROWS upright edges holds k/2 fold^2, times l^2/(4 (A1 + A2)) where scaled.
+    """
+    cloth, x = _folded(fold)
+    edges = (COLUMNS - 1) * ROWS
+    scale = _scale() if scaling == "length_area" else 1.0
+    exact = edges * scale * cloth.material.bending_stiffness / 2 * fold**2
+    return energies.BendHinge(cloth, scaling=scaling).value_and_gradient(x)[0] / exact
+
+
+@known_answer(expected=1.0, tolerance=1e-12, reason="round-off")
+def hinges_past_half_a_turn() -> float:
+    """Return the energy with rest angles of 3 rad and a fold of -3 rad: the short way is 2 pi - 6."""
+    cloth, x = _folded(-3.0)
+    upright = np.ptp(cloth.rest_positions[cloth.hinges[:, :2], 0], axis=1) < 1e-9
+    # The sign of a hinge's angle follows from its numbering; a fold of -3 is -3 or 3 there.
+    angles = np.where(upright, -_signs(cloth) * 3.0, 0.0)
+    bend = energies.BendHinge(cloth, rest_angles=angles)
+    exact = upright.sum() * _scale() * cloth.material.bending_stiffness / 2 * (2 * np.pi - 6) ** 2
+    return bend.value_and_gradient(x)[0] / exact
+
+
+@known_answer(
+    unit="N", expected=0.0, tolerance=1e-14, reason="round-off of angles times k over a cell of 0.1 m"
+)
+def hinges_rest_shape_force() -> float:
+    """Return the largest force in a strip whose rest angles are those of its folded shape, turned."""
+    cloth, x = _folded(0.8)
+    curved = sim.Cloth(x, cloth.faces, cloth.material)
+    bend = energies.BendHinge(curved, rest_angles="rest")
+    return float(np.abs(sim.Potential([bend]).gradient(x @ random_rotation(5).T)).max())
+
+
+def _scale() -> float:
+    """Return l^2 / (4 (A1 + A2)) of an upright edge."""
+    length = DEPTH / ROWS
+    return length**2 / (4 * CELL * length)
+
+
+def _folded(fold: float) -> tuple[sim.Cloth, np.ndarray]:
+    points, faces = right_grid(ROWS, COLUMNS, DEPTH, COLUMNS * CELL)
+    heading = fold * np.arange(COLUMNS)
+    steps = CELL * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    profile = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
+    column = np.rint(points[:, 0] / CELL).astype(int)
+    x = np.stack([profile[column, 0], points[:, 1], profile[column, 1]], axis=1)
+    return sim.Cloth(in_space(points), faces, sim.Material()), x @ random_rotation(4).T
+
+
+def _signs(cloth: sim.Cloth) -> np.ndarray:
+    """Return the sign of each hinge's angle where the strip is folded by a small negative angle, (H,)."""
+    from reference_sim.energies.bend_hinge import dihedral_angles
+
+    return np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))
+
 
 STIFFNESS = 1.0  # [J] k; every result is divided by it
 NU = -1 / 3  # Poisson's ratio of hinges on equilateral triangles
@@ -167,3 +248,43 @@ def _stiffness(points: np.ndarray, faces: np.ndarray, terms: Terms) -> tuple[sim
     cloth = sim.Cloth(in_space(points), faces, sim.Material(bending_stiffness=STIFFNESS))
     hessian = sim.Potential(list(terms(cloth))).hessian(cloth.rest_positions).tocsr()
     return cloth, hessian[2::3][:, 2::3]
+
+
+class GaussianCurvature(energies.Energy):
+    """Energy E = c (total curvature - that of the flat rest state), summed over the corners on the border.
+
+    Args:
+        cloth: the rest state; it has to be flat.
+        stiffness: c [J].
+    """
+
+    name = "gaussian_curvature"
+
+    def __init__(self, cloth: sim.Cloth, stiffness: float) -> None:
+        self.cloth = cloth
+        corners = np.stack([np.roll(cloth.faces, -k, axis=1) for k in range(3)], axis=1)  # tip, next, last
+        on_border = np.isin(cloth.faces, np.concatenate(boundary_loops(cloth.faces)))
+        self.stencils = corners[on_border]
+        self.stiffness = stiffness
+        self.rest_angles = corner_angles(cloth.rest_positions, cloth.faces)[on_border]
+
+    @classmethod
+    def without_poisson_effect(cls, cloth: sim.Cloth, D: float) -> GaussianCurvature:
+        """Return the term that makes a plate of nu = 0 of hinges on equilateral triangles, D [J] their C11.
+
+        The two energies differ by D (nu_0 - nu) det(S) per area, nu_0 = 0 and nu that of the hinges.
+        """
+        return cls(cloth, -NU * D)
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the stiffness [J]."""
+        return {"stiffness_J": self.stiffness}
+
+    def element_energy(self, u: Tensor) -> Tensor:
+        """Return E [J] of each corner: u (..., N, 3, 3) [m] -> (..., N)."""
+        import torch
+
+        a, b = u[..., 1, :] - u[..., 0, :], u[..., 2, :] - u[..., 0, :]
+        sine = torch.linalg.vector_norm(torch.linalg.cross(a, b), dim=-1)
+        angles = torch.atan2(sine, (a * b).sum(-1))
+        return self.stiffness * (angles - torch.as_tensor(self.rest_angles).to(u))

@@ -11,7 +11,7 @@ import reference_sim as sim
 from benchmarks.meshes import in_space, jittered_patch, right_grid
 from benchmarks.scene import Scene
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.convergence import demand_converged
+from benchmarks.validation.equilibrium import demand_converged
 from reference_sim import energies
 
 DT = 1.0 / 30.0

@@ -1,0 +1,264 @@
+"""Body, garments and motions of a run: a user's files, each read once, and what is made for the body.
+
+A user's own body, garment and motions: each file is read once, when a run is planned.
+
+The digests are those of the contents as read, so that no file is opened a second time to know it again.
+
+The liveliest part of a motion, for suite speed: whole motions would take hours.
+
+A clip is the run of frames in which the joints are fastest on average, and the frames before it that are
+simulated and not evaluated. It begins in the midst of the motion, with the cloth as it is there: simulated
+from the motion's own start, see benchmarks.scenes.dressed_body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.provenance import digest
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from benchmarks.presets import Preset
+    from snug.body.parametric_body import Body
+    from snug.file_options import GarmentFile, MotionFileOptions
+    from snug.garments.garment import Garment
+    from snug.motion.motion import Motion
+
+LIBRARY = "library"  # in place of a path: the embedded motions
+FEWEST_FRAMES = 3  # of a motion: inertia needs two before the one that is evaluated
+
+
+class InputError(ValueError):
+    """A user's file that cannot take part in a run; the message names file and remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class UserBody:
+    """A body of SMPL's family, and the file that it was read from."""
+
+    path: Path
+    body: Body
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the body as read."""
+        return digest(self.body)
+
+
+@dataclass(frozen=True, eq=False)
+class UserGarment:
+    """A garment on the body of the run, and the file that it was read from."""
+
+    file: GarmentFile
+    garment: Garment
+
+    @property
+    def name(self) -> str:
+        """Name of the garment, and first part of the names of its scenes."""
+        return self.file.name
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the garment as read: of its file, of the options, and of the body that wears it."""
+        return digest(self.garment)
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """All that a run takes from a user's files; without any, the package's body and garments.
+
+    motions: name -> motion at its full length.
+    """
+
+    body: UserBody | None = None
+    garment: UserGarment | None = None
+    motions: Mapping[str, Motion] = field(default_factory=dict)
+
+    @cached_property
+    def wearer(self) -> Body:
+        """The body that wears the garments: the user's, or the package's."""
+        if self.body is not None:
+            return self.body.body
+        from snug.body.parametric_body import Body  # not needed where a run has no dressed scene
+
+        return Body.load()
+
+
+def read_inputs(
+    body: Path | None = None,
+    garment: GarmentFile | None = None,
+    motions: Sequence[str] = (),
+    motion_options: MotionFileOptions | None = None,
+) -> Inputs:
+    """Read a user's files.
+
+    Args:
+        body: file of SMPL's family, .npz or .pkl; None: the package's body.
+        garment: mesh made for that body, and how to take it; None: garments are tailored.
+        motions: paths of files and folders; "library" is passed over.
+        motion_options: what the files of motions do not say.
+
+    Raises:
+        ValueError: one line with file and remedy: BodyError, GarmentError, MotionError, or InputError for a
+            motion that is too short or has the name of another.
+
+    >>> read_inputs().garment is None
+    True
+    """
+    worn = None if body is None else UserBody(body, _read_body(body))
+    inputs = Inputs(worn, motions=_read_motions(motions, motion_options))
+    if garment is None:
+        return inputs
+    from snug.garments.reading import read_garment  # it loads libraries of meshes
+
+    return Inputs(worn, UserGarment(garment, read_garment(garment, inputs.wearer)), inputs.motions)
+
+
+def _read_body(path: Path) -> Body:
+    from snug.body.smpl_files import read_body  # loads scipy
+
+    return read_body(path)
+
+
+def _read_motions(paths: Sequence[str], options: MotionFileOptions | None) -> dict[str, Motion]:
+    motions: dict[str, Motion] = {}
+    files = [path for path in paths if path != LIBRARY]
+    if not files:
+        return motions
+    from snug.motion.files import load_motions  # its readers are slow to load
+    from snug.motion.library import CLIPS
+    from snug.motion.library import LIBRARY as MADE
+
+    for path in files:
+        for motion in load_motions(path, options=options):
+            # A file of a recorded clip's name takes the clip's place.
+            if motion.name in motions or (motion.name in MADE and motion.name not in CLIPS):
+                raise InputError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
+            if motion.frames < FEWEST_FRAMES:
+                raise InputError(
+                    f"--motions {path}: {motion.frames} frames; at least {FEWEST_FRAMES} are needed"
+                )
+            motions[motion.name] = motion
+    return motions
+
+
+@dataclass(frozen=True)
+class Assets:
+    """A body, its garments and the motions, all by name; each as long as the preset lets it be.
+
+    clips: motion -> frames of its liveliest part. bodies: motion or clip -> posed body (T,B,3) [m], where
+    ready made.
+    """
+
+    body: Body
+    garments: dict[str, Garment]
+    motions: dict[str, Motion]
+    clips: dict[str, range]
+    bodies: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def named(self, names: Iterable[str]) -> list[Motion]:
+        """Return the motions of those names, in that order."""
+        return [self.motions[name] for name in names]
+
+    def motion(self, name: str, part: str) -> Motion:
+        """Return the whole motion of that name, or its clip, named "<motion>@clip"."""
+        whole = self.motions[name]
+        if part != "clip":
+            return whole
+        frames = self.clips[name]
+        return replace(whole.cut(frames.start, frames.stop), name=f"{name}@clip")
+
+    def before(self, name: str, part: str) -> Motion | None:
+        """Return the motion before that part; None where the part begins with the motion."""
+        start = self.clips[name].start if part == "clip" else 0
+        return self.motions[name].cut(0, start) if start else None
+
+    def only(self, motion: str) -> Assets:
+        """Return the assets with this motion alone: little to hand to another process."""
+        names = {motion} & self.motions.keys()
+        motions = {name: self.motions[name] for name in names}
+        return replace(self, motions=motions, clips={name: self.clips[name] for name in names}, bodies={})
+
+    def posed_body(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
+        """Return the body (T,B,3) [m] of that shape, or of the mean one, in that motion."""
+        ready = self.bodies.get(motion.name)
+        return self.body.vertices(motion.poses, motion.translations, betas) if ready is None else ready
+
+
+def open_assets(
+    preset: Preset,
+    motions: Iterable[Motion],
+    garments: Iterable[str],
+    *,
+    inputs: Inputs | None = None,
+    training: Collection[str] = (),
+) -> Assets:
+    """Tailor these garments and no others to the body, and cut motions to the preset's length.
+
+    Args:
+        preset: vertices of a garment, frames of a motion, of one that trains, and of a clip.
+        motions: at their full length.
+        garments: names of templates, or that of the user's garment, which is taken as read.
+        inputs: the user's body and garment; without them the package's body.
+        training: names of the motions that train.
+
+    Raises:
+        ValueError: a garment that cannot be tailored to this body.
+
+    >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
+    """
+    from snug.garments.templates import find_template
+
+    inputs = inputs or Inputs()
+    wearer, user_garment = inputs.wearer, inputs.garment
+    tailored = {
+        name: user_garment.garment
+        if user_garment and name == user_garment.name
+        else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
+        for name in garments
+    }
+    longest = {True: preset.train_frames, False: preset.frames}
+    whole = [motion.cut(0, longest[motion.name in training]) for motion in motions]
+    clips = {
+        motion.name: liveliest_part(wearer, motion, preset.clip_frames, preset.warm_up_frames)
+        for motion in whole
+    }
+    return Assets(wearer, tailored, {motion.name: motion for motion in whole}, clips)
+
+
+def embedded_motions(names: Iterable[str]) -> list[Motion]:
+    """Make motions of the embedded library.
+
+    >>> [motion.frames for motion in embedded_motions(["walk"])]
+    [120]
+    """
+    from snug.motion.library import make_motion
+
+    return [make_motion(name) for name in names]
+
+
+def liveliest_part(body: Body, motion: Motion, frames: int, warm_up: int = 0) -> range:
+    """Return the liveliest `frames` frames and `warm_up` before them; all of a motion too short."""
+    import numpy as np
+
+    speed = joint_speeds(body, motion)
+    sums = np.concatenate([[0.0], np.cumsum(speed)])
+    steps = min(frames - 1, len(speed))
+    before = min(warm_up, len(speed) - steps)
+    start = int(np.argmax((sums[steps:] - sums[: len(sums) - steps])[before:]))
+    return range(start, start + before + steps + 1)
+
+
+def joint_speeds(body: Body, motion: Motion) -> np.ndarray:
+    """Return the mean speed of the joints between two frames, (T - 1,) [m/s]."""
+    import numpy as np
+
+    transforms = body.transforms(motion.poses, motion.translations)
+    joints = np.einsum("tjab,jb->tja", transforms[..., :3], body.joints()) + transforms[..., 3]
+    return motion.fps * np.linalg.norm(np.diff(joints, axis=0), axis=2).mean(1)

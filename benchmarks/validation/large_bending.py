@@ -1,0 +1,400 @@
+"""Large bending with a known answer: elastica, catenary, lateral buckling, slit annulus.
+
+Large bending: a clamped strip against Euler's elastica, which scipy integrates.
+
+Hinges stand for a plate stiffness D that depends on the mesh (see plates.py). So D, and where the clamp acts,
+are calibrated once per mesh from small deflections (see benchmarks.fabrics.strip), and what is judged is the
+shape at large ones.
+
+Equilibria with an exact curve: a hanging strip and the elastic catenary, both with lambda = 0.
+
+Then a strip is a string of force N = E2 s (s^2 - 1)/2 per width at stretch s, and a strip of 1 m under its
+weight w = rho_a g per area follows from the force at each of its points, integrated here by scipy.
+
+Lateral buckling: a strip on edge, clamped at one end, gives way sideways under a load or its own weight.
+
+P = 4.0126 (EI GJ)^0.5 / L^2 at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread
+evenly over the length (Timoshenko and Gere, Theory of Elastic Stability), the limit of narrow strips of the
+test of Romero et al. 2021. On equilateral triangles the hinges are an
+isotropic plate (see plates.py) with D = k/4 and nu = -1/3, so for a narrow strip of width b
+EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
+
+Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line load.
+
+E = 21 MPa, nu = 0, thickness 0.03 m, radii 6 and 10 m, 0.8 N/m on the free lip. Shells of the literature
+lift its inner corner by 13.891 m and the outer by 17.528 m.
+
+The mesh is made of equilateral triangles, where hinges are a plate of one D (see plates.py), mapped to the
+annulus by exp, which is conformal: they stay equilateral. Such a plate has nu = -1/3, so its D is C11 = k/4,
+and the energy of Gaussian curvature makes it one of nu = 0 (see gaussian_curvature.py). Without that term the
+limit is another plate, which the load lifts less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import reference_sim as sim
+from benchmarks.meshes import ROW, in_space, lying, rectangle, right_grid
+from benchmarks.validation.case import known_answer
+from benchmarks.validation.equilibrium import DeadLoad, demand_converged, fitted_order
+from benchmarks.validation.plates import NU, GaussianCurvature
+from reference_sim import energies
+
+if TYPE_CHECKING:
+    from benchmarks.fabrics.strip import Strip
+
+ELASTICA_STIFFNESS = 1e-3  # [J] hinge stiffness
+# 330 N/m: at Gamma = 1000 the strip weighs 0.9 N per metre of width, and stretches by 0.3 %.
+ELASTICA_MATERIAL = sim.Material(young_modulus=700e3, poisson_ratio=0.0, bending_stiffness=ELASTICA_STIFFNESS)
+COLUMNS = 120
+SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
+
+
+@cache
+def strip(family: str, columns: int) -> Strip:
+    """Return a strip of 1 m, clamped at x = 0."""
+    from benchmarks.fabrics.strip import clamped_strip
+
+    return clamped_strip(family, columns, 1.0, ELASTICA_MATERIAL)
+
+
+def bent_strip(
+    family: str, weight: float, load: float, columns: int = COLUMNS
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the chord of the strip and of the elastica, (width, height) each, over the length."""
+    from benchmarks.fabrics.elastica import exact_elastica
+
+    made = strip(family, columns)
+    cloth, length = made.cloth, made.length
+    acceleration = weight * made.stiffness / length**3 / ELASTICA_MATERIAL.areal_density
+    terms: list[energies.Energy] = [energies.StretchStVK(cloth), energies.BendHinge(cloth)]
+    if weight:
+        terms.append(energies.Gravity(cloth, acceleration=acceleration))
+    if load:
+        forces = np.zeros_like(cloth.rest_positions)
+        share = cloth.vertex_areas[made.tip] / cloth.vertex_areas[made.tip].sum()
+        forces[made.tip, 1] = -load * made.stiffness / length**2 * made.width * share
+        terms.append(DeadLoad(cloth, forces))
+    s, (x, drop) = exact_elastica(weight, load)
+    rest = cloth.rest_positions
+    guess = rest.copy()  # on the elastica: near the answer, not it
+    free = rest[:, 0] > made.cell
+    guess[free, 0] = np.interp(rest[free, 0], s, x)
+    guess[free, 1] = -np.interp(rest[free, 0], s, drop)
+    strength = (weight + load) * made.stiffness / ELASTICA_MATERIAL.areal_density / 9.81
+    result = sim.minimise(sim.Potential(terms), guess, tolerance=1e-6 * strength)
+    demand_converged(result, f"the strip of {family} triangles")
+    return made.chord(result.positions) / length, np.array([x[-1], drop[-1]])
+
+
+def slenderness(gamma: float, columns: int) -> float:
+    """Return height over width of the chord at that Gamma, over the elastica's, on `columns` cells."""
+    from benchmarks.fabrics.strip import FAMILY
+
+    ours, exact = bent_strip(FAMILY, gamma, 0.0, columns)
+    return float((ours[1] / ours[0]) / (exact[1] / exact[0]))
+
+
+@known_answer(
+    {
+        "end_loaded_cantilever_1": {"load": 1.0},
+        "end_loaded_cantilever_3": {"load": 3.0},
+        "end_loaded_cantilever_10": {"load": 10.0},
+        "heavy_elastica_10": {"weight": 10.0},
+    },
+    smoke=False, expected=0.0, tolerance=3e-3, reason="120 cells, their error halves with the cell",
+)  # fmt: skip
+@known_answer(
+    {"heavy_elastica_100": {"weight": 100.0}, "heavy_elastica_1000": {"weight": 1000.0}},
+    smoke=False, expected=0.0, tolerance=6e-3, reason="120 cells, their error halves with the cell",
+)  # fmt: skip
+@known_answer(
+    {"heavy_elastica_1": {"weight": 1.0}},
+    smoke=False, expected=0.0, tolerance=1e-4, reason="120 cells, their error halves with the cell",
+)  # fmt: skip
+def tip_distance(weight: float = 0.0, load: float = 0.0) -> float:
+    """Return the distance of a cantilever's tip to the elastica, over its length, worst of the families.
+
+    It bends under a weight, Gamma, or under a force at the end. Where all diagonals lean one way, as in
+    family "right", which is left out, the strip twists and is no elastica.
+    """
+    bent = (bent_strip(family, weight, load) for family in SYMMETRIC)
+    return max(float(np.linalg.norm(ours - exact)) for ours, exact in bent)
+
+
+E2 = 32.965  # [N/m] membrane modulus
+HANGING_THICKNESS = 0.47e-3
+HANGING_MATERIAL = sim.Material(
+    young_modulus=E2 / HANGING_THICKNESS, poisson_ratio=0.0, thickness=HANGING_THICKNESS
+)
+WEIGHT = HANGING_MATERIAL.areal_density * sim.GRAVITY  # [N/m^2]
+SPAN = 0.8  # [m] between the ends of the catenary
+HANGING_ROWS = (12, 24, 48)
+
+
+def string_stretch(force: float) -> float:
+    """Return s with E2 s (s^2 - 1)/2 = force [N/m]."""
+    from scipy.optimize import brentq
+
+    return brentq(lambda s: E2 * s * (s * s - 1) / 2 - force, 1.0, 3.0, xtol=1e-15)
+
+
+def exact_tip() -> float:
+    """Return the length [m] of the strip of 1 m hanging by one end."""
+    from scipy.integrate import quad
+
+    return quad(lambda hanging: string_stretch(WEIGHT * hanging), 0, 1, epsabs=1e-13)[0]
+
+
+@known_answer(unit="m", tolerance=2e-6, reason="second order in 1/24 of the length")
+def hanging_strip_tip() -> tuple[float, float]:
+    """Return the distance of the free end of a 1 m strip from the hung one, measured and exact."""
+    return _hanging(HANGING_ROWS[1]), exact_tip()
+
+
+@known_answer(expected=2.0, tolerance=0.2, reason="12, 24 and 48 cells are few")
+def hanging_strip_order() -> float:
+    """Return the order in h of the tip of a hanging strip."""
+    exact = exact_tip()
+    return fitted_order(
+        [abs(_hanging(rows) - exact) for rows in HANGING_ROWS], [1 / rows for rows in HANGING_ROWS]
+    )
+
+
+def _hanging(rows: int) -> float:
+    points, faces = right_grid(rows, 4, 1.0, 4.0 / rows)
+    points[:, 1] -= 1.0  # the top edge at y = 0
+    cloth = sim.Cloth(in_space(points), faces, HANGING_MATERIAL, pins=np.flatnonzero(points[:, 1] > -1e-9))
+    x = _at_rest(cloth, cloth.rest_positions * [1.0, 1.02, 1.0])[1]
+    return float(-x[points[:, 1] < -1 + 1e-9, 1].mean())
+
+
+def exact_catenary() -> dict[str, float]:
+    """Return the horizontal "force" per width on an end [N/m] and the "sag" [m] of the elastic catenary.
+
+    X is measured from the lowest point.
+    """
+    from scipy.integrate import quad
+    from scipy.optimize import brentq
+
+    def over_half(force: float, vertical: bool) -> float:
+        def share(X: float) -> float:
+            N = float(np.hypot(force, WEIGHT * X))
+            return string_stretch(N) * (WEIGHT * X if vertical else force) / N
+
+        return quad(share, 0, 0.5, epsabs=1e-13)[0]
+
+    force = brentq(lambda H: 2 * over_half(H, False) - SPAN, 0.01, 10.0, xtol=1e-14)
+    return {"force": force, "sag": over_half(force, True)}
+
+
+@known_answer(["catenary_force"], unit="N/m", tolerance=2e-4, reason="second order in 1/48 of the length")
+@known_answer(["catenary_sag"], unit="m", tolerance=1e-4, reason="second order in 1/48 of the length")
+@cache
+def catenary() -> dict[str, tuple[float, float]]:
+    """Return the horizontal force per width, or the sag, of an elastic catenary, 1 m over a span of 0.8 m."""
+    measured, exact = _catenary(HANGING_ROWS[-1]), exact_catenary()
+    return {f"catenary_{name}": (measured[name], exact[name]) for name in exact}
+
+
+@known_answer(expected=2.0, tolerance=0.1, reason="12, 24 and 48 cells are few")
+def catenary_order() -> float:
+    """Return the order in h of the sag of an elastic catenary."""
+    exact = exact_catenary()["sag"]
+    return fitted_order(
+        [abs(_catenary(rows)["sag"] - exact) for rows in HANGING_ROWS], [1 / rows for rows in HANGING_ROWS]
+    )
+
+
+def _catenary(columns: int) -> dict[str, float]:
+    width = 2.0 / columns
+    points, faces = right_grid(2, columns, width, 1.0)
+    rest = lying(points)
+    ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9))
+    cloth = sim.Cloth(rest, faces[:, ::-1], HANGING_MATERIAL, pins=ends)
+    start = rest * [SPAN, 1.0, 1.0] - [0.5 * SPAN, 0.0, 0.0]
+    start[:, 1] = -0.28 * (1 - (2 * start[:, 0] / SPAN) ** 2)  # near the answer, not it
+    potential, x = _at_rest(cloth, start)
+    left = points[:, 0] < 1e-9
+    middle = np.abs(points[:, 0] - 0.5) < 1e-9
+    force = -potential.gradient(x)[left, 0].sum() / width
+    return {"force": float(force), "sag": float(-x[middle, 1].mean())}
+
+
+def _at_rest(cloth: sim.Cloth, start: np.ndarray) -> tuple[sim.Potential, np.ndarray]:
+    potential = sim.Potential([energies.StretchStVK(cloth), energies.Gravity(cloth)])
+    return potential, demand_converged(sim.minimise(potential, start, tolerance=1e-9), "the strip").positions
+
+
+BUCKLING_STIFFNESS = (
+    1e-5  # [J] hinge stiffness: so small that the strip hardly sags in its own plane before it buckles
+)
+BUCKLING_MATERIAL = sim.Material(poisson_ratio=0.3, bending_stiffness=BUCKLING_STIFFNESS)
+CRITICAL = {"end": 4.0126, "weight": 12.85}  # total load, over (EI GJ)^0.5 / L^2
+BUCKLING_ROWS = (4, 8)
+
+
+@known_answer(
+    {"lateral_buckling": {}}, expected=1.0, tolerance=0.03, smoke=False,
+    reason="the clamp holds back warping over a width, 4 % of the length",
+)  # fmt: skip
+def critical_load(where: str = "end", slender: float = 0.04) -> float:
+    """Return the load at which a strip on edge buckles sideways, over the closed form.
+
+    Args:
+        where: the load acts, "end" or "weight".
+        slender: width over length.
+
+    The free edges lack half a hinge, an error of first order in the cell: two meshes are extrapolated.
+    """
+    coarse, fine = (_ratio(rows, where, slender) for rows in BUCKLING_ROWS)
+    return 2 * fine - coarse
+
+
+def _ratio(rows: int, where: str, slender: float) -> float:
+    columns = round(rows * ROW / slender)
+    h = 1 / (columns - 0.5)  # the clamp lies half-way between the two pinned columns
+    width = rows * h * ROW
+    points, faces = rectangle("equilateral", columns, rows, columns * h, width)
+    points -= [h / 2, width / 2]
+    cloth = sim.Cloth(
+        in_space(points), faces, BUCKLING_MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h)
+    )
+    D, nu = BUCKLING_STIFFNESS / 4, NU
+    exact = CRITICAL[where] * width * D * np.sqrt((1 - nu**2) * 2 * (1 - nu))
+    forces = np.zeros((len(points), 3))
+    if where == "weight":
+        forces[:, 1] = -exact * cloth.vertex_areas / width
+    else:
+        tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
+        share = 1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2  # shear of a beam: least at the free edges
+        forces[tip, 1] = -exact * share / share.sum()
+    return buckling_factor(cloth, forces)
+
+
+def buckling_factor(cloth: sim.Cloth, forces: np.ndarray) -> float:
+    """Return the factor on dead loads (V, 3) [N] at which a flat sheet in the plane z = 0 gives way sideways.
+
+    Raises RuntimeError where the sheet in its plane does not converge.
+    """
+    import scipy.sparse as sp
+    import scipy.sparse.linalg as spla
+
+    strain, stiff = energies.StretchStVK(cloth), energies.BendHinge(cloth)
+    stiff.stiffness = 1e5 * stiff.stiffness  # keeps the loaded strip in its plane, where hinges do no work
+    in_plane = sim.Potential([strain, stiff, DeadLoad(cloth, forces)])
+    flat = demand_converged(
+        sim.minimise(in_plane, cloth.rest_positions, tolerance=1e-9), "the strip in its plane"
+    )
+    free = np.flatnonzero(cloth.free)
+
+    def out_of_plane(potential: sim.Potential, x: np.ndarray) -> sp.csc_matrix:
+        return sp.csc_matrix(potential.hessian(x)[2::3][:, 2::3][free][:, free])
+
+    bending = out_of_plane(sim.Potential([energies.BendHinge(cloth)]), cloth.rest_positions)
+    stress = out_of_plane(sim.Potential([strain]), flat.positions)
+    # (bending + factor stress) w = 0: 1/factor is the largest eigenvalue of -stress against bending.
+    start = np.ones(len(free))
+    values = spla.eigsh(-stress, k=1, M=bending, which="LA", v0=start, return_eigenvectors=False)
+    return 1 / float(values[0])
+
+
+INNER, OUTER, LOAD = 6.0, 10.0, 0.8
+SZE = (13.891, 17.528)  # [m] lifts of the inner and the outer corner
+YOUNG = 21e6
+ANNULUS_THICKNESS = 0.03
+D = YOUNG * ANNULUS_THICKNESS**3 / 12  # [J] of the plate, nu = 0
+C11 = 1 / 4  # of scaled hinges on equilateral triangles, over k
+ANNULUS_ROWS = (8, 16)  # of triangles between the radii
+STAGES = 12
+ANNULUS_MATERIAL = sim.Material(
+    young_modulus=YOUNG,
+    poisson_ratio=0.0,
+    thickness=ANNULUS_THICKNESS,
+    density=1.0,
+    bending_stiffness=D / C11,
+)
+
+
+@known_answer(
+    {
+        "slit_annulus_inner_hinges_alone": {"which": "inner", "poisson_ratio": "hinges"},
+        "slit_annulus_outer_hinges_alone": {"which": "outer", "poisson_ratio": "hinges"},
+    },
+    unit="m", smoke=False, long=True, reason="reported: the price of nu = -1/3",
+)  # fmt: skip
+@known_answer(
+    {"slit_annulus_inner": {"which": "inner"}, "slit_annulus_outer": {"which": "outer"}},
+    unit="m", tolerance=0.08, smoke=False, long=True,
+    reason="half of what 3 % of bending stiffness changes; the limit of three meshes is 0.04 m off",
+)  # fmt: skip
+def corner(which: str, poisson_ratio: str = "zero") -> tuple[float, float]:
+    """Return the lift of the free lip's corner in the limit of fine meshes, and that of shells.
+
+    Edges on the border have no hinge, an error of first order in the cell: two meshes are extrapolated.
+
+    Args:
+        which: "inner" or "outer".
+        poisson_ratio: "zero", or "hinges" for that of the hinges alone, -1/3.
+    """
+    coarse, fine = (lifted(rows, poisson_ratio) for rows in ANNULUS_ROWS)
+    place = ("inner", "outer").index(which)
+    return float((2 * fine - coarse)[place]), SZE[place]
+
+
+@cache
+def lifted(rows: int, poisson_ratio: str = "zero") -> np.ndarray:
+    """Return the lifts [m] of the inner and the outer corner, with so many rows of triangles."""
+    plate = annulus(rows)
+    terms: list[energies.Energy] = [energies.StretchStVK(plate.cloth), energies.BendHinge(plate.cloth)]
+    if poisson_ratio == "zero":
+        terms.append(GaussianCurvature.without_poisson_effect(plate.cloth, D))
+    return lift(plate, terms)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """Flat annulus, clamped at one lip: angle from the clamp (V,) [rad] and radius (V,) [m]."""
+
+    cloth: sim.Cloth
+    turn: np.ndarray
+    radius: np.ndarray
+
+
+def annulus(rows: int, material: sim.Material = ANNULUS_MATERIAL, family: str = "equilateral") -> Plate:
+    """Return the plate with so many rows of triangles of a family, see meshes.FAMILIES."""
+    width = np.log(OUTER / INNER)
+    columns = round(2 * np.pi / width * rows * (ROW if family == "equilateral" else 1.0))
+    flat, faces = rectangle(family, columns, rows, 2 * np.pi, width)
+    h = 2 * np.pi / (columns - 0.5)
+    turn = flat[:, 0] * columns / (columns - 0.5) - h / 2  # the clamp: half-way between two pinned columns
+    radius = INNER * np.exp(flat[:, 1])
+    rest = np.stack([radius * np.cos(turn), 0.0 * turn, -radius * np.sin(turn)], axis=1)
+    return Plate(sim.Cloth(rest, faces, material, pins=np.flatnonzero(turn < 0.6 * h)), turn, radius)
+
+
+def lift(plate: Plate, terms: Sequence[energies.Energy]) -> np.ndarray:
+    """Return the lifts [m] of the free lip's inner and outer corner under the whole load.
+
+    Raises RuntimeError where a stage of the load does not converge.
+    """
+    cloth, turn, radius = plate.cloth, plate.turn, plate.radius
+    lip = np.flatnonzero(turn > 2 * np.pi - 1e-6)
+    lip = lip[np.argsort(radius[lip])]
+    share = np.gradient(radius[lip])
+    share[[0, -1]] /= 2
+    forces = np.zeros_like(cloth.rest_positions)
+    x = cloth.rest_positions.copy()
+    x[:, 1] = 1e-3 * turn**2
+    x[cloth.pins] = cloth.rest_positions[cloth.pins]
+    for stage in range(1, STAGES + 1):
+        forces[lip, 1] = LOAD * share * (stage / STAGES) ** 2
+        result = sim.minimise(sim.Potential([*terms, DeadLoad(cloth, forces)]), x, tolerance=1e-4)
+        x = demand_converged(result, f"the plate at stage {stage}").positions
+    return x[lip[[0, -1]], 1]

@@ -1,0 +1,372 @@
+"""Strain and stress of St. Venant and Kirchhoff in the arrays of scikit-fem, for forms of the known answers.
+
+    G = (F^T F - 1) / 2,   S = lambda tr(G) 1 + 2 mu G
+
+F is (d, 2, ...), the gradient of the positions; G and S are (2, 2, ...). No code is shared with the energies
+of the simulator, which the forms check.
+
+A square sheet pulled between two clamps, against quadratic triangles of scikit-fem.
+
+The clamps hold the width, so the sheet necks: no closed form, but a smooth reference. Both are held in their
+plane, here by a large hinge stiffness (flat hinges do no work), there by having two coordinates.
+
+A membrane under the forces that make a chosen smooth surface its equilibrium.
+
+    x(X, Y) = (1.15 X + 0.04 sin pi X sin pi Y, 1.1 Y + 0.05 X Y (1 - Y), 0.15 sin pi X sin pi Y)
+
+The forces are those of the weak form, f_a = int P(grad x) grad phi_a, by quadrature of order 8 in scikit-fem,
+and the border is held on the surface; what the mesh then makes of it may differ by the error of linear
+triangles alone: h^2 in the mean square, h in the gradient.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+import reference_sim as sim
+from benchmarks.meshes import in_space, jittered_patch, random_rotation
+from benchmarks.validation.case import known_answer
+from benchmarks.validation.equilibrium import DeadLoad, demand_converged, fitted_order
+from reference_sim import energies
+
+IDENTITY = np.eye(2)[:, :, None, None]
+
+
+def strain(F: np.ndarray) -> np.ndarray:
+    """Return Green's strain G."""
+    return 0.5 * (np.einsum("ia...,ib...->ab...", F, F) - IDENTITY)
+
+
+def change_of_strain(F: np.ndarray, dF: np.ndarray) -> np.ndarray:
+    """Return the change of G where F changes by dF, to first order."""
+    half = np.einsum("ia...,ib...->ab...", F, dF)
+    return 0.5 * (half + half.swapaxes(0, 1))
+
+
+def stress(G: np.ndarray, material: sim.Material) -> np.ndarray:
+    """Return the second Piola-Kirchhoff stress S [N/m] of a strain, or its change of a change of strain."""
+    return material.lame_lambda * (G[0, 0] + G[1, 1]) * IDENTITY + 2 * material.lame_mu * G
+
+
+def virtual_work(F: np.ndarray, S: np.ndarray, dF: np.ndarray) -> np.ndarray:
+    """Return the work of S where F changes by dF."""
+    return np.einsum("ia...,ab...,ib...->...", F, S, dF)
+
+
+STRETCH, SHEAR = 1.3, 0.4
+
+
+@known_answer(
+    {
+        f"membrane_{state.replace(' ', '_')}": {"state": state}
+        for state in ("uniaxial strain", "uniaxial stress", "equibiaxial", "simple shear", "collapse")
+    },
+    expected=1.0, tolerance=1e-12, reason="round-off of some hundred triangles",
+)  # fmt: skip
+def closed_form(state: str) -> float:
+    """Return the energy of a homogeneous state of a rotated, unstructured patch over its closed form.
+
+    With G = (s^2 - 1)/2, per unit area: uniaxial strain (lam/2 + mu) G^2; uniaxial stress E2 G^2/2 at
+    lateral stretch^2 1 - nu2 (s^2 - 1); equibiaxial 2 (lam + mu) G^2; simple shear g
+    lam g^4/8 + mu (g^2/2 + g^4/4); collapse to a point (lam + mu)/2.
+    """
+    cloth, points = _turned_patch()
+    deformation, exact = _states()[state]
+    x = in_space(points @ deformation.T) @ random_rotation(2).T + [0.3, -2.0, 1.0]
+    return energies.StretchStVK(cloth).value_and_gradient(x)[0] / exact  # the patch has unit area
+
+
+def _turned_patch() -> tuple[sim.Cloth, np.ndarray]:
+    points, faces = jittered_patch(8)
+    return sim.Cloth(in_space(points) @ random_rotation(1).T, faces, sim.Material()), points
+
+
+def _states() -> dict[str, tuple[np.ndarray, float]]:
+    """Return deformation (2,2) and energy per area [J/m^2] of each state, by name."""
+    material = sim.Material()
+    lam, mu = material.lame_lambda, material.lame_mu
+    s, g = STRETCH, SHEAR
+    G = (s**2 - 1) / 2
+    E2, nu2 = 4 * mu * (lam + mu) / (lam + 2 * mu), lam / (lam + 2 * mu)
+    lateral = np.sqrt(1 - nu2 * (s**2 - 1))
+    return {
+        "uniaxial strain": (np.diag([s, 1.0]), (lam / 2 + mu) * G**2),
+        "uniaxial stress": (np.diag([s, lateral]), E2 * G**2 / 2),
+        "equibiaxial": (np.diag([s, s]), 2 * (lam + mu) * G**2),
+        "simple shear": (np.array([[1.0, g], [0.0, 1.0]]), lam * g**4 / 8 + mu * (g**2 / 2 + g**4 / 4)),
+        "collapse": (np.zeros((2, 2)), (lam + mu) / 2),
+    }
+
+
+@known_answer(unit="N", tolerance=1e-11, reason="round-off of a sum of ten forces of 1 N")
+def membrane_pull() -> tuple[float, float]:
+    """Return the force on an end of unit width in uniaxial stress, and its closed form s E2 G.
+
+    Raises RuntimeError if anything pulls across.
+    """
+    cloth, points = _turned_patch()
+    deformation, _ = _states()["uniaxial stress"]
+    turn = random_rotation(2)
+    force = (
+        energies.StretchStVK(cloth).value_and_gradient(in_space(points @ deformation.T) @ turn.T)[1] @ turn
+    )
+    if np.abs(force[:, 1:]).max() > 1e-11:
+        raise RuntimeError(f"{np.abs(force[:, 1:]).max():.3g} N act across the pull")
+    exact = STRETCH * sim.Material().membrane_modulus * (STRETCH**2 - 1) / 2
+    return float(force[points[:, 0] > 1 - 1e-9, 0].sum()), exact
+
+
+@known_answer(
+    {"constant_bending_stiffness": {"name": "bending_stiffness", "printed": 3.96e-5}},
+    unit="J", tolerance=5.1e-8, reason="three printed digits",
+)  # fmt: skip
+@known_answer(
+    {
+        "constant_lame_lambda": {"name": "lame_lambda", "printed": 20.9},
+        "constant_lame_mu": {"name": "lame_mu", "printed": 11.1},
+    },
+    unit="N/m", tolerance=0.051, reason="three printed digits",
+)  # fmt: skip
+def constant(name: str, printed: float) -> tuple[float, float]:
+    """Return the constant of the default cotton, and what the paper prints."""
+    return float(getattr(sim.Material(), name)), printed
+
+
+@known_answer(unit="N", expected=426.0 * 0.47e-3 * 9.81, tolerance=1e-12, reason="round-off")
+def weight_of_a_square_metre() -> float:
+    """Return the weight of a square metre of cotton: 426 kg/m^3 times 0.47 mm times 9.81 m/s^2."""
+    cloth, _ = _turned_patch()
+    return float(energies.Gravity(cloth).value_and_gradient(cloth.rest_positions)[1][:, 1].sum())
+
+
+@known_answer(
+    ["membrane_energy_scikit_fem", "membrane_gradient_scikit_fem", "membrane_hessian_scikit_fem"],
+    expected=0.0, tolerance=1e-12, reason="round-off of two assemblies of the same sums",
+)  # fmt: skip
+@cache
+def scikit_fem() -> dict[str, float]:
+    """Return the relative difference to scikit-fem's energy, gradient and Hessian, in a random 3D state."""
+    import skfem
+
+    material = sim.Material()
+    points, faces = jittered_patch(12)
+    x = in_space(points) @ random_rotation(4).T
+    x += np.random.default_rng(5).normal(0, 0.03, x.shape)
+
+    mesh = skfem.MeshTri(points.T.copy(), faces.T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1(), 3), intorder=2)
+    order = basis.nodal_dofs.T.ravel()
+    state = np.zeros(basis.N)
+    state[order] = x.ravel()
+
+    @skfem.Functional
+    def energy(w):
+        G = strain(w["x"].grad)
+        return 0.5 * np.einsum("ab...,ab...->...", G, stress(G, material))
+
+    @skfem.LinearForm
+    def gradient(v, w):
+        F = w["x"].grad
+        return virtual_work(F, stress(strain(F), material), v.grad)
+
+    @skfem.BilinearForm
+    def hessian(u, v, w):
+        F = w["x"].grad
+        change_of_stress = stress(change_of_strain(F, u.grad), material)
+        return virtual_work(u.grad, stress(strain(F), material), v.grad) + virtual_work(
+            F, change_of_stress, v.grad
+        )
+
+    field = basis.interpolate(state)
+    theirs = (
+        float(energy.assemble(basis, x=field)),
+        gradient.assemble(basis, x=field)[order],
+        hessian.assemble(basis, x=field).tocsr()[order][:, order],
+    )
+    ours = sim.Potential([energies.StretchStVK(sim.Cloth(in_space(points), faces, material))])
+    matrix = ours.hessian(x)
+    slope = ours.gradient(x).ravel()
+    return {
+        "membrane_energy_scikit_fem": abs(ours.value(x) / theirs[0] - 1),
+        "membrane_gradient_scikit_fem": float(np.linalg.norm(slope - theirs[1]) / np.linalg.norm(theirs[1])),
+        "membrane_hessian_scikit_fem": float(
+            np.sqrt(((matrix - theirs[2]).power(2)).sum() / theirs[2].power(2).sum())
+        ),
+    }
+
+
+@known_answer(
+    unit="N", expected=0.0, tolerance=1e-11, reason="round-off of a membrane of 33 N/m moved by 4 m"
+)
+def rigid_motion_force() -> float:
+    """Return the largest force in a flat patch after a rigid motion, hinges on."""
+    potential, x = _moved_patch()
+    return float(np.abs(potential.gradient(x)).max())
+
+
+@known_answer(expected=0.0, tolerance=1e-11, reason="round-off of positions some metres from the origin")
+def rigid_invariance() -> float:
+    """Return the relative change of the forces on a disordered patch under a rigid motion."""
+    potential, x = _moved_patch()
+    x = x + np.random.default_rng(6).normal(0, 0.03, x.shape)
+    turn = random_rotation(9)
+    before, after = potential.gradient(x), potential.gradient(x @ turn.T + [0.5, -1.0, 2.0])
+    return float(np.linalg.norm(after @ turn - before) / np.linalg.norm(before))
+
+
+@known_answer(expected=6.0, tolerance=0.0, reason="three translations and three rotations, no other")
+def rigid_zero_modes() -> float:
+    """Return the number of zero eigenvalues of the Hessian of a flat patch, under 1e-9 of the largest."""
+    potential, x = _moved_patch()
+    values = np.linalg.eigvalsh(potential.hessian(x).toarray())
+    return float((np.abs(values) < 1e-9 * values[-1]).sum())
+
+
+def _moved_patch() -> tuple[sim.Potential, np.ndarray]:
+    points, faces = jittered_patch(5)
+    rest = in_space(points)
+    cloth = sim.Cloth(rest, faces, sim.Material())
+    potential = sim.Potential([energies.StretchStVK(cloth), energies.BendHinge(cloth)])
+    return potential, rest @ random_rotation(7).T + [1.0, 2.0, 3.0]
+
+
+CLAMPED_STRETCH = 1.2
+CLAMPED_MATERIAL = sim.Material(poisson_ratio=0.3, bending_stiffness=1.0)
+CLAMPED_CELLS = 32
+GOLD_CELLS = 24
+
+
+SINGULAR = "32 cells beside the singular corners of the clamps"
+
+
+@known_answer(["clamped_stretch_neck"], unit="m", tolerance=3e-4, smoke=False, reason=SINGULAR)
+@known_answer(["clamped_stretch_force"], unit="N", tolerance=0.01, smoke=False, reason=SINGULAR)
+@cache
+def clamped_stretch() -> dict[str, tuple[float, float]]:
+    """Return the force on a clamp, or the width of the neck half-way, ours and of P2 by scikit-fem."""
+    ours, gold = _ours(), _gold()
+    return {f"clamped_stretch_{name}": (ours[name], gold[name]) for name in gold}
+
+
+def _ours() -> dict[str, float]:
+    points, faces = jittered_patch(CLAMPED_CELLS)
+    clamps = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
+    cloth = sim.Cloth(in_space(points), faces, CLAMPED_MATERIAL, pins=np.flatnonzero(clamps))
+    potential = sim.Potential([energies.StretchStVK(cloth), energies.BendHinge(cloth)])
+    stretched = cloth.rest_positions * [CLAMPED_STRETCH, 1.0, 1.0]
+    result = demand_converged(sim.minimise(potential, stretched, tolerance=1e-9), "the sheet")
+    pull = potential.gradient(result.positions)[points[:, 0] > 1 - 1e-9, 0].sum()
+    middle = (np.abs(points[:, 0] - 0.5) < 1e-9) & (np.abs(points[:, 1] - 0.5) > 0.5 - 1e-9)
+    return {"force": float(pull), "neck": float(np.ptp(result.positions[middle, 1]))}
+
+
+def _gold() -> dict[str, float]:
+    import skfem
+
+    # Graded towards the corners of the clamps, where the stress is singular.
+    line = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, GOLD_CELLS + 1))
+    mesh = skfem.MeshTri.init_tensor(line, line)
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP2()), intorder=5)
+
+    @skfem.LinearForm
+    def residual(v, w):
+        F = w["position"].grad
+        return virtual_work(F, stress(strain(F), CLAMPED_MATERIAL), v.grad)
+
+    @skfem.BilinearForm
+    def tangent(u, v, w):
+        F = w["position"].grad
+        change_of_stress = stress(change_of_strain(F, u.grad), CLAMPED_MATERIAL)
+        return virtual_work(u.grad, stress(strain(F), CLAMPED_MATERIAL), v.grad) + virtual_work(
+            F, change_of_stress, v.grad
+        )
+
+    x = basis.project(lambda X: np.stack([CLAMPED_STRETCH * X[0], X[1]]))
+    left = basis.get_dofs(lambda X: np.isclose(X[0], 0)).all()
+    right = basis.get_dofs(lambda X: np.isclose(X[0], 1)).all()
+    held = np.concatenate([left, right])
+    for _ in range(20):
+        field = basis.interpolate(x)
+        r = residual.assemble(basis, position=field)
+        step = skfem.solve(*skfem.condense(tangent.assemble(basis, position=field), -r, D=held))
+        x = x + step
+        if np.abs(step).max() < 1e-12:
+            break
+    else:
+        raise RuntimeError("the reference did not converge")
+    r = residual.assemble(basis, position=basis.interpolate(x))
+    pulled = basis.get_dofs(lambda X: np.isclose(X[0], 1)).all(["u^1"])
+    middle = np.flatnonzero(np.abs(mesh.p[0] - 0.5) < 1e-9)
+    heights = x[basis.nodal_dofs[1, middle]]
+    return {"force": float(r[pulled].sum()), "neck": float(np.ptp(heights))}
+
+
+MANUFACTURED_CELLS = (8, 16, 32)
+
+
+def surface(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """Return x (3, ...) [m] of material points."""
+    bump = np.sin(np.pi * X) * np.sin(np.pi * Y)
+    return np.stack([1.15 * X + 0.04 * bump, 1.1 * Y + 0.05 * X * Y * (1 - Y), 0.15 * bump])
+
+
+def gradient(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """Return F = dx/dX (3, 2, ...)."""
+    along = np.pi * np.cos(np.pi * X) * np.sin(np.pi * Y)
+    across = np.pi * np.sin(np.pi * X) * np.cos(np.pi * Y)
+    zero = np.zeros_like(X)
+    return np.stack(
+        [
+            np.stack([1.15 + 0.04 * along, 0.04 * across]),
+            np.stack([zero + 0.05 * Y * (1 - Y), 1.1 + 0.05 * X * (1 - 2 * Y)]),
+            np.stack([0.15 * along, 0.15 * across]),
+        ]
+    )
+
+
+LINEAR = "linear triangles; random meshes scatter the slope"
+
+
+@known_answer(["manufactured_gradient_order"], expected=1.0, tolerance=0.1, reason=LINEAR)
+@known_answer(["manufactured_order"], expected=2.0, tolerance=0.2, reason=LINEAR)
+@cache
+def orders() -> dict[str, float]:
+    """Return the order in h of the error of positions or of the deformation gradient, in the mean square."""
+    errors = [_errors(cells) for cells in MANUFACTURED_CELLS]
+    sizes = [1 / cells for cells in MANUFACTURED_CELLS]
+    return {name: fitted_order([e[name] for e in errors], sizes) for name in errors[0]}
+
+
+def _errors(cells: int) -> dict[str, float]:
+    import skfem
+
+    material = sim.Material()
+    points, faces = jittered_patch(cells)
+    mesh = skfem.MeshTri(points.T.copy(), faces.T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1(), 3), intorder=8)
+    numbers = basis.nodal_dofs.T
+
+    @skfem.LinearForm
+    def forces(v, w):
+        F = gradient(*w.x)
+        return virtual_work(F, stress(strain(F), material), v.grad)
+
+    @skfem.Functional
+    def position_error(w):
+        return ((w["field"] - surface(*w.x)) ** 2).sum(axis=0)
+
+    @skfem.Functional
+    def gradient_error(w):
+        return ((w["field"].grad - gradient(*w.x)) ** 2).sum(axis=(0, 1))
+
+    border = (np.abs(points - 0.5) > 0.5 - 1e-9).any(axis=1)
+    cloth = sim.Cloth(in_space(points), faces, material, pins=np.flatnonzero(border))
+    potential = sim.Potential([energies.StretchStVK(cloth), DeadLoad(cloth, forces.assemble(basis)[numbers])])
+    result = demand_converged(sim.minimise(potential, surface(*points.T).T), "the membrane")
+    state = np.zeros(basis.N)
+    state[numbers.ravel()] = result.positions.ravel()
+    field = basis.interpolate(state)
+    forms = {"manufactured_order": position_error, "manufactured_gradient_order": gradient_error}
+    return {name: float(np.sqrt(form.assemble(basis, field=field))) for name, form in forms.items()}

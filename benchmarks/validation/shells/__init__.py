@@ -1,1 +1,0 @@
-"""Known answers of membrane and hinges: closed forms, scikit-fem, plates, large bending."""
