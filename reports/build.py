@@ -50,12 +50,12 @@ def build_report(run_dir: str | Path) -> Built:
     # Heavy: not needed for --help.
     from reports.blocks import FIGURES
     from reports.blocks.block import Report
-    from reports.document.typeset import write_pdf
     from reports.figures.figure import draw_figures, remove_figures
     from reports.page.write_page import write_page
+    from reports.pdf import write_pdf
     from reports.run.reading import read_run_with_trainings
     from reports.tables import make_tables, write_tables
-    from reports.text.answer import answer
+    from reports.text.text_table import answer
 
     folder = RunFolder(run_dir)
     run = read_run_with_trainings(folder)

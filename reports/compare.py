@@ -10,8 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
-from reports.comparison.change import BETTER, FAILING, GONE, OTHER, TIME_TOLERANCE, WORSE
-from reports.comparison.compare_runs import Comparison, compare
+from reports.comparison import BETTER, FAILING, GONE, OTHER, TIME_TOLERANCE, WORSE, Comparison, compare
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
 

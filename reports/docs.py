@@ -21,11 +21,11 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
     Raises:
         ValueError: for a part of no known form or without an end; names the document.
     """
-    from reports.entries.page import ENTRIES, PAGE, page_of
-    from reports.statistics.published import DEFAULT, PUBLISHED, read_published
-    from reports.text.generated_parts import fill  # loads pandas
+    from reports.entries import ENTRIES, PAGE, page_of
+    from reports.statistics.outcomes import DEFAULT, PUBLISHED, read_published
     from reports.text.published_parts import (
         LIBRARY_FILES,
+        fill,  # loads pandas
         library_file,
         published_part,
     )

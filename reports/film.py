@@ -16,11 +16,11 @@ from scipy.ndimage import uniform_filter1d
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder, replacing
-from reports.pictures.render import camera_axes
+from reports.rendering import camera_axes
 
 if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
-    from reports.run.selected_roll_outs import SelectedRollOuts
+    from reports.run.reading import SelectedRollOuts
 
 EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.mp4
@@ -262,7 +262,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise ValueError("--speed is 0.01 to 10, --width 64 to 2000")
     demand_possible(path)
     demand_writable_folder(path.parent)
-    from reports.run.selected_roll_outs import select_roll_outs
+    from reports.run.reading import select_roll_outs
 
     selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
     if path.suffix == ".pc2":

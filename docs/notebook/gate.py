@@ -15,8 +15,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
-from reports.comparison.change import FAILING, Change
-from reports.comparison.compare_runs import compare
+from reports.comparison import FAILING, Change, compare
 from reports.run.finished_run import Run
 from reports.run.reading import read_run
 

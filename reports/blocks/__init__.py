@@ -6,23 +6,14 @@ A new figure is a function in a file of its own and a line here.
 """
 
 from reports.blocks.block import Block, Heading, SentenceBlock, TableBlock
-from reports.blocks.page_one_sentences import headline
 from reports.blocks.printed_tables import failed_checks, not_converged, with_labels
-from reports.blocks.what_went_wrong import unread_files, worst
-from reports.figures.break_even import break_even
-from reports.figures.dots import dots
-from reports.figures.energy_series import energy_series
-from reports.figures.error_against_time import error_of_page_one, errors_of_scene, errors_of_scenes
+from reports.blocks.sentences import headline, unread_files, worst
+from reports.figures.costs import break_even, error_of_page_one, errors_of_scene, errors_of_scenes
 from reports.figures.fabric.textile_errors import textile_errors
 from reports.figures.figure import Figure
-from reports.figures.hem import hem
-from reports.figures.known_answers import known_answers
-from reports.figures.training_curves import training_curves
-from reports.pictures.colour_maps import colour_maps
-from reports.pictures.failures import failures
-from reports.pictures.lead_row import lead_row
-from reports.pictures.side_by_side import side_by_side
-from reports.pictures.strip import strip
+from reports.figures.over_time import energy_series, hem, training_curves
+from reports.figures.values import dots, known_answers
+from reports.pictures import colour_maps, failures, lead_row, side_by_side, strip
 
 BLOCKS: tuple[Block, ...] = (
     SentenceBlock(headline),

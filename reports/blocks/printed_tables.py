@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import replace
 
 from reports.run.finished_run import Run
-from reports.tables.outcomes import merged
+from reports.tables.findings import merged
 from reports.tables.table import Cell, Table
 
 LETTERS = 90  # of a sentence in a cell

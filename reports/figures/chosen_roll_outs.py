@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from reference_sim.trajectory import Trajectory
-from reports.figures.method_styles import leading
+from reports.figures.plotting import leading
 from reports.run.finished_run import Run, shown_seeds
-from reports.run.roll_outs import STEP
-from reports.statistics.page_one_methods import leads
+from reports.run.stored_files import STEP
+from reports.statistics.outcomes import leads
 from reports.statistics.pareto import compared_cells
 
 INERTIA = "energy/inertia"

@@ -1,4 +1,4 @@
-"""Writing of report.html: data and roll-outs of a run in the template, one file that asks for no other."""
+"""Data of the page besides roll-outs: methods, plots, sentences and tables, as plain values."""
 
 from __future__ import annotations
 
@@ -6,18 +6,143 @@ import base64
 import hashlib
 import html
 import json
+import math
 import string
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
-from reports.blocks.block import Report
-from reports.page.embedded_roll_outs import Embedded, embed
-from reports.page.packed_arrays import deflated
-from reports.page.page_data import methods_of, plots_of, sentences_of, tables_of, unfinished_cells
-from reports.page.roll_out_choice import BUDGET, RULE
+from reports.blocks import BLOCKS
+from reports.blocks.block import Report, SentenceBlock, TableBlock
+from reports.blocks.sentences import endings
+from reports.figures.plotting import style
+from reports.page.embedded_roll_outs import BUDGET, RULE, Embedded, deflated, embed
+from reports.run.finished_run import Run
+from reports.statistics.effects import Effect
+from reports.statistics.means_and_spreads import Mean, value_of
+from reports.statistics.outcomes import BAD
+from reports.statistics.pareto import ERRORS, error_points, indistinct, run_time, time_label
+from reports.tables.findings import merged
+from reports.tables.table import Cell, Column, Table, column_texts, remarks_below
+
+
+def methods_of(run: Run) -> dict[str, dict[str, Any]]:
+    """Return method -> label, role, colour, and the family of those that differ by one number."""
+    return {
+        name: {
+            "label": method.label, "role": method.role, "colour": style(run, name).colour,
+            "family": method.family if method.level is not None else "", "level": method.level,
+        }
+        for name, method in run.methods.items()
+    }  # fmt: skip
+
+
+def plots_of(run: Run) -> dict[str, dict[str, Any]]:
+    """Return scene -> the points of its plots of error against run time, where there are two or more."""
+    cells = run.cells("speed", "garments")
+    plots = {}
+    for scene, rows in cells.groupby("scene", sort=False):
+        panels = {name: panel for name in ERRORS if (panel := _panel(run, rows, name))}
+        if panels:
+            time = run_time(rows)
+            plots[str(scene)] = {
+                "time": time_label(time),
+                "reference": value_of(rows, run.reference, time),
+                "panels": panels,
+            }
+    return plots
+
+
+def _panel(run: Run, rows: pd.DataFrame, metric: str) -> dict[str, Any] | None:
+    points = [] if metric not in run.metrics else error_points(run, rows, metric)
+    if len(points) < 2:
+        return None
+    return {
+        "title": run.metrics[metric].heading, "definition": run.metrics[metric].definition,
+        "band": indistinct(run, rows, metric),
+        "points": [[p.method, p.time, p.error, p.time_spread, p.error_spread] for p in points],
+    }  # fmt: skip
+
+
+def tables_of(report: Report) -> list[dict[str, Any]]:
+    """Return the tables of the report blocks, then all others with a caption; cells as texts that sort.
+
+    A table without a caption is a file to plot from, and too long for a page.
+    """
+    first = [block.name for block in BLOCKS if isinstance(block, TableBlock)]
+    names = dict.fromkeys((*first, *report.tables))
+    tables = [report.tables[name] for name in names if name in report.tables]
+    return [table_data(report.run, table) for table in tables if table.caption]
+
+
+def sentences_of(report: Report) -> list[tuple[str, str]]:
+    """Return (topic, sentence) of the report blocks."""
+    blocks = [block for block in BLOCKS if isinstance(block, SentenceBlock) and not block.small]
+    return [pair for block in blocks for pair in block.make(report.run)]
+
+
+def table_data(run: Run, table: Table) -> dict[str, Any]:
+    """Return a table as the page's script shows it; the run declares its metrics and methods."""
+    printed = [_printed(table, reference) for reference in table.references]
+    texts = [
+        column_texts(run, column, [row[place] for row in table.rows], [row[place] for row in printed])
+        for place, column in enumerate(table.columns)
+    ]
+    lines = [list(line) for line in zip(*texts)]
+    rows = [[_cell(text, cell) for text, cell in zip(line, row)] for line, row in zip(lines, table.rows)]
+    return {
+        "name": table.name, "caption": table.caption or table.name, "note": remarks_below(table, lines),
+        "columns": [_column(run, column) for column in table.columns], "rows": rows,
+        "printed": [[text["text"] for text in line] for line in lines[len(rows) :]],
+    }  # fmt: skip
+
+
+def _printed(table: Table, reference: tuple[str, dict[str, str]]) -> list[str]:
+    """Return a row of the paper's values: its label stands in the last column of texts."""
+    label, values = reference
+    texts = [column.name for column in table.columns if column.text]
+    return [label if column.name == texts[-1] else values.get(column.name, "") for column in table.columns]
+
+
+def _column(run: Run, column: Column) -> dict[str, Any]:
+    metric = run.metrics.get(column.name)
+    definition = metric.definition if metric else ""
+    better = metric.lower_is_better if metric else None
+    if better is not None:
+        definition += f"; {'lower' if better else 'higher'} is better"
+    return {"title": column.title, "unit": column.unit_above, "words": column.text, "definition": definition}
+
+
+def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
+    """Return a text that sorts by itself, or a number as [text, value, spread, mark]."""
+    value = cell.shown if isinstance(cell, Effect) else cell.value if isinstance(cell, Mean) else cell
+    if isinstance(value, str):
+        return text["text"]
+    number = None if value is None or math.isnan(value) else max(min(float(value), 1e300), -1e300)
+    # The last digits of a mean differ between processors; a page that is kept must not.
+    return [text["text"], None if number is None else float(f"{number:.12g}"), text["spread"], text["mark"]]
+
+
+def unfinished_cells(report: Report) -> tuple[str, bool, list[str]]:
+    """Say what did not run to its end: the counts of page one, whether anything went wrong, and each cell."""
+    if "unfinished" not in report.tables:
+        return "", False, []
+    table = merged(report.tables["unfinished"], ("suite", "scene"))
+    names = [column.name for column in table.columns]
+    cells = [{name: str(cell) for name, cell in zip(names, row)} for row in table.rows]
+    cells.sort(key=lambda cell: (*BAD, "skipped").index(cell["status"]))
+    lines = [
+        f"{cell['status']}: {report.run.label(cell['method'])}, seed {cell['seed']}, {cell['scene']}: "
+        f"{cell['reason']}"
+        for cell in cells
+    ]
+    wrong = cells[0]["status"] not in ("stalled", "skipped")
+    return f"Not every number could be had. {endings(report.run)}".strip(), wrong, lines
+
 
 HERE = Path(__file__).parent
 SCRIPTS = ("data", "draw", "view", "plots", "tables", "share", "page")  # in this order

@@ -12,8 +12,7 @@ import pandas as pd
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import is_member
 from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row
-from reports.run.roll_outs import RollOuts
-from reports.run.training_histories import History
+from reports.run.stored_files import History, RollOuts
 
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster
 SUITES = ("garments", "speed", "validation", "extremes", "shapes")  # that have tables of their own

@@ -18,6 +18,10 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from benchmarks.metric import Metric
+from benchmarks.results.protocol import LEAST_MEMBERS
+from reports.run.finished_run import Run
+
 
 @dataclass(frozen=True)
 class Mean:
@@ -185,3 +189,81 @@ def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean |
     asked = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
     first, second = (replace(m, asked=asked * (m.asked // len(both))) for m in (first, second))
     return first, second
+
+
+# Metric -> its value where a roll-out equals the reference.
+AT_REFERENCE = {
+    "distance/rms": 0.0, "curvature/error": 0.0, "curvature/histogram": 0.0, "dynamics/amplitude": 1.0,
+    "dynamics/correlation": 1.0,
+}  # fmt: skip
+
+
+def ensemble_spread(run: Run, rows: pd.DataFrame, metric: str) -> pd.Series:
+    """Return scene -> root mean square error against the reference over the members of its ensemble.
+
+    Of members that converged; scenes with fewer than LEAST_MEMBERS of these are left out.
+    """
+    kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["status"] == "ok")]
+    members = kept[kept["method"].isin(run.reference_ensemble)]
+    squares = (members["value"] - AT_REFERENCE.get(metric, 0.0)) ** 2
+    of_scene = squares.groupby(members["scene"], observed=True)
+    return of_scene.mean()[of_scene.size() >= LEAST_MEMBERS] ** 0.5
+
+
+def in_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
+    """Return how many spreads of the reference's ensemble a method is away from the reference.
+
+    In each scene the spread is `ensemble_spread`, and the method's error the root mean square over its seeds.
+    The result is the mean error of the scenes over their mean spread; None where no scene has a spread.
+    """
+    kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["method"] == method)]
+    squares = (kept["value"] - AT_REFERENCE[metric]) ** 2
+    spread = ensemble_spread(run, rows, metric)
+    error = squares.groupby(kept["scene"], observed=True).mean() ** 0.5
+    both = spread.index.intersection(error.index)
+    total = float(spread[both].sum())
+    return float(error[both].sum()) / total if total > 0.0 else None
+
+
+HALF = 50.0  # [%]
+FRAME = ["scene", "seed", "seconds"]
+
+
+def share_of_frames(term: str) -> Metric:
+    """Declare the metric of the rows that `with_shares` adds."""
+    title = f"Frames with more {term}"
+    return Metric(name=f"frames/{term}", unit="%", title=title, definition="", lower_is_better=True)
+
+
+def half_of(mean: Mean) -> Mean:
+    """Return the mean that a share of frames is compared with: half of the frames of each roll-out."""
+    return replace(mean, value=HALF, cells=dict.fromkeys(mean.cells, HALF), seeded=False)
+
+
+def with_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str) -> pd.DataFrame:
+    """Return the rows and, for either method, the share of frames in which it has more energy [%].
+
+    Args:
+        rows: of the run.
+        frames: energies of evaluated frames, as Run.frame_energies.
+        term: of the energy, as "strain".
+        one: a method.
+        other: a second method; they are compared in each scene and seed that both have.
+    """
+    if frames.empty or term not in frames:
+        return rows
+    first, second = (frames[frames["method"] == name].dropna(subset=term) for name in (one, other))
+    both = first.merge(second, on=FRAME, suffixes=("", "_other"))
+    above = {one: both[term] > both[f"{term}_other"], other: both[term] < both[f"{term}_other"]}
+    parts = [rows]
+    for method, more in above.items():
+        shares = (100.0 * more).groupby([both["scene"], both["seed"]]).mean().rename("share").reset_index()
+        known = rows[(rows["method"] == method) & (rows["metric"] == f"energy/{term}") & rows["usable"]]
+        shared = known.merge(shares, on=["scene", "seed"])
+        metric = share_of_frames(term)
+        shared = shared.assign(
+            metric=metric.name, unit=metric.unit, value=shared["share"], uncertainty=float("nan"),
+            moved=[()] * len(shared),
+        )  # fmt: skip
+        parts.append(shared[rows.columns])
+    return pd.concat(parts, ignore_index=True)

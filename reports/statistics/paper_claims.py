@@ -18,8 +18,7 @@ from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import BEFORE_FRAMES
 from reports.run.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect, recording_of
-from reports.statistics.frame_shares import HALF, half_of, share_of_frames, with_shares
-from reports.statistics.means_and_spreads import pair
+from reports.statistics.means_and_spreads import HALF, half_of, pair, share_of_frames, with_shares
 from reports.statistics.verdicts import (
     LESS,
     MORE,

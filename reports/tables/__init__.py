@@ -9,25 +9,25 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from reports.run.finished_run import Run
-from reports.tables.ablations import ablation_effects, ablations
-from reports.tables.body_shapes import shapes
+from reports.tables.costs import crossings, error_rivals, reference_uncertainty, trainings
 from reports.tables.fabric.textile_tests import (
     fabric_bands,
     fabric_drape,
     fabric_order,
 )
 from reports.tables.findings import (
+    endings,
     errors_in_spreads,
+    extremes,
     findings,
+    paper_table_1,
     relative_excess,
+    unfinished,
+    validation,
 )
-from reports.tables.outcomes import endings, extremes, unfinished, validation
 from reports.tables.page_one_table import overview
-from reports.tables.paper_values import paper_table_1
-from reports.tables.pivot import metric_tables
-from reports.tables.speed import crossings, error_rivals, reference_uncertainty
+from reports.tables.pivots import ablation_effects, ablations, metric_tables, shapes
 from reports.tables.table import Table
-from reports.tables.trainings import trainings
 
 TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     metric_tables,

@@ -1,14 +1,22 @@
-"""Tables of what was found: the paper's claims, relative excess, errors in spreads of the reference."""
+"""Tables of what was found: the paper's claims, relative excess, outcomes, what did not end well."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pandas as pd
+
 from benchmarks.metric import Metric
 from reports.run.finished_run import Run
+from reports.statistics.effects import recording_of
+from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
+from reports.statistics.outcomes import BAD, check_name, checks, counted, stress_tests, tolerances_away
 from reports.statistics.paper_claims import judged
 from reports.statistics.relative_excess import SKINNING, Excess, excess_of, with_relative_excess
-from reports.statistics.spreads import AT_REFERENCE, in_spreads
 from reports.statistics.verdicts import measure_of, standing, untested
-from reports.tables.table import GARMENT, METHOD, Cell, Column, Table, table
+from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, table
 
 CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero "
@@ -122,3 +130,153 @@ def errors_in_spreads(run: Run) -> list[Table]:
         "valid simulation."
     )
     return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))
+
+
+REASON = Column("reason", "Reason", text=True)
+
+
+def validation(run: Run) -> list[Table]:
+    """List the checks: measured against expected; one without a tolerance is reported, not judged.
+
+    A row that is ok outside its tolerance is of a program under test, which violates what is expected.
+    """
+    lines = [
+        (
+            check_name(run, row),
+            row.unit,
+            row.value,
+            row.expected,
+            row.tolerance,
+            tolerances_away(row),
+            _result(row),
+        )
+        for row in checks(run).itertuples()
+    ]
+    columns = (
+        Column("check", "Check", text=True),
+        Column("unit", "Unit", text=True),
+        Column("measured", "Measured", digits=7, trim=True),
+        Column("expected", "Expected", digits=7, trim=True),
+        Column("tolerance", "Tolerance", digits=2, trim=True),
+        Column("away", "Tolerances away", digits=2),
+        Column("status", "Result", text=True),
+    )
+    return table("validation", columns, lines, "Checks with a known answer.")
+
+
+def _result(row: Any) -> str:
+    if row.status != "ok":
+        return row.status
+    if pd.isna(row.tolerance):
+        return "reported"
+    return "pass" if (tolerances_away(row) or 0.0) <= 1.0 else "violated"
+
+
+def extremes(run: Run) -> list[Table]:
+    """List the stress tests and how each ended."""
+    rows = stress_tests(run)
+    lines = [(r.scene, r.method, "converged" if r.status == "ok" else r.status, r.value, r.reason)
+        for r in rows.itertuples()]  # fmt: skip
+    unit = rows["unit"].iloc[0] if len(rows) else ""
+    columns = (
+        Column("case", "Case", text=True),
+        METHOD,
+        Column("outcome", "Outcome", text=True),
+        Column("gradient", "Largest gradient", unit, digits=2, trim=True),
+        Column("reason", "In words", text=True),
+    )
+    return table("extremes", columns, lines, "Every stress test and how it ended.")
+
+
+def endings(run: Run) -> list[Table]:
+    """Count cells, checks and stress tests by how they ended."""
+    ends = ("ok", *BAD, "skipped")
+    lines: list[tuple[Cell, ...]] = [
+        (kind, *(counts[end] for end in ends), sum(counts.values())) for kind, counts in counted(run).items()
+    ]
+    columns = [Column(name, name.capitalize()) for name in (*ends, "all")]
+    return table("endings", (Column("what", "What", text=True), *columns), lines, "How many ended how.")
+
+
+def unfinished(run: Run) -> list[Table]:
+    """List every cell that failed or was skipped, once per reason, whatever the number of its metrics."""
+    judged_elsewhere = (run.frame["case"] != "") & (run.frame["status"] != "skipped")
+    rows = run.frame[(run.frame["status"] != "ok") & ~judged_elsewhere]
+    names = ["suite", "scene", "method", "seed", "status", "reason"]
+    lines = rows[names].drop_duplicates().itertuples(index=False)
+    columns = (SUITE, SCENE, METHOD,
+        Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
+    cells = [(*line[:5], line[5] or "no reason given") for line in lines]
+    return table("unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each.")
+
+
+def merged(table: Table, names: Iterable[str]) -> Table:
+    """Merge lines that differ in one of the columns alone into one with all that stands there."""
+    rows: Sequence[tuple[Cell, ...]] = table.rows
+    for place in [place for place, column in enumerate(table.columns) if column.name in set(names)]:
+        texts: dict[tuple[Cell, ...], list[str]] = {}
+        for row in rows:
+            texts.setdefault((*row[:place], *row[place + 1 :]), []).append(str(row[place]))
+        rows = [(*key[:place], ", ".join(every), *key[place:]) for key, every in texts.items()]
+    return replace(table, rows=tuple(rows), grouped_by=(), references=(), note="")
+
+
+# Table -> method -> metric -> as printed. A column that the paper does not report is a dash.
+PRINTED = {
+    "energies": {
+        "PBNS, in the paper": {
+            "energy/strain": "0.111", "energy/bending": "0.007", "energy/gravity": "0.044",
+            "energy/inertia": "0.0035",
+        },
+        "SNUG, in the paper": {
+            "energy/strain": "0.064", "energy/bending": "0.004", "energy/gravity": "0.028",
+            "energy/inertia": "0.0034",
+        },
+    },
+    "curvature": {"SNUG, in the paper": {"curvature/error": "2.7"}},
+    "cost": {
+        "TailorNet, in the paper": {
+            "cost/data": "29 h", "cost/train": "6.5 h", "cost/frame": "10.1", "cost/memory": "2114",
+        },
+        "Santesteban 2019, in the paper": {
+            "cost/data": "180 h", "cost/train": "17 h", "cost/frame": "2.5", "cost/memory": "109",
+        },
+        "SNUG, in the paper": {
+            "cost/data": "0 h", "cost/train": "2 h", "cost/frame": "2.2", "cost/memory": "19",
+        },
+    },
+}  # fmt: skip
+NOTES = {
+    "energies": "In grey the paper's values, for its own garment, motions, contact and zero of gravity.",
+    "curvature": "In grey the paper's value, whose operator and unit it does not state.",
+    "cost": "In grey the paper's values, on its own machine with a GPU.",
+}
+
+TEST_CLIPS = ("tshirt/01_01", "tshirt/07_02")  # two of the paper's four test sequences
+
+
+def paper_table_1(run: Run) -> list[Table]:
+    """Tabulate energies of the paper's recipe on two of its test sequences, with what its table 1 has.
+
+    Each number is a mean over all frames and seeds. The paper does not state the zero of its gravity.
+    """
+    frames = run.frame_energies
+    if frames.empty:
+        return []
+    kept = frames[frames["scene"].map(recording_of).isin(TEST_CLIPS)]
+    if not {"pbns-paper", "snug-paper"} <= set(kept["method"]):
+        return []
+    means = kept.groupby("method")[["strain", "bending", "inertia"]].mean()
+    lines = []
+    for term in means:
+        printed = [float(values[f"energy/{term}"]) for values in PRINTED["energies"].values()]
+        pairs = (means.loc["pbns-paper", term], means.loc["snug-paper", term]), printed
+        lines.append((term, *(x for pbns, snug in pairs for x in (pbns, snug, snug / pbns))))
+    columns = [Column("energy", "Energy", text=True)]
+    for name, where in (("here", "here"), ("paper", "in the paper")):
+        columns += [Column(f"{m}_{name}", f"{m}, {where}", "J", trim=True) for m in ("PBNS", "SNUG")]
+        columns.append(Column(f"ratio_{name}", f"SNUG / PBNS, {where}", digits=2))
+    caption = (
+        "Table 1 of the paper: means over the frames of 01_01 and 07_02, two of its four test sequences."
+    )
+    return table("paper_table_1", columns, lines, caption)

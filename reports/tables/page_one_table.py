@@ -7,15 +7,13 @@ from collections.abc import Sequence
 import pandas as pd
 
 from reports.run.finished_run import Run
-from reports.statistics.break_even import compared_scenes, rivals
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
-from reports.statistics.page_one_methods import EXTERNAL, leads
-from reports.statistics.pareto import run_time
+from reports.statistics.outcomes import EXTERNAL, leads
+from reports.statistics.pareto import compared_scenes, rivals, run_time
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
-from reports.tables.number_texts import in_scenes
-from reports.tables.table import Cell, Column, Table, metric_column, table
+from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
 
 ROWS = 8
 ANSWERS = ("distance/rms", "penetration/surface", "dynamics/amplitude", "dynamics/correlation")

@@ -1,9 +1,9 @@
-"""A table: columns, rows of numbers and texts, and its CSV file, which keeps nine digits."""
+"""A table: columns, rows of numbers and texts, its cells as printed, and its CSV file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,109 @@ import pandas as pd
 from benchmarks.metric import Metric
 from benchmarks.results.row import cell_text
 from reference_sim.files.atomic_files import replacing
-from reports.statistics.effects import Effect
+from reports.run.finished_run import Run
+from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
 from reports.statistics.means_and_spreads import Mean
-from reports.tables.number_texts import CSV_DASH, csv_number
+
+DASH = "–"
+CSV_DASH = "-"
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_FIGURE_SPACE, _POINT_SPACE = "\u2007", "\u2008"
+
+
+def number(value: float | None, digits: int = 3, *, trim: bool = False) -> str:
+    """Return `value` to `digits` significant digits; a dash if absent or not finite.
+
+    `trim` leaves out zeros at the end, for numbers that are exact.
+
+    >>> number(0.064349), number(1734.0), number(2.5e-7), number(None)
+    ('0.0643', '1,734', '2.50×10⁻⁷', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return DASH
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if -4 <= exponent < 6:
+        text = f"{value:,.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
+        return _trimmed(text) if trim else text
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    mantissa = _trimmed(mantissa) if trim else mantissa
+    return f"{mantissa.replace('-', '−')}×10{str(int(power)).translate(_RAISED)}"
+
+
+def _trimmed(text: str) -> str:
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def with_spread(value: float | None, spread: float | None) -> str:
+    """Return a number with its spread to two digits, without ± where there is no spread.
+
+    >>> with_spread(0.5, 0.0123)
+    '0.500 ± 0.012'
+    """
+    if spread is None or not math.isfinite(spread) or number(value) == DASH:
+        return number(value)
+    return f"{number(value)} ± {number(spread, 2)}"
+
+
+def duration(seconds: float | None) -> str:
+    """Return a duration in s, min or h; a dash if absent.
+
+    >>> duration(75.0), duration(402.0), duration(104400.0)
+    ('75.0 s', '6.70 min', '29.0 h')
+    """
+    if seconds is None or not math.isfinite(seconds):
+        return DASH
+    if seconds == 0.0:
+        return "0 s"
+    for limit, size, unit in ((120.0, 1.0, "s"), (7200.0, 60.0, "min")):
+        if abs(seconds) < limit:
+            return f"{number(seconds / size)} {unit}"
+    return f"{number(seconds / 3600.0)} h"
+
+
+def csv_number(value: float | None) -> str:
+    """Return nine digits for a file; a dash if absent."""
+    if value is None or not math.isfinite(value):
+        return CSV_DASH
+    return f"{value:.9g}"
+
+
+def aligned(texts: Sequence[str]) -> list[str]:
+    """Pad the texts on the right by spaces as wide as digits, so that decimal points stand in a column.
+
+    Only plain decimals are padded; a dash, a spread or a power of ten is left as it is.
+    """
+    tails = [len(text.partition(".")[2]) if _is_plain(text) else 0 for text in texts]
+    widest = max(tails, default=0)
+    padded = []
+    for text, tail in zip(texts, tails):
+        if not _is_plain(text) or tail == widest:
+            padded.append(text)
+        else:
+            padded.append(text + ("" if tail else _POINT_SPACE) + _FIGURE_SPACE * (widest - tail))
+    return padded
+
+
+def _is_plain(text: str) -> bool:
+    return bool(text) and all(letter in "−,.0123456789" for letter in text)
+
+
+def in_scenes(scenes: Collection[str]) -> str:
+    """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
+    kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
+    return f"in {len(scenes)} {kind}{'' if len(scenes) == 1 else 's'}"
+
+
+def listed(items: Sequence[str]) -> str:
+    """Return the words as "a, b and c".
+
+    >>> listed(["a", "b", "c"]), listed(["a"]), listed([])
+    ('a, b and c', 'a', '')
+    """
+    return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))
+
 
 ROUNDING = {"dynamics/amplitude": 1e-4}  # a network's float32 positions alone move a hem by 1e-6 to 1e-5
 EFFECT_PARTS = ("kind", "low", "high", "covers")
@@ -124,3 +224,71 @@ def _parts_of_effect(cell: Cell) -> tuple[str, ...]:
         return (CSV_DASH,) * len(EFFECT_PARTS)
     low, high = cell.interval or (None, None)
     return cell.scale, csv_number(low), csv_number(high), cell.covers or CSV_DASH
+
+
+CellText = dict[str, str]  # text, spread, mark
+REMARKS = {
+    "*": "* A mean over fewer scenes or seeds than in the other rows, for want of the rest.",
+    "†": "† The solver left some frames unconverged.",
+    "‡": "‡ The interval is over seeds alone: there is one motion, or motions make no difference.",
+    "§": "§ The interval is over motions alone: there is no second seed, or seeds make no difference.",
+    "#": "# The range over motions and seeds.",
+}
+_COVERED = {"seeds": "‡", "motions": "§", RANGE: "#"}
+SMALL = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
+
+
+def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
+    """Return the remarks below a table: its note, the meaning of its ± and of the marks in its lines."""
+    remarks = [table.note] if table.note else []
+    means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
+    kinds = []
+    if any(mean.spread for mean in means):
+        seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
+        kinds.append(f"standard deviation over {' or '.join(map(str, seeds))} seeds")
+    if any(mean.uncertainty for mean in means):
+        kinds.append("the spread of the reference's ensemble, or a sample's error")
+    if kinds:
+        lone = any(m.spread_or_uncertainty is None for m in means)
+        without = " Without it: one seed, or nothing random." if lone and len(kinds) == 1 else ""
+        remarks.append(f"±: {' or, where larger, '.join(kinds)}.{without}")
+    marks = {mark for line in lines for cell in line for mark in cell["mark"]}
+    return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
+
+
+def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]) -> list[CellText]:
+    """Return text, spread or interval, and marks of a column's cells; `printed`: the paper's rows below."""
+    texts = [*(_text(run, column, cell) for cell in cells), *printed]
+    texts = texts if column.text or column.mixed else aligned(texts)
+    lines = []
+    for text, cell in zip(texts, [*cells, *[None] * len(printed)]):
+        spread, mark = "", ""
+        if isinstance(cell, Mean):
+            mark = ("" if cell.complete else "*") + ("†" if cell.stalled else "")
+            if (apart := cell.spread_or_uncertainty) and abs(cell.value) >= column.rounding:
+                spread = f"± {duration(apart) if column.unit == 's' else number(apart, 1)}"
+        elif isinstance(cell, Effect):
+            mark = ("" if cell.complete else "*") + _COVERED.get(cell.covers, "")
+            ends = cell.interval or ()
+            spread = " to ".join("∞" if end == math.inf else number(end, column.digits) for end in ends)
+        lines.append({"text": text, "spread": spread, "mark": mark})
+    return lines
+
+
+def _text(run: Run, column: Column, cell: Cell) -> str:
+    if isinstance(cell, Effect):
+        sign = {RATIO: "×", DIFFERENCE: "+" if cell.value > 0.0 else ""}.get(cell.scale, "")
+        return sign + number(cell.shown, column.digits)
+    value = cell.value if isinstance(cell, Mean) else cell
+    if isinstance(value, str):
+        return (run.label(value) if column.method else value) or DASH
+    if isinstance(value, int):
+        return str(value)
+    if value == math.inf:  # tolerances away from a number that must be exact
+        return "∞"
+    if column.unit == "s":
+        return duration(value)
+    if value is not None and abs(value) < column.rounding:
+        return number(0.0)
+    small = column.digits > 3 and value is not None and abs(value) < SMALL
+    return number(value, 2 if small else column.digits, trim=column.trim)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks.page_one_sentences import headline
+from reports.blocks.sentences import headline
 from reports.run.reading import read_run_with_trainings
 from reports.tables import make_tables
 from reports.tables.table import Table

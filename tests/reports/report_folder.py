@@ -16,7 +16,7 @@ from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
 from reports.blocks.block import Report
 from reports.run.finished_run import Run, make_run
-from reports.run.roll_outs import RollOuts
+from reports.run.stored_files import RollOuts
 from reports.tables import make_tables
 from snug.training.kinds import find_kind
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from benchmarks.results.row import Row
-from reports.blocks.page_one_sentences import headline
+from reports.blocks.sentences import headline
 from tests.reports.report_folder import row as any_row
 
 WORN = {

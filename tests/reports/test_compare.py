@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.results.row import ResultsError
 from reports import compare as command
-from reports.comparison.compare_runs import compare
+from reports.comparison import compare
 from tests.reports.report_folder import row, run_folder, run_of
 
 SCENES = ("tshirt/walk", "tshirt/jump", "tshirt/bow", "tshirt/kick")

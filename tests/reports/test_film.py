@@ -14,8 +14,8 @@ from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
 from reports import film
-from reports.pictures.render import camera_axes
-from reports.run.selected_roll_outs import SelectedRollOuts
+from reports.rendering import camera_axes
+from reports.run.reading import SelectedRollOuts
 from tests.reports.report_folder import row, run_folder, run_of, sheet, write_mesh
 
 SCENE = "tshirt/walk"
@@ -93,7 +93,7 @@ def test_an_mp4_has_every_frame(run, tmp_path):
 
 @needs_opengl
 def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monkeypatch):
-    from reports.run.selected_roll_outs import select_roll_outs
+    from reports.run.reading import select_roll_outs
 
     labels: list[str] = []
     monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: labels.append(label) or label)

@@ -16,9 +16,9 @@ from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build
 from reports.blocks import FIGURES
-from reports.document.content import changed_files
 from reports.figures.figure import draw_figures
-from reports.run import training_histories as training
+from reports.pdf import changed_files
+from reports.run import stored_files as training
 from reports.run.finished_run import make_run
 from reports.run.reading import read_run
 from reports.statistics.means_and_spreads import Mean

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from reports.figures.figure import Drawing
-from reports.figures.plane.curves import families
-from reports.figures.plane.points import draw_points, write_labels
+from reports.figures.plane import draw_points, families, write_labels
 from reports.figures.plotting import LABELLED, fit, new_panels
 from reports.run.finished_run import Run
 from reports.statistics.fabric.order import ERROR, rows_of_test

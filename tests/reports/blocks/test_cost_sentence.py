@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from reports.blocks import page_one_sentences
+from reports.blocks import sentences
 from tests.reports.report_folder import row as any_row
 from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
@@ -36,8 +36,8 @@ def test_only_a_rival_that_was_timed_in_all_scenes_and_is_nearer_is_named():
     ]
     run = run_of(rows)
     frame = run.cells("speed", "garments")
-    assert page_one_sentences._rivals(run, frame, ["a", "b"]) == []
-    assert page_one_sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
+    assert sentences._rivals(run, frame, ["a", "b"]) == []
+    assert sentences._rivals(run, frame, ["a"])[0].startswith("PBNS is no slower")
 
 
 def test_a_rival_within_the_uncertainty_of_the_reference_is_as_near():

@@ -9,13 +9,12 @@ import re
 import numpy as np
 import pytest
 
-from reports.blocks.page_one_sentences import headline, topics
 from reports.blocks.printed_tables import shortened
-from reports.blocks.what_went_wrong import endings, failures
-from reports.document.content import content
+from reports.blocks.sentences import endings, failures, headline, topics
+from reports.pdf import content
 from reports.statistics import paper_claims
-from reports.statistics.page_one_methods import leads
-from reports.tables import make_tables, number_texts
+from reports.statistics.outcomes import leads
+from reports.tables import make_tables, table
 from reports.tables.page_one_table import ROWS
 from reports.tables.table import Column, Table
 from tests.reports.report_folder import SCENES, all_rows, report_of, row, run_of
@@ -45,7 +44,7 @@ def test_the_headline_is_the_share_of_skinnings_excess_over_the_scenes_that_a_ne
     typical = np.sinh(np.arcsinh([5.0, 20.0]).mean())
     sentences = near(rows)
     assert sentences.startswith(
-        f"On 2 unseen motions SNUG has a relative excess of {number_texts.number(typical, 2)} % ("
+        f"On 2 unseen motions SNUG has a relative excess of {table.number(typical, 2)} % ("
     )
     assert "; pooled 12 %), where the reference" in sentences
     assert (

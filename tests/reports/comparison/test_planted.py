@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.results.row import Row
-from reports.comparison.change import FAILING
-from reports.comparison.compare_runs import compare
+from reports.comparison import FAILING, compare
 from tests.reports.report_folder import row, run_of
 
 SCENES = tuple(f"tshirt/motion_{k}" for k in range(8))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reports.document.configuration import configuration
+from reports.pdf import configuration
 from tests.reports.report_folder import row, run_of
 
 MOTIONS = {"train tshirt": ["07_01"], "test tshirt": ["kick", "walk"], "frames": {"07_01": 9, "kick": 5}}

@@ -10,9 +10,7 @@ import pytest
 
 from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
-from reports.entries.__main__ import main
-from reports.entries.page import page_of
-from reports.entries.tables import entries_tables, full_scenes, of_entry
+from reports.entries import entries_tables, full_scenes, main, of_entry, page_of
 from reports.run.reading import read_run
 from tests.reports.report_folder import row, run_folder
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.figures import hem, known_answers, method_styles
+from reports.figures import over_time, plotting, values
 from reports.figures.chosen_roll_outs import SceneRollOuts
-from reports.figures.dots import dots
+from reports.figures.over_time import training_curves
 from reports.figures.plotting import file_name, printable
-from reports.figures.training_curves import training_curves
+from reports.figures.values import dots
 from reports.run import reading
 from reports.run.finished_run import shown_seeds
 from reports.run.reading import read_run_with_trainings
@@ -20,38 +20,38 @@ def test_methods_keep_their_order_and_their_look():
     run = run_of([row(method=name) for name in names])
     known = ["simulation", "skinning", "snug", "zebra", "newton-2", "newton-8", "newton-16"]
     assert run.ordered(names) == known
-    assert method_styles.style(run, "newton-2").label == "Newton, 2 iterations"
-    assert method_styles.style(run, "newton-2").colour == method_styles.style(run, "newton-16").colour
-    assert method_styles.style(run, "newton-2").line != method_styles.style(run, "newton-8").line
-    assert method_styles.style(run, "zebra") == method_styles.style(run_of([row(method="zebra")]), "zebra")
-    colours = [look.colour for look in method_styles.KNOWN.values() if look.colour]
+    assert plotting.style(run, "newton-2").label == "Newton, 2 iterations"
+    assert plotting.style(run, "newton-2").colour == plotting.style(run, "newton-16").colour
+    assert plotting.style(run, "newton-2").line != plotting.style(run, "newton-8").line
+    assert plotting.style(run, "zebra") == plotting.style(run_of([row(method="zebra")]), "zebra")
+    colours = [look.colour for look in plotting.KNOWN.values() if look.colour]
     assert len(set(colours)) == len(colours)
 
 
 def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
     run = run_of([row(method=m) for m in ("snug", "snug+lbfgs-4", "snug-no-inertia", "snug+cleanup")])
     base, less, warm, cleaned = (
-        method_styles.style(run, m) for m in ("snug", "snug-no-inertia", "snug+lbfgs-4", "snug+cleanup")
+        plotting.style(run, m) for m in ("snug", "snug-no-inertia", "snug+lbfgs-4", "snug+cleanup")
     )
     assert warm.colour == cleaned.colour == base.colour != less.colour
     assert less.marker == base.marker and warm.marker != base.marker
-    family = method_styles.family_style(run, run.methods["snug+lbfgs-4"])
+    family = plotting.family_style(run, run.methods["snug+lbfgs-4"])
     assert (family.label, warm.label) == ("SNUG + L-BFGS", "SNUG + L-BFGS, 4 iterations")
     alone = run_of([row(method="snug+cleanup")])  # what it starts from did not run
-    assert method_styles.style(alone, "snug+cleanup").label == "SNUG, cleaned up"
+    assert plotting.style(alone, "snug+cleanup").label == "SNUG, cleaned up"
 
 
 def test_a_roll_out_of_the_user_is_shown_where_there_is_no_room_for_all():
-    rows = [row(method=f"solver-{k}", role="solver") for k in range(method_styles.ROOM)]
+    rows = [row(method=f"solver-{k}", role="solver") for k in range(plotting.ROOM)]
     run = run_of([*rows, row(method="mine", role="external"), row(method="simulation")])
-    assert method_styles.leading(run, run.methods) == ["simulation", "mine"]
+    assert plotting.leading(run, run.methods) == ["simulation", "mine"]
 
 
 def test_a_panel_of_curves_shows_five_methods_the_reference_and_the_users_among_them():
     names = ("skinning", "untrained", "snug", "supervised", "pbns", "snug+cleanup", "simulation")
     run = run_of([*(row(method=name) for name in names), row(method="mine", role="external")])
     five = ["simulation", "skinning", "snug", "pbns", "mine"]
-    assert sorted(method_styles.few(run, run.methods)) == sorted(five)
+    assert sorted(plotting.few(run, run.methods)) == sorted(five)
 
 
 def test_the_hem_is_drawn_where_it_swings():
@@ -63,9 +63,9 @@ def test_the_hem_is_drawn_where_it_swings():
     cloth, faces = sheet(0.1)
     series = {method: mesh(cloth, faces, turn) for method in run.methods}
     twist = SceneRollOuts("tunic/twist", series)
-    assert hem.hem_turns(run, twist) and hem.draw_hem(run, twist).name == "hem_tunic-twist"
+    assert over_time.hem_turns(run, twist) and over_time.draw_hem(run, twist).name == "hem_tunic-twist"
     still = mesh(cloth, faces, {name: 0.01 * curve for name, curve in turn.items()})
-    assert not hem.hem_turns(run, SceneRollOuts("tunic/still", {"snug": still}))
+    assert not over_time.hem_turns(run, SceneRollOuts("tunic/still", {"snug": still}))
 
 
 def stopping() -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +83,7 @@ def test_a_hem_whose_roll_outs_all_ended_before_the_body_stopped_is_drawn_withou
     for frames, stopped in ((12, False), (13, True)):
         fields = {name: np.append(curve, curve[-1])[:frames] for name, curve in turn.items()}
         series = {"snug": mesh(moving[:frames], faces, fields)}
-        drawing = hem.draw_hem(run, SceneRollOuts("tunic/stop", series, mesh(moving, faces, {})))
+        drawing = over_time.draw_hem(run, SceneRollOuts("tunic/stop", series, mesh(moving, faces, {})))
         assert ("the body has stopped" in drawing.caption) == stopped
 
 
@@ -91,9 +91,9 @@ def test_a_stop_is_where_the_body_no_longer_moves():
     moving, faces = stopping()
     frames = len(moving)
     body = mesh(moving, faces, {})
-    assert hem.stop_frame(body) == 12
-    assert hem.stop_frame(mesh(moving[: 12 + hem.HELD], faces, {})) is None
-    assert hem.stop_frame(mesh(moving[12:], faces, {})) is None  # it never moved
+    assert over_time.stop_frame(body) == 12
+    assert over_time.stop_frame(mesh(moving[: 12 + over_time.HELD], faces, {})) is None
+    assert over_time.stop_frame(mesh(moving[12:], faces, {})) is None  # it never moved
     after = np.arange(frames) - 12.0
     curves = {
         "swings": np.radians(30.0 * np.exp(-0.1 * np.maximum(after, 0)) * np.cos(0.4 * after)),
@@ -106,11 +106,11 @@ def test_a_stop_is_where_the_body_no_longer_moves():
     torn = {"hem/yaw": curves["swings"][:8], "hem/from_end": np.abs(curves["swings"][:8])}
     series["torn"] = mesh(moving[:8], faces, torn)  # it has no end to be measured from
     run = run_of([row(method=method) for method in series])
-    drawing = hem.draw_hem(run, SceneRollOuts("tunic/stop", series, body))
+    drawing = over_time.draw_hem(run, SceneRollOuts("tunic/stop", series, body))
     assert "torn" not in drawing.caption.lower()
     assert "the body has stopped, at 0.400 s" in drawing.caption
-    assert hem.overshoot(curves["swings"], 12) > np.radians(10.0)
-    assert hem.overshoot(curves["creeps"], 12) == 0.0
+    assert over_time.overshoot(curves["swings"], 12) > np.radians(10.0)
+    assert over_time.overshoot(curves["creeps"], 12) == 0.0
 
 
 def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
@@ -147,7 +147,7 @@ def test_a_dot_stands_for_each_motion_and_seed():
 
 
 def test_a_metric_that_no_leading_method_has_takes_no_panel_of_dots():
-    solvers = [f"solver-{k}" for k in range(method_styles.ROOM)]
+    solvers = [f"solver-{k}" for k in range(plotting.ROOM)]
     rows = [row("tshirt/a", m, "curvature/error", 1.0, role="solver") for m in solvers]
     rows += [row("tshirt/a", m, "energy/total", 2.0) for m in ("simulation", "snug")]
     (drawing,) = dots(run_of(rows))
@@ -189,9 +189,9 @@ def test_checks_are_drawn_by_their_tolerances_in_order():
         "tolerance": 2.0,
     }
     rows = [row(f"case {k}", value=v, **more) for k, v in enumerate((1.0, 0.5, 0.0))]
-    (drawing,) = known_answers.known_answers(run_of(rows))
+    (drawing,) = values.known_answers(run_of(rows))
     heights = drawing.canvas.axes[0].get_lines()[0].get_ydata()
-    assert list(heights) == [known_answers.LOWEST, 0.25, 0.5]
+    assert list(heights) == [values.LOWEST, 0.25, 0.5]
 
 
 def test_the_first_seed_that_came_to_its_end_is_shown():

@@ -18,8 +18,7 @@ from reports.blocks import FIGURES
 from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH
 from reports.run.finished_run import Run
-from reports.run.roll_outs import RollOuts
-from reports.run.training_histories import History
+from reports.run.stored_files import History, RollOuts
 from tests.reports.report_folder import mesh, row, run_of, sheet
 
 LEAST = 4.0  # [cm] that a panel is wide and high on paper

@@ -7,8 +7,7 @@ import dataclasses
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from reports.figures.break_even import break_even
-from reports.figures.error_against_time import error_of_page_one, errors_of_scene, errors_of_scenes
+from reports.figures.costs import break_even, error_of_page_one, errors_of_scene, errors_of_scenes
 from reports.figures.figure import Drawing, save_drawing
 from reports.statistics.pareto import (
     indistinct,

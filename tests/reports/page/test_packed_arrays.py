@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.surface import curvature
-from reports.page.packed_arrays import Pack
-from reports.statistics.vertex_values import area_change, depth, distance, mean_curvature, skin_of
+from reports.cloth_colours import area_change, depth, distance, mean_curvature, skin_of
+from reports.page.embedded_roll_outs import Pack
 from tests.reports.page.page_by_hand import block, unpacked
 from tests.reports.report_folder import sheet
 

@@ -11,8 +11,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from reports.page.page_data import table_data
-from reports.page.roll_out_choice import groups
+from reports.page.embedded_roll_outs import groups
+from reports.page.write_page import table_data
 from reports.run.reading import read_run
 from reports.statistics.effects import EXCESS, RATIO, Effect
 from reports.tables.table import Column, Table

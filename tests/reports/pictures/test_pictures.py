@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from reports import rendering
 from reports.blocks import FIGURES
+from reports.cloth_colours import scales
 from reports.figures.chosen_roll_outs import SceneRollOuts
-from reports.pictures import render, sheets
-from reports.pictures.colour_scales import scales
-from reports.pictures.failures import failures, worst_failures
-from reports.pictures.side_by_side import draw_side_by_side
+from reports.pictures import draw_side_by_side, failures, worst_failures
 from reports.run.reading import read_run
 from tests.reports.report_folder import FRAMES, Stored, mesh, row, run_folder, run_of, sheet
 
@@ -56,11 +55,11 @@ def test_the_frame_of_page_one_is_one_whose_step_was_judged():
 
 def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
     cloth, faces = sheet(0.1)
-    camera = render.camera_for([cloth[0]], 0.0, 1.0)
-    body = render.Surface(cloth[0] * [1.0, 1.0, 0.0], faces, (0.0, 0.0, 1.0))
-    front = render.Surface(cloth[0], faces, (1.0, 0.0, 0.0))
-    image, other = render.views(
-        body, [front, render.Surface(cloth[0] - [0, 0, 0.2], faces, (0, 1, 0))], camera, 60, 60
+    camera = rendering.camera_for([cloth[0]], 0.0, 1.0)
+    body = rendering.Surface(cloth[0] * [1.0, 1.0, 0.0], faces, (0.0, 0.0, 1.0))
+    front = rendering.Surface(cloth[0], faces, (1.0, 0.0, 0.0))
+    image, other = rendering.views(
+        body, [front, rendering.Surface(cloth[0] - [0, 0, 0.2], faces, (0, 1, 0))], camera, 60, 60
     )
     assert image.shape == (60, 60, 3) and image[0, 0].min() == 1.0  # white around
     assert image[30, 30, 0] > 0.3 > image[30, 30, 2] and other[30, 30, 2] > 0.3 > other[30, 30, 1]
@@ -79,8 +78,10 @@ def test_light_from_the_side_tells_a_fold_from_a_sheet():
 
     def shades(depth: float) -> float:
         points = np.stack([x.ravel(), y.ravel(), depth * np.sin(40.0 * x.ravel())], axis=1)
-        camera = render.camera_for([points], 0.0, 0.7)
-        (image,) = render.views(None, [render.Surface(points, faces, render.CLOTH_COLOUR)], camera, 90, 63)
+        camera = rendering.camera_for([points], 0.0, 0.7)
+        (image,) = rendering.views(
+            None, [rendering.Surface(points, faces, rendering.CLOTH_COLOUR)], camera, 90, 63
+        )
         return float(image[20:43, 20:70].mean(axis=2).std())
 
     assert shades(0.01) > 0.04 > 5.0 * shades(0.0)
@@ -109,7 +110,7 @@ def test_only_what_was_drawn_is_read(tmp_path):
 
 def test_words_beside_a_row_have_room_for_all_their_lines():
     tile = np.zeros((10, 10, 3))
-    figure = sheets.sheet([[tile]], (1.0, 1.0), ["0 s"], beside=["SNUG, paper's\ntext"])
+    figure = rendering.sheet([[tile]], (1.0, 1.0), ["0 s"], beside=["SNUG, paper's\ntext"])
     (caption,) = (text for text in figure.texts if text.get_rotation() == 90)
     box = caption.get_window_extent(FigureCanvasAgg(figure).get_renderer())
     assert box.x0 >= 0.0 and box.x1 <= figure.axes[0].get_window_extent().x0

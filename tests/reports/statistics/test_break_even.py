@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from reports.statistics.break_even import Cost, compared_scenes, cost_of, crossing, rivals
-from reports.tables.speed import crossings, error_rivals
+from reports.statistics.pareto import Cost, compared_scenes, cost_of, crossing, rivals
+from reports.tables.costs import crossings, error_rivals
 from tests.reports.report_folder import row as any_row
 from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row

@@ -9,13 +9,12 @@ import pandas as pd
 import pytest
 
 from benchmarks.methods.catalogue.all_methods import METHODS
-from reports.document.layout import lay_out_table
+from reports.pdf import lay_out_table
 from reports.statistics.effects import EXCESS
-from reports.statistics.frame_shares import share_of_frames, with_shares
+from reports.statistics.means_and_spreads import share_of_frames, with_shares
 from reports.statistics.paper_claims import BEFORE, CLAIMS, PRIMARY, counts, in_words, judged, with_before
 from reports.tables import make_tables
-from reports.tables.findings import findings
-from reports.tables.paper_values import PRINTED
+from reports.tables.findings import PRINTED, findings
 from tests.reports.report_folder import row, run_of
 
 

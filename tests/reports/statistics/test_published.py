@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from reports.run.finished_run import Run
-from reports.statistics import published
-from reports.statistics.published import DEFAULT, published_beside
+from reports.statistics import outcomes
+from reports.statistics.outcomes import DEFAULT, published_beside
 from tests.reports import report_folder
 from tests.reports.report_folder import row
 
@@ -39,8 +39,8 @@ def run_of(
 def publish(monkeypatch, tmp_path):
     def made(run: Run) -> None:
         (tmp_path / DEFAULT).mkdir()
-        monkeypatch.setattr(published, "PUBLISHED", tmp_path)
-        monkeypatch.setattr(published, "read_published", lambda folder: run)
+        monkeypatch.setattr(outcomes, "PUBLISHED", tmp_path)
+        monkeypatch.setattr(outcomes, "read_published", lambda folder: run)
 
     return made
 
@@ -66,7 +66,7 @@ def test_the_interval_is_that_of_one_more_seed(publish):
     publish(run_of({}, started="before"))
     for line in drawn:
         before = run_of(dict(enumerate(line[:3])), SCENES[:1], started="before")
-        published.read_published = lambda folder, before=before: before
+        outcomes.read_published = lambda folder, before=before: before
         inside += published_beside(run_of({0: line[3]}, SCENES[:1]), "snug").endswith(": reproduced")
     assert 0.91 <= inside / 100 <= 0.985
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reports.blocks.page_one_sentences import headline
-from reports.tables.body_shapes import shapes
+from reports.blocks.sentences import headline
+from reports.tables.pivots import shapes
 from tests.reports.report_folder import row, run_of
 
 

@@ -6,9 +6,9 @@ import dataclasses
 
 import pytest
 
-from reports.statistics.break_even import compared_scenes
+from reports.statistics.pareto import compared_scenes
 from reports.tables import make_tables
-from reports.tables.speed import crossings, error_rivals, reference_uncertainty
+from reports.tables.costs import crossings, error_rivals, reference_uncertainty
 from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
 

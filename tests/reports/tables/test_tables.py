@@ -10,14 +10,14 @@ import pytest
 
 from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
-from reports.blocks.what_went_wrong import endings
-from reports.document.layout import lay_out_table
+from reports.blocks.sentences import endings
+from reports.pdf import lay_out_table
 from reports.run.finished_run import make_run
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
-from reports.tables import make_tables, number_texts
-from reports.tables.ablations import ablation_effects, ablations
-from reports.tables.outcomes import merged
+from reports.tables import make_tables, table
+from reports.tables.findings import merged
+from reports.tables.pivots import ablation_effects, ablations
 from tests.benchmarks.runner.test_cell_tasks import plan_of
 from tests.reports.report_folder import SCENES, all_rows, row, run_of, skipped
 
@@ -230,25 +230,19 @@ def test_pairs_share_their_scenes_or_have_their_own():
     ],
 )
 def test_numbers_as_text(value, text):
-    assert number_texts.number(value) == text
+    assert table.number(value) == text
 
 
 def test_other_texts():
-    assert (
-        number_texts.number(0.2835, 7, trim=True) == "0.2835"
-        and number_texts.number(6.0, 7, trim=True) == "6"
-    )
-    assert (
-        number_texts.with_spread(0.5, 0.012) == "0.500 ± 0.012"
-        and number_texts.with_spread(0.5, None) == "0.500"
-    )
-    assert [number_texts.duration(s) for s in (0.0, 61.0, 402.0, 104400.0, None)] == [
+    assert table.number(0.2835, 7, trim=True) == "0.2835" and table.number(6.0, 7, trim=True) == "6"
+    assert table.with_spread(0.5, 0.012) == "0.500 ± 0.012" and table.with_spread(0.5, None) == "0.500"
+    assert [table.duration(s) for s in (0.0, 61.0, 402.0, 104400.0, None)] == [
         "0 s", "61.0 s", "6.70 min", "29.0 h", "–",
     ]  # fmt: skip
-    assert number_texts.csv_number(None) == "-" and number_texts.csv_number(0.0) == "0"
+    assert table.csv_number(None) == "-" and table.csv_number(0.0) == "0"
 
 
 def test_decimal_points_stand_in_a_column():
-    padded = number_texts.aligned(["0.123", "18.2", "400", "–"])
+    padded = table.aligned(["0.123", "18.2", "400", "–"])
     assert len({len(text) - text.index(".") for text in padded[:2]}) == 1
     assert len(padded[2]) - 3 == len(padded[0]) - 1 and padded[3] == "–"

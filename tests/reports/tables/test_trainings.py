@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.run.training_histories import History
-from reports.tables.trainings import trainings
+from reports.run.stored_files import History
+from reports.tables.costs import trainings
 from tests.reports.report_folder import row, run_of
 
 

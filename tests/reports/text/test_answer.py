@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from reports.tables import make_tables
-from reports.text.answer import MOST_METHODS, answer
+from reports.text.text_table import MOST_METHODS, answer
 from tests.reports.report_folder import row, run_of
 
 TOTALS = {

@@ -11,12 +11,14 @@ import pytest
 from benchmarks.metrics import find_metric
 from benchmarks.results.run_folder import RunFolder
 from reports.docs import ROOT, documents, main
+from reports.statistics.outcomes import PUBLISHED
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY
-from reports.statistics.published import PUBLISHED
-from reports.text.generated_parts import BEGIN, END, fill
 from reports.text.published_parts import (
+    BEGIN,
+    END,
     LIBRARY_FILES,
     evaluation_rows,
+    fill,
     library_file,
     published_part,
 )

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from reports.docs import ROOT
-from reports.statistics.published import PUBLISHED
+from reports.statistics.outcomes import PUBLISHED
 from reports.text import run_page
 from reports.text.run_page import write_run_pages
 

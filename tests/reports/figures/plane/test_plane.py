@@ -6,9 +6,15 @@ import itertools
 
 import numpy as np
 
-from reports.figures.plane.curves import families, of_page_one
-from reports.figures.plane.labels import Label, boxes_along, place_labels
-from reports.figures.plane.points import draw_points, write_labels
+from reports.figures.plane import (
+    Label,
+    boxes_along,
+    draw_points,
+    families,
+    of_page_one,
+    place_labels,
+    write_labels,
+)
 from reports.figures.plotting import fit, new_figure
 from reports.statistics.pareto import Point
 from tests.reports.report_folder import row, run_of

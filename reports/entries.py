@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +12,14 @@ from urllib.parse import urlencode
 from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
+from reference_sim.command_line import Parser, command
+from reference_sim.files.atomic_files import replacing
+from reports.page.write_page import filled, table_data
 from reports.run.finished_run import Run
+from reports.run.reading import read_run
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
+from reports.statistics.outcomes import DEFAULT, PUBLISHED
 from reports.statistics.relative_excess import excess_of
 from reports.tables.table import Cell, Column, Table
 
@@ -137,3 +143,88 @@ def entries_tables(
 def _excess(cells: tuple[Cell, ...]) -> float:
     shown = cells[1].shown if isinstance(cells[1], Effect) else cells[1]
     return shown if isinstance(shown, float) else float("inf")
+
+
+ENTRIES = "submissions"
+PAGE = "index.html"
+SCRIPTS = ("tables", "entries")  # in this order
+
+
+def entries_page(path: Path, tables: Sequence[tuple[Table, Sequence[Scored]]]) -> str:
+    """Return the markup of the page.
+
+    Args:
+        path: where it will be; links lead from it to pages of runs.
+        tables: of reports.entries.entries_tables.
+    """
+    content = []
+    for table, scored in tables:
+        data = table_data(scored[0].run, table)
+        for row, entry in zip(data["rows"], scored):
+            if link := entry.link(path):
+                row[0] = [row[0], row[0], "", "", link]
+        content.append(data)
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    # No text of an entry ends the element.
+    return filled("entries.html", SCRIPTS, content=text.replace("<", "\\u003c"))
+
+
+def entries_in(folder: Path) -> list[Path]:
+    """Return the folders of entries, by name. Raises ResultsError where there is none."""
+    entries = sorted(path.parent for path in folder.glob("*/entry.toml"))
+    if not entries:
+        raise ResultsError(f"{folder}: holds no entry, a folder with entry.toml")
+    return entries
+
+
+def page_of(folder: Path, path: Path, published: tuple[RunFolder, Run]) -> tuple[str, list[Path]]:
+    """Return the page of the entries in a folder, and the entries that have no scores.
+
+    Args:
+        folder: has a folder for each entry.
+        path: where the page will be.
+        published: the run whose methods stand beside entries of its protocol.
+
+    Raises:
+        ResultsError: no entry, or scores that cannot be read.
+    """
+    entries = entries_in(folder)
+    scores = {entry: RunFolder(entry / "scores") for entry in entries}
+    without = [entry for entry in entries if not scores[entry].config_path.is_file()]
+    scored = [of_entry(scores[entry], read_run(scores[entry])) for entry in entries if entry not in without]
+    return entries_page(path, entries_tables(scored, published)), without
+
+
+EXAMPLES = """examples:
+  python -m reports.entries                                   submissions/index.html
+  python -m reports.entries mine -o entries.html              of other entries
+
+Entries without scores are left out and named: python -m benchmarks.submit score DIR makes them.
+exit status: 0 written; 1 written without some entry; 2 a folder cannot be read."""
+
+
+@command("reports.entries")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    parser = Parser(
+        prog="python -m reports.entries",
+        description="Make the page of all entries beside the published methods of the project.",
+        epilog=EXAMPLES,
+    )
+    parser.add_argument("entries", metavar="DIR", nargs="?", default=ENTRIES, help=f"default {ENTRIES}")
+    parser.add_argument("-o", "--out", metavar="FILE", help=f"the page (default DIR/{PAGE})")
+    options = parser.parse_args(arguments)
+    folder, run = Path(options.entries), RunFolder(PUBLISHED / DEFAULT)
+    path = Path(options.out) if options.out else folder / PAGE
+    entries_in(folder)  # before much is read
+    page, without = page_of(folder, path, (run, read_run(run)))
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
+    for entry in without:
+        print(f"{entry}: left out: it has no scores; run python -m benchmarks.submit score {entry}")
+    print(path)
+    return 1 if without else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

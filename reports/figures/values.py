@@ -1,4 +1,6 @@
-"""Values behind the means: a dot for each motion and seed, a bar at the mean.
+"""Figures of single values behind the means, and of checks with a known answer.
+
+Values behind the means: a dot for each motion and seed, a bar at the mean.
 
 Relative excess takes the place of the total energy where the run has it. It spans decades and may be below
 zero, so it is drawn on the scale of its statistics, arcsinh(x / 1 %).
@@ -6,6 +8,7 @@ zero, so it is drawn on the scale of its statistics, arcsinh(x / 1 %).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -13,11 +16,12 @@ import numpy as np
 
 from benchmarks.results.protocol import SOFTENING
 from reports.figures.figure import Drawing
-from reports.figures.method_styles import leading, style
-from reports.figures.plotting import arcsinh_axis, fit, log_axis, new_panels, wrapped
+from reports.figures.plotting import arcsinh_axis, fit, leading, log_axis, new_panels, style, wrapped
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import Mean, means
+from reports.statistics.outcomes import checks, tolerances_away
 from reports.statistics.relative_excess import RELATIVE_EXCESS, TOTAL, excess_of, with_relative_excess
+from reports.tables.table import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,3 +85,26 @@ def _draw_panel(
         if bar is not None:
             axes.plot([bar] * 2, [place - 0.36, place + 0.36], color="#111111", linewidth=1.4)
     return shown
+
+
+LOWEST = 1e-6  # tolerances away: what is nearer is drawn here
+
+
+def known_answers(run: Run) -> Iterator[Drawing]:
+    """Draw in order how many tolerances two checks or more lie from their answers."""
+    away = [tolerances_away(row) for row in checks(run).itertuples()]
+    known = sorted(float(x) for x in away if x is not None and math.isfinite(x))
+    if len(known) < 2:
+        return
+    figure, (axes,) = new_panels(1)
+    heights = np.maximum(known, LOWEST)
+    axes.plot(range(1, len(known) + 1), heights, "o", color="#0072B2", markersize=3)
+    axes.axhline(1.0, color="#D55E00", linewidth=1.2)
+    axes.annotate("tolerance", (1, 1.0), (0, 3), textcoords="offset points", fontsize=8, color="#B04A00")
+    axes.set_ylim(LOWEST / 2.0, max(3.0, 2.0 * heights[-1]))
+    axes.set(xlabel="checks, in order", ylabel="tolerances away")
+    log_axis(axes, "y")
+    fit(figure)
+    caption = f"{len(known)} checks with a known answer: distance from it over the tolerance"
+    caption += f"; {number(LOWEST, 1)} stands for all that is less."
+    yield Drawing(figure, "known_answers", caption)

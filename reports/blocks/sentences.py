@@ -1,32 +1,194 @@
-"""Headline sentences of page one: how near, how it moves, at what cost, how certain."""
+"""Sentences of a report: how near the networks come, how they move, at what cost, what went wrong."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 
 import pandas as pd
 
-from reports.blocks.excess_sentences import on_other_bodies, relative_excesses
+from reports.blocks.printed_tables import cut
 from reports.run.finished_run import Run
 from reports.statistics import paper_claims
-from reports.statistics.break_even import NETWORK, compared_scenes, reference_scenes
-from reports.statistics.means_and_spreads import mean_of, pair, value_of
-from reports.statistics.page_one_methods import subjects
+from reports.statistics.effects import Effect, is_recorded, recording_of
+from reports.statistics.means_and_spreads import ensemble_spread, mean_of, pair, value_of
+from reports.statistics.outcomes import (
+    BAD,
+    EXTERNAL,
+    LEARNED,
+    STRAIN,
+    counted,
+    leads,
+    overstretched,
+    published_beside,
+    subjects,
+)
 from reports.statistics.pareto import (
+    NETWORK,
     SMALLER_STEPS,
     beaten_by,
+    compared_scenes,
     fastest,
     indistinct,
     points_of,
+    reference_scenes,
     run_time,
     truncated,
 )
-from reports.statistics.spreads import ensemble_spread
-from reports.statistics.verdicts import compare_methods, measure_of
-from reports.tables.number_texts import in_scenes, listed, number
+from reports.statistics.relative_excess import (
+    RELATIVE_EXCESS,
+    TOTAL,
+    Excess,
+    excess_of,
+    rows_of_other_shapes,
+    with_relative_excess,
+)
+from reports.statistics.verdicts import (
+    LESS,
+    MORE,
+    OPEN,
+    TIED,
+    compare_methods,
+    measure_of,
+    standing,
+    untested,
+)
+from reports.tables.table import in_scenes, listed, number
+
+BY_CODE = "embedded library"  # how the source of a motion of the package that code makes begins
+
+
+def relative_excesses(run: Run, worn: pd.DataFrame) -> list[str]:
+    """Say which relative excess each network of page one has, and whether the first has less energy."""
+    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
+    rows = with_relative_excess(run, worn)
+    known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
+    if not known:
+        return []
+    first, *others = known
+    excess = known[first]
+    # Those in which skinning has an excess: a network that failed in one has a remark on it.
+    scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
+    count = len(scenes)
+    beside = published_beside(run, first)
+    motions = f"{count} {_kind(run, scenes)}motion{'' if count == 1 else 's'}"
+    paired = [f"; {says}" for says in _paired(run, worn, first, others)]
+    pooled = {name: f"pooled {number(of.pooled, 2)} %" if count > 1 else "" for name, of in known.items()}
+    first_share = f"{_share(excess, pooled[first])}{f' ({beside})' if beside else ''}"
+    shares = [
+        f"{run.label(first)} has a relative excess of {first_share}",
+        *(f"{run.label(name)} of {_share(known[name], pooled[name])}" for name in others),
+    ]
+    scale = "where the reference has 0 % and skinning alone 100 %"
+    sentences = [f"On {motions} {listed(shares)}, {scale}{''.join(paired)}"]
+    if count > 1:
+        worst = listed(
+            [f"{run.label(name)} {number(of.worst[1], 2)} %{of.fewer}" for name, of in known.items()]
+        )
+        sentences += [
+            f"These percentages are geometric means over {_repeated(run, scenes, known)}; pooled: the ratio "
+            f"of the sums over motions. Worst motions: {worst}"
+        ]
+    return [*sentences, _against_reference(run.label(first), excess)]
+
+
+def on_other_bodies(run: Run) -> list[str]:
+    """Say which relative excess each network has on bodies of other shapes, in the one motion of them."""
+    rows = rows_of_other_shapes(run)
+    networks = [name for name in run.ordered(set(rows["method"])) if run.methods[name].role in LEARNED]
+    known = {name: excess for name in networks if (excess := excess_of(run, rows, name))}
+    shares = [f"{run.label(name)} {_share(excess)}" for name, excess in known.items()]
+    count = rows["scene"].nunique()
+    where = f"on {count} other {'body' if count == 1 else 'bodies'}, in one motion,"
+    return [f"{where} relative excesses are: {', '.join(shares)}"] if shares else []
+
+
+def _kind(run: Run, scenes: Collection[str]) -> str:
+    """Return what these scenes' motions are to the networks, before the word "motions"."""
+    if set(scenes) <= set(run.trained_on):
+        return ""
+    validation = set(run.with_motion("validation")) & set(scenes)
+    if not validation:
+        return "unseen "
+    return "validation " if validation == set(scenes) else "validation and other unseen "
+
+
+def _repeated(run: Run, scenes: Collection[str], known: Mapping[str, Excess]) -> str:
+    """Return what the means are taken over: "motions", or how many sources of which kinds, with theirs."""
+    sources = {recording_of(scene) for scene in scenes}
+    count = len(sources)
+    if count == len(scenes):
+        return "motions"
+    recordings = {name for name in sources if is_recorded(name)}
+    others = sources - recordings
+    origins = run.config.get("motion_sources", {})
+    made = all(origins.get(scene.partition("/")[2], "").startswith(BY_CODE) for scene in others)
+    motions = f"motion{'' if len(others) == 1 else 's'}"
+    kind = f"{motions} made by code" if made else f"other {motions}"
+    recorded = f"{len(recordings)} recording{'' if len(recordings) == 1 else 's'}"
+    parts = f"{recorded}, each averaged over its segments"
+    if others:
+        of_recordings, of_others = (_typical(run, known, recorded=kept) for kept in (True, False))
+        parts += f" ({of_recordings}), and {len(others)} {kind} ({of_others})"
+    return f"{count} sources treated as independent: {parts}"
+
+
+def _typical(run: Run, known: Mapping[str, Excess], *, recorded: bool) -> str:
+    """Return "SNUG 3.8 % and PBNS 12 %": typical over the recorded motions, or over the others."""
+    shares = {name: number(excess.typical_of(recorded=recorded), 2) for name, excess in known.items()}
+    return listed([f"{run.label(name)} {share} %" for name, share in shares.items()])
+
+
+def _share(excess: Excess, *remarks: str) -> str:
+    """Return a relative excess as "6.1 % (95 % interval 2.3 to 14)", and of how many roll-outs if not all."""
+    inside = "; ".join(filter(None, [_interval(excess.effect), *remarks]))
+    return f"{number(excess.typical, 2)} %{f' ({inside})' if inside else ''}{excess.fewer}"
+
+
+def _interval(effect: Effect) -> str:
+    """Return "95 % interval 2.3 to 14", empty of an effect without one."""
+    ends = effect.interval
+    return f"95 % interval {' to '.join(number(end, 2) for end in ends)}" if ends else ""
+
+
+def _against_reference(label: str, excess: Excess) -> str:
+    """Say how the energy of the method with this label compares with the reference's."""
+    stands = standing(excess.effect, excess.effect.p_value())
+    return {
+        TIED: f"{label} ties with the reference",
+        MORE: f"the excess of {label} is larger than the uncertainty of the reference",
+        LESS: f"{label} has less energy than the reference, which is no better: still cloth has less",
+    }.get(stands, f"whether {label} differs from the reference is inconclusive{untested(excess.effect)}")
+
+
+def _paired(run: Run, rows: pd.DataFrame, one: str, others: Sequence[str]) -> list[str]:
+    """Say which of these have more total energy than a method, paired by motion, and which less."""
+    standings: dict[str, list[str]] = {}
+    for other in others:
+        compared = compare_methods(run, rows, run.metrics[TOTAL], one, other)
+        if (effect := compared.effect) and compared.one and compared.other:
+            p = effect.p_value()
+            stands = standing(effect, p)
+            shown = _tested(effect, p) if stands in (LESS, MORE) and p is not None else ""
+            shown += compared.one.fewer or compared.other.fewer
+            standings.setdefault(stands, []).append(f"{run.label(other)}{shown}")
+    first = run.label(one)
+    says = {
+        LESS: f"paired by motion, {first} has less energy than {{}}",
+        MORE: f"paired by motion, {first} has more energy than {{}}",
+        TIED: f"paired by motion, {first} has as much energy as {{}}",
+        OPEN: f"whether {first} or {{}} has less is inconclusive",
+    }
+    return [text.format(listed(standings[stands])) for stands, text in says.items() if stands in standings]
+
+
+def _tested(effect: Effect, p: float) -> str:
+    """Return " (−8.1 points, 95 % interval −12 to −4.0, p = 0.002)" of an effect on relative excess."""
+    parts = (f"{number(effect.shown, 2)} points", _interval(effect), f"p = {number(p, 2)}")
+    return f" ({', '.join(filter(None, parts))})"
+
 
 CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
 FEW = 3  # scenes whose values are told one by one
@@ -255,3 +417,67 @@ def _rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
 def unbroken(text: str) -> str:
     """Return the text with each number on the line of its unit."""
     return re.sub(r"(?<=\d) (?=(J|ms|mm|1/m|%)\b|%)", "\u00a0", text)
+
+
+MOST = 5  # failures on page one
+FILES = 12  # names of files that could not be read
+
+
+def worst(run: Run) -> list[tuple[str, str]]:
+    """Say what went worst: counts of endings, then single failures by name."""
+    counts = endings(run)
+    if run.problems:
+        counts += f" {len(run.problems)} files could not be read: see the end."
+    named = [(name, cut(event)) for name, event in failures(run)]
+    return [("What went worst", counts), *named] if counts or named else []
+
+
+def endings(run: Run) -> str:
+    """Say how many cells, checks and stress tests ended how, with every kind that is not ok."""
+    parts = []
+    for kind, counts in counted(run).items():
+        bad = [f"{counts[name]} {name}" for name in (*BAD, "skipped") if counts[name]]
+        parts.append(f"of {sum(counts.values()):,} {kind} {', '.join(bad) if bad else 'all ended well'}")
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def failures(run: Run) -> list[tuple[str, str]]:
+    """Name the worst: failed cells and checks first, then stress tests, then overstretched networks.
+
+    There are MOST of them in all, some of each kind.
+    """
+    rows = run.frame[run.frame["status"].isin(BAD)]
+    rows = rows.assign(rank=rows["status"].map(BAD.index)).sort_values("rank", kind="stable")
+    rows = rows.drop_duplicates(["scene", "method", "seed"])
+    is_case = rows["case"] != ""
+    kinds: list[list[tuple[str, str]]] = [
+        [
+            (
+                f"{run.label(row.method)}, {row.scene}" + (f", seed {row.seed}" if row.seed else ""),
+                f"{row.status}: {row.reason}",
+            )
+            for row in part.itertuples()
+        ]
+        for part in (rows[~is_case], rows[is_case])
+    ]
+    kinds.append(
+        [
+            (
+                f"{run.label(method)}, {scene}",
+                f"{STRAIN[metric]} {number(strain)} J, {number(ratio)} times the simulation's",
+            )
+            for method, scene, metric, strain, ratio in overstretched(run)[:3]
+        ]
+    )
+    chosen: list[tuple[str, str]] = []
+    for left, kind in zip((3, 2, 1), kinds):
+        chosen += kind[: max((MOST - len(chosen)) // left, 1)]
+    return chosen[:MOST]
+
+
+def unread_files(run: Run) -> list[tuple[str, str]]:
+    """Name the files of the run that could not be read."""
+    more = [f"and {len(run.problems) - FILES} more"] if len(run.problems) > FILES else []
+    files = "; ".join([*run.problems[:FILES], *more])
+    return [("Files of this run that could not be read, missing above", files)] if files else []

@@ -1,29 +1,35 @@
-"""Error against run time: solvers, networks and baselines on one plot, members of a family joined."""
+"""Figures of run time: error against run time, and break-even of trainings."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
+import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
 from reports.figures.figure import Drawing
-from reports.figures.plane.curves import SOLVERS, families, of_page_one
-from reports.figures.plane.points import draw_points, write_labels
-from reports.figures.plotting import LABELLED, file_name, fit, new_panels, wrapped
+from reports.figures.plane import SOLVERS, draw_points, families, of_page_one, write_labels
+from reports.figures.plotting import LABELLED, few, file_name, fit, log_axis, new_panels, style, wrapped
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.pareto import (
     ERRORS,
     Point,
     compared_cells,
+    compared_costs,
+    compared_scenes,
+    crossing,
     error_points,
     indistinct,
+    rivals,
     run_time,
     time_label,
 )
-from reports.tables.number_texts import number
+from reports.tables.table import number
 
 MOST_PANELS, MOST_SCENES = 4, 7  # in the PDF; the page has all
 BAND_REMARK = " Grey: within the reference's uncertainty."  # remark of a caption
@@ -132,3 +138,37 @@ def missing_remark(run: Run, points: Sequence[Point]) -> str:
     """Return the remark of a caption on methods of which some seeds did not finish."""
     methods = dict.fromkeys(f"{run.label(point.method)}{point.fewer}" for point in points if point.fewer)
     return f" Seeds that did not finish are left out: {', '.join(methods)}." if methods else ""
+
+
+MOST_FRAMES = 1e7
+
+
+def break_even(run: Run) -> Iterator[Drawing]:
+    """Draw total time against the number of frames, in the scenes of the first garment with timed solvers.
+
+    Each trained network and each solver has a line; a dot stands where a training has paid.
+    """
+    frame = run.cells("speed", "garments")
+    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
+    shown = few(run, (cost.method for cost in trained))
+    trained = [cost for cost in trained if cost.method in shown]
+    if not trained or len(trained) + len(others) < 2:
+        return
+    costs = [*others, *trained]
+    figure, (axes,) = new_panels(1)
+    frames = np.logspace(0, math.log10(MOST_FRAMES), 200)
+    for cost in costs:
+        look = style(run, cost.method)
+        axes.plot(frames, [cost.total(n) for n in frames], color=look.colour, linestyle=look.line)
+    for network, rival in itertools.product(trained, others):
+        met = crossing(network, rival)
+        if met is not None and 1.0 <= met <= MOST_FRAMES:
+            colour = style(run, network.method).colour
+            axes.plot(met, network.total(met), "o", color=colour, markersize=4.5)
+    axes.set(xlabel="frames", ylabel="data, training and frames [s]")
+    log_axis(axes, "x")
+    log_axis(axes, "y")
+    fit(figure, [style(run, m) for m in run.ordered(cost.method for cost in costs)])
+    caption = f"Total time against the number of frames ({', '.join(scenes)}). "
+    yield Drawing(figure, "break_even", caption + "Dots: where a training has paid.")

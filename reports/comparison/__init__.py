@@ -1,1 +1,0 @@
-"""Changes from one run to another that exceed the noise of both."""

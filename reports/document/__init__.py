@@ -1,1 +1,0 @@
-"""The PDF of a run: report blocks laid out by a typesetter."""

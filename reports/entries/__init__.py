@@ -1,1 +1,0 @@
-"""The command python -m reports.entries: the page of all entries beside the published methods."""

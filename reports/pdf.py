@@ -1,0 +1,248 @@
+"""Configuration of a run as names and values, for the report's page on its protocol.
+
+Content of the PDF, as values that the template lays out: the report blocks and what stands around them.
+
+It is to be read in minutes: what is long stands in tables/ and in report.html, as the protocol says.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import typst
+
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.files.atomic_files import replacing
+from reports.blocks import BLOCKS
+from reports.blocks.block import ROWS, Heading, Report, SentenceBlock, TableBlock
+from reports.blocks.printed_tables import shortened
+from reports.figures.figure import Figure, Picture
+from reports.figures.plotting import printable
+from reports.run.finished_run import Run
+from reports.tables.table import DASH, CellText, Column, Table, column_texts, duration, number, remarks_below
+
+# Declarations and files: not how the rows were made. run.json has it all.
+NOT_SHOWN = (
+    "format", "metrics", "cases", "earlier", "digests", "tasks", "cells", "outdated", "scenes", "methods",
+    "motion_sources", "stages", "body", "garment",
+)  # fmt: skip
+UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
+MOST_LETTERS = 420  # letters of a value
+
+
+def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[list[str]]:
+    """Return names and values of run.json, whatever it holds, each value a text; motions are the rows'."""
+    config = {**config, "motions": sorted(set(frame["motion"]) - {""})}
+    pairs = {
+        _title(name): _text(value)
+        for name, value in config.items()
+        if name not in NOT_SHOWN and value not in (None, "", [], {})
+    }
+    start, end = moment(config.get("started")), moment(config.get("finished"))
+    if start and end and (start.tzinfo is None) == (end.tzinfo is None):
+        pairs["Wall time"] = duration((end - start).total_seconds())
+    for name in ("dtype", "threads", "hardware"):
+        pairs[f"{_title(name)} of the rows"] = ", ".join(sorted(set(frame[name].astype(str)) - {""})) or DASH
+    return [
+        [title, text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}…"]
+        for title, text in pairs.items()
+    ]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return number(value, 4, trim=True)
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(item) for item in value) or DASH
+    if isinstance(value, dict):
+        return "; ".join(f"{_title(name).lower()} {_text(item)}" for name, item in value.items()) or DASH
+    return DASH if value is None else str(value)
+
+
+def _title(name: str) -> str:
+    """Turn "memory_gb" into "Memory [GB]"."""
+    title = name.replace("_", " ")
+    for ending, unit in UNITS.items():
+        if title.endswith(ending):
+            title = f"{title.removesuffix(ending)} [{unit}]"
+    return title[:1].upper() + title[1:]
+
+
+def moment(text: object) -> datetime | None:
+    """Return an ISO date and time since 1971, or None where it is absent or none."""
+    try:
+        time = datetime.fromisoformat(str(text))
+    except ValueError:
+        return None
+    return time if time.year > 1970 else None
+
+
+Values = dict[str, Any]  # of one block, as JSON takes them
+FEW = 5  # up to so many columns, the columns of a table share its width evenly
+MOST = 9  # columns of numbers that fit on a page; a wider table goes on below
+
+
+def lay_out(report: Report, block: SentenceBlock | Figure | TableBlock) -> list[Values]:
+    """Return the values of a block, none where the report has no content for it."""
+    if isinstance(block, SentenceBlock):
+        sentences = [list(pair) for pair in block.make(report.run)]
+        return [{"kind": "sentences", "pairs": sentences, "small": block.small}] if sentences else []
+    if isinstance(block, Figure):
+        return [_figure(picture) for picture in report.pictures.get(block.name, ())]
+    if block.name not in report.tables:
+        return []
+    table = block.printed(report.run, report.tables[block.name])
+    return list(lay_out_table(report.run, shortened(table, block.most))) if table.rows else []
+
+
+def _figure(picture: Picture) -> Values:
+    return {
+        "kind": "figure",
+        "path": f"figures/{picture.path.name}",
+        "caption": picture.caption,
+        "width": picture.width,
+    }
+
+
+def lay_out_table(run: Run, table: Table) -> Iterator[Values]:
+    """Yield a table, in parts where it has more columns than fit on a page."""
+    heads = [column for column in table.columns if column.text]
+    numbers = [column for column in table.columns if not column.text]
+    parts = max(1, -(-len(numbers) // MOST))
+    each = max(1, -(-len(numbers) // parts))
+    for first in range(0, max(len(numbers), 1), each):
+        shown = {column.name for column in (*heads, *numbers[first : first + each])}
+        places = [place for place, column in enumerate(table.columns) if column.name in shown]
+        rows = [tuple(row[place] for place in places) for row in table.rows]
+        columns = tuple(table.columns[place] for place in places)
+        rows = [row for row in rows if first == 0 or any(cell is not None for cell in row[len(heads) :])]
+        caption = table.caption + (" (continued)" if first else "")
+        yield _part(run, replace(table, columns=columns, rows=tuple(rows), caption=caption))
+
+
+def _part(run: Run, table: Table) -> Values:
+    heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
+    places = [place for place in range(len(table.columns)) if place not in heads]
+    columns = [table.columns[place] for place in places]
+    references = [r for r in table.references if any(column.name in r[1] for column in columns)]
+    cells = []
+    for rank, (place, column) in enumerate(zip(places, columns)):
+        printed = [label if rank == 0 else texts.get(column.name, DASH) for label, texts in references]
+        cells.append(column_texts(run, column, [row[place] for row in table.rows], printed))
+    lines = [list(line) for line in zip(*cells)]
+    groups: dict[str, list[list[CellText]]] = {}
+    for row, line in zip(table.rows, lines):
+        groups.setdefault(" · ".join(str(row[place]) for place in heads), []).append(line)
+    return {
+        "kind": "table",
+        "caption": table.caption,
+        "note": remarks_below(table, lines),
+        "columns": [
+            {"title": column.title, "unit": column.unit_above, "left": column.text, "width": width}
+            for column, width in zip(columns, _widths(columns))
+        ],
+        "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
+        "references": lines[len(table.rows) :],
+        "breakable": len(table.rows) > ROWS,
+    }
+
+
+def _widths(columns: Sequence[Column]) -> list[str]:
+    """Return widths: columns of numbers share evenly; with texts among them each takes what it needs."""
+    if all(not column.text for column in columns[1:]):
+        return ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]
+    return ["auto"] * len(columns)
+
+
+FILES = 4  # names of files that are not as the run wrote them
+DEFINED = ("energies", "curvature", "cost", "overview")  # tables whose metrics are defined
+
+
+def content(report: Report) -> dict[str, Any]:
+    """Return everything the template needs, as JSON-ready values."""
+    run = report.run
+    sections = _sections(report)
+    return {
+        "title": "Neural garments versus a reference solver",
+        "subtitle": report.subtitle,
+        "changed": changed_files(run),
+        "size": _size(run.config),
+        "first": sections[0]["blocks"],
+        "workers": _side_by_side(run.config),
+        "configuration": configuration(run.config, run.frame),
+        "sections": [section for section in sections[1:] if section["blocks"]],
+        "definitions": _definitions(report),
+    }
+
+
+def _sections(report: Report) -> list[dict[str, Any]]:
+    """Return the blocks by heading, those of page one first."""
+    sections: list[dict[str, Any]] = [{"title": "", "blocks": []}]
+    for block in BLOCKS:
+        if isinstance(block, Heading):
+            sections.append({"title": block.title, "blocks": []})
+        else:
+            sections[-1]["blocks"] += lay_out(report, block)
+    return sections
+
+
+def changed_files(run: Run) -> str:
+    """Say that files are not what the run wrote: a reader of the numbers is to know it first."""
+    if not run.changed:
+        return ""
+    more = f" and {len(run.changed) - FILES} more" if len(run.changed) > FILES else ""
+    return f"Not as the run wrote them: {', '.join(run.changed[:FILES])}{more}. This report is of them."
+
+
+def _size(config: Mapping[str, Any]) -> str:
+    """Return the preset's description; that of a smoke test says that its numbers mean nothing."""
+    values = config.get("preset_values")
+    description = values.get("description") if isinstance(values, dict) else None
+    return f"{description}" if description else ""
+
+
+def _side_by_side(config: Mapping[str, Any]) -> str:
+    count = config.get("workers")
+    if not count:
+        return "one thread each."
+    together = "one after another" if count == 1 else f"up to {count} side by side"
+    return f"{together}, one thread each."
+
+
+def _definitions(report: Report) -> list[list[str]]:
+    """Return (heading, definition) of every metric that is a column of DEFINED tables."""
+    tables = [report.tables[name] for name in DEFINED if name in report.tables]
+    printed = {column.name for table in tables for column in table.columns}
+    return [
+        [metric.heading, metric.definition]
+        for metric in report.run.metrics.values()
+        if metric.name in printed and metric.definition
+    ]
+
+
+TEMPLATE = Path(__file__).parent / "report.typ"
+
+
+def write_pdf(folder: RunFolder, report: Report) -> Path:
+    """Write report.pdf with fonts of the typesetter alone and the run's own date; return its path."""
+    config = report.run.config
+    finished = moment(config.get("finished")) or moment(config.get("started"))
+    values = json.dumps(content(report), ensure_ascii=False, allow_nan=False)
+    compiler = typst.Compiler(
+        TEMPLATE.read_bytes(),
+        root=str(folder.path),
+        ignore_system_fonts=True,
+        sys_inputs={"content": printable(values)},
+    )
+    with replacing(folder.report_path) as temporary:
+        stamp = int(finished.timestamp()) if finished else 0
+        compiler.compile(output=str(temporary), format="pdf", timestamp=stamp)
+    return folder.report_path

@@ -1,0 +1,181 @@
+"""Tables that metrics declare, of ablations and of body shapes: means over the motions of a garment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from benchmarks.metric import Metric
+from reports.run.finished_run import Run
+from reports.statistics.means_and_spreads import mean_of, means
+from reports.statistics.relative_excess import (
+    SKINNING,
+    TOTAL,
+    excess_of,
+    relative_metric,
+    rows_of_other_shapes,
+    rows_of_shapes,
+)
+from reports.statistics.verdicts import compare_methods
+from reports.tables.findings import NOTES, PRINTED
+from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, metric_column, table
+
+
+def metric_tables(run: Run, only: str = "") -> list[Table]:
+    """Return the table of each name that metrics of the run declare, or of the name `only`.
+
+    Where no garment has a number of it, the table is NAME_by_scene.
+    """
+    declared = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
+    names = [name for name in declared if only in ("", name)]
+    return [made for name in names for made in _by_garment(run, name) or _by_scene(run, name)]
+
+
+def _by_garment(run: Run, name: str) -> list[Table]:
+    """Tabulate means over the motions of each garment, with the values that the paper printed.
+
+    Ablations, which stand beside their base, and perturbed references are left out.
+    """
+    title = name.replace("_", " ").capitalize()
+    which = "timed" if name == "cost" else "the"
+    metrics, lines = pivot(run, run.garment_rows, name, ("garment", "method"))
+    apart = {
+        garment: run.standing_apart(rows) | set(run.reference_ensemble)
+        for garment, rows in run.garment_rows[run.garment_rows["table"] == name].groupby("garment")
+    }
+    return table(
+        name, (GARMENT, METHOD, *map(metric_column, metrics)),
+        [line for line in lines if line[1] not in apart[line[0]]],
+        f"{title}: mean over {which} motions and seeds of each garment.", grouped_by=("garment",),
+        references=tuple(PRINTED.get(name, {}).items()), note=NOTES.get(name, ""),
+    )  # fmt: skip
+
+
+def _by_scene(run: Run, name: str) -> list[Table]:
+    """Tabulate means over seeds in each scene."""
+    metrics, lines = pivot(run, run.cells(), name, ("suite", "scene", "method"))
+    columns = (SUITE, SCENE, METHOD, *map(metric_column, metrics))
+    caption = f"{name.replace('_', ' ').capitalize()}, scene by scene."
+    return table(f"{name}_by_scene", columns, lines, caption, grouped_by=("suite", "scene"))
+
+
+def pivot(
+    run: Run, frame: pd.DataFrame, name: str, keys: tuple[str, ...]
+) -> tuple[list[Metric], list[tuple[Cell, ...]]]:
+    """Compute means of the frame, a line for each value of the keys, a column for each metric.
+
+    Args:
+        run: the run.
+        frame: rows of it; those that failed say what a mean lacks.
+        name: of the table that the metrics declare.
+        keys: columns of results.csv that name a line, the last of them "method".
+    """
+    wanted = frame[frame["table"] == name]
+    usable = set(wanted[wanted["usable"]]["metric"])
+    metrics = [metric for metric in run.metrics.values() if metric.name in usable]
+    if not metrics:
+        return [], []
+    cells = means(frame[frame["metric"].isin(usable) | ~frame["usable"]], *keys, "metric")
+    wide = cells.unstack("metric", sort=False).astype(object)
+    wide = wide.where(wide.notna(), None)[[metric.name for metric in metrics]]
+    methods = {method: place for place, method in enumerate(run.ordered(wide.index.get_level_values(-1)))}
+    garments = {garment: place for place, garment in enumerate(run.garments(wanted))}
+    outer = {key[:-1]: place for place, key in reversed(list(enumerate(wide.index)))}
+    last = len(keys) - 1
+
+    def order(line: tuple[Cell, ...]) -> tuple[int, int, int]:
+        """Garments as declared, other outer keys as they come, methods in their order."""
+        garment = garments[str(line[0])] if keys[0] == "garment" else 0
+        return garment, outer[line[:last]], methods[str(line[last])]
+
+    lines = ((*key, *line) for key, line in zip(wide.index, wide.itertuples(index=False)))
+    return metrics, sorted(lines, key=order)
+
+
+SHOWN = (
+    "energy/strain", "energy/bending", "energy/gravity", "energy/inertia", "energy/collision", "energy/total",
+    "curvature/error", "penetration/vertices", "dynamics/amplitude", "dynamics/correlation", "roll_out/drift",
+)  # fmt: skip
+# A term that is left out of the loss is of course larger; the total is the base's own loss, curvature error
+# (the paper's measure) is nobody's.
+COMPARED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
+HEAD = (GARMENT, METHOD)
+
+
+def ablations(run: Run) -> list[Table]:
+    """Tabulate the numbers of each base and of its ablations that ran, by garment."""
+    metrics = [run.metrics[name] for name in SHOWN if name in run.metrics]
+    lines: list[tuple[Cell, ...]] = [
+        (garment, method, *(mean_of(rows, method, metric.name) for metric in metrics))
+        for garment, base, below, rows in _families(run)
+        for method in (base, *below)
+    ]
+    columns = [metric_column(metric) for metric in metrics]
+    caption = "Ablations: the base first, then its variants."
+    return table("ablations", (*HEAD, *columns), lines, caption, grouped_by=("garment",))
+
+
+def ablation_effects(run: Run) -> list[Table]:
+    """Tabulate the effect of each ablation against its base, with intervals."""
+    metrics = [run.metrics[name] for name in COMPARED if name in run.metrics]
+    lines: list[tuple[Cell, ...]] = []
+    for garment, base, below, rows in _families(run):
+        for method in below:
+            effects = [compare_methods(run, rows, metric, method, base).effect for metric in metrics]
+            lines.append((garment, method, *effects))
+    caption = (
+        "Effect of each variant, over the scenes that it shares with its base. ×: variant over base, of "
+        "geometric means. Numbers without × are variant minus base, in the unit of the column; of relative "
+        "excess, in points."
+    )
+    note = (
+        "Below: 95 % intervals over motions and seeds, each for itself; of points the interval on the scale "
+        "of the test, with the mean nearer to 0 held."
+    )
+    shown = [relative_metric(metric.name) if metric.arbitrary_zero else metric for metric in metrics]
+    columns = (*HEAD, *map(metric_column, shown))
+    return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
+
+
+def _families(run: Run) -> Iterator[tuple[str, str, list[str], pd.DataFrame]]:
+    """Yield garment, base, the ablations that ran with it, and the rows of the garment."""
+    for garment in run.garments(run.garment_rows):
+        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        usable = rows[rows["usable"]]["method"]
+        ablations_here = run.standing_apart(rows)
+        below = [method for method in run.ordered(usable) if method in ablations_here]
+        for base in dict.fromkeys(run.methods[method].base for method in below):
+            yield garment, base, [m for m in below if run.methods[m].base == base], rows
+
+
+METRICS = (TOTAL, "energy/strain", "energy/collision", "penetration/vertices")
+OTHERS, MEAN_BODY = "other shapes", "mean shape"
+
+
+def shapes(run: Run) -> list[Table]:
+    """Tabulate each method on all other bodies together and on the mean body, with its relative excess."""
+    rows, norms = rows_of_shapes(run)
+    metrics = [run.metrics[name] for name in METRICS if name in run.metrics]
+    if rows.empty or not metrics:
+        return []
+    methods = run.ordered(set(rows["method"]) - set(run.reference_ensemble))
+    lines: list[tuple[Cell, ...]] = []
+    for name, part in (
+        (OTHERS, rows_of_other_shapes(run)),
+        (MEAN_BODY, rows[rows["scene"].isin(norms.index[norms == 0.0])]),
+    ):
+        cells = means(part, "method", "metric")
+        for method in methods:
+            excess = None if method in (run.reference, SKINNING) else excess_of(run, part, method)
+            share = (excess.effect, excess.mean) if excess else (None, None)
+            lines.append((name, method, *share, *(cells.get((method, m.name)) for m in metrics)))
+    columns = (
+        Column("scene", "Body", text=True), METHOD, Column("typical", "Typical", "%", digits=2),
+        Column("mean", "Mean", "%", digits=2), *map(metric_column, metrics),
+    )  # fmt: skip
+    caption = (
+        "Body shapes: the others together, and the mean body, in one motion. Typical (geometric, with its "
+        "interval over bodies and seeds) and mean: relative excess; energies and penetration: means."
+    )
+    return table("shapes", columns, lines, caption)
