@@ -157,9 +157,9 @@ CARRYING = (
     "benchmarks/training.py", "snug/trained", *provenance.NO_RESULT,
 )  # fmt: skip
 TASKS = {
-    "simulation": ("benchmarks/runner/ground_truth.py", *schedule.RUNS, *schedule.SOLVERS,
+    "simulation": ("benchmarks/runner/ground_truth.py", *schedule.RUNS, schedule.SOLVERS,
                    *schedule.NETWORKS),
-    "network": ("benchmarks/methods", *schedule.RUNS, *schedule.SOLVERS, *schedule.NETWORKS),
+    "network": ("benchmarks/methods", *schedule.RUNS, schedule.SOLVERS, *schedule.NETWORKS),
     "training": schedule.TRAINING,
     "metrics": ("benchmarks/runner/measurements.py", *schedule.METRICS, *schedule.RUNS,
                 *schedule.DRESSING),
