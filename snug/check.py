@@ -5,14 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from reference_sim.command_line import Parser, command
-from snug.file_options import GarmentFile, add_garment_options, make_garment_file
-
-if TYPE_CHECKING:
-    from snug.garments.fit import DressForm
+from snug.file_options import add_garment_options, make_garment_file
 
 PROGRAM = "snug.check"
 USABLE, UNUSABLE, UNREADABLE = 0, 1, 2
@@ -20,7 +15,7 @@ LEVEL_MARKS = {"ok": "", "note": "note", "unusable": "NO"}
 EXAMPLES = """examples:
   python -m snug.check shirt.obj                              on the body of the package
   python -m snug.check shirt.obj dress.ply --body mine.npz    on your own
-  python -m snug.check shirt.obj --garment-units cm --garment-up z --picture shirt.png
+  python -m snug.check shirt.obj --garment-units cm --garment-up z
   python -m snug.check shirt.obj --garment-rest uv            its UV chart as rest shape
 
 beside a mesh: <name>.weights.npz with an array "weights" (V, 24), or the vertex properties weight_0 to
@@ -39,10 +34,6 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, VTK, STL or OFF")
     parser.add_argument("--body", metavar="FILE", help="a body of your own (default: that of the package)")
-    parser.add_argument(
-        "--picture", type=Path, metavar="OUT.png",
-        help="a picture of the (last) garment on the body, triangles below the skin in red",
-    )  # fmt: skip
     add_garment_options(parser)
     return parser
 
@@ -52,36 +43,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
     options = make_parser().parse_args(arguments)
     files = [make_garment_file(path, options) for path in options.files]
-    if options.picture and not options.picture.parent.is_dir():
-        raise ValueError(f"--picture {options.picture}: no such folder")
     # NumPy and more, which --help does not need.
     from snug.body.smpl_files import read_body
     from snug.garments.fit import DressForm
-
-    form = DressForm(read_body(options.body))
-    return max(_check(file, form, options.picture) for file in files)
-
-
-def _check(file: GarmentFile, form: DressForm, picture: Path | None) -> int:
-    """Print the findings about one file; return its exit status."""
     from snug.garments.garment import GarmentError
     from snug.garments.reading import examine_file
 
-    try:
-        examination = examine_file(file, form)
-    except GarmentError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
-        return UNREADABLE
-    print(f"{file.path}: {'cannot be used' if examination.unusable else 'can be used'}")
-    for finding in examination.findings:
-        remedy = f"; {finding.remedy}" if finding.remedy else ""
-        print(f"  {LEVEL_MARKS[finding.level]:<5}{finding.matter:<18}{finding.text}{remedy}")
-    if picture and examination.surface is not None and examination.distances is not None:
-        from snug.garments.picture import draw
-
-        draw(picture, form.body, examination.surface, examination.distances)
-        print(f"  {picture}")
-    return UNUSABLE if examination.unusable else USABLE
+    form, status = DressForm(read_body(options.body)), USABLE
+    for file in files:
+        try:
+            examination = examine_file(file, form)
+        except GarmentError as error:
+            print(f"{PROGRAM}: {error}", file=sys.stderr)
+            status = UNREADABLE
+            continue
+        print(f"{file.path}: {'cannot be used' if examination.unusable else 'can be used'}")
+        for finding in examination.findings:
+            remedy = f"; {finding.remedy}" if finding.remedy else ""
+            print(f"  {LEVEL_MARKS[finding.level]:<5}{finding.matter:<18}{finding.text}{remedy}")
+        status = max(status, UNUSABLE if examination.unusable else USABLE)
+    return status
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ from reports.tables.table import DASH, Table, number
 from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows
 from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
-from snug.motion.library import clip_rows, distance_rows, source_rows
+from snug.motion.library import clip_rows, source_rows
 
 HEAD = ["Claim", "Tested", "Effect", "Interval", "p", "Verdict", "Run"]
 NOT_MEASURED = "not measured"
@@ -168,7 +168,7 @@ FORMS = (
     f"{'; '.join(PARTS)}"
 )
 
-LIBRARY_FILES = {"library_clips.csv": clip_rows, "library_distances.csv": distance_rows}  # in docs/
+LIBRARY_FILES = {"library_clips.csv": clip_rows}  # in docs/
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
 

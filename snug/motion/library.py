@@ -1,19 +1,13 @@
 """Embedded library: its motions by name, in the roles of training, validation and test.
 
 Recorded clips train. Whole sequences of recordings and motions made by code validate and test, see
-docs/protocol.md. Nothing heavy is loaded before a motion is made, so that names can be listed quickly, and of
-the recorded clips only those that are made are read.
-
-Composition of the library, for docs/protocol.md and the CSV files next to it.
-
-The recorded clips have roles and digests. A validation or test motion has a distance to the training poses
-(`snug.motion.motion.nearest_pose`).
+docs/protocol.md. Nothing heavy is loaded before a motion is made, so that names can be listed quickly.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from functools import cache
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -170,7 +164,7 @@ def make_motion(name: str) -> Motion:
         recorded = _read_clip(clip)
         return recorded if name == clip else _segment(name, recorded)
     # Its curves need SciPy; names are listed without.
-    from snug.motion.clips.make_clip import make_clip
+    from snug.motion.actions import make_clip
 
     return spread_arms(make_clip(name))
 
@@ -192,29 +186,13 @@ def _segment(name: str, clip: Motion) -> Motion:
     return Motion(name, turned.poses, turned.translations, clip.fps, clip.kind, source)
 
 
-ROLES = {
-    "training": TRAIN,
-    "validation": (*VALIDATION, *DYNAMIC_VALIDATION),
-    "test": TEST,
-}
-
-
 def clip_rows() -> Iterator[tuple[str, ...]]:
     """Yield a heading and a row of each recorded clip: name, content, frames, role, digest."""
     yield "Clip", "Content", "Frames", "Role", "Digest"
-    role_of = {clip_of(name): role for role, names in ROLES.items() for name in names}
+    roles = {"training": TRAIN, "validation": VALIDATION, "test": TEST}
+    role_of = {clip_of(name): role for role, names in roles.items() for name in names}
     for name, (content, frames, digest) in CLIPS.items():
         yield f"`{name}`", content, str(frames), role_of[name], f"`{digest}`"
-
-
-def distance_rows() -> Iterator[tuple[str, ...]]:
-    """Yield a heading and a row of each test or validation motion: its distance [deg] to training poses."""
-    yield "Motion", "Role", "Content", "Frames", "Mean distance [deg]", "Largest distance [deg]"
-    for role in ("test", "validation"):
-        for name in ROLES[role]:
-            degrees = _distances(name)
-            mean, largest = f"{degrees.mean():.1f}", f"{degrees.max():.1f}"
-            yield f"`{name}`", role, _content(name), str(len(degrees)), mean, largest
 
 
 def source_rows() -> Iterator[tuple[str, ...]]:
@@ -223,27 +201,13 @@ def source_rows() -> Iterator[tuple[str, ...]]:
     The distances [deg] to training poses are over the frames of all test motions of the source.
     """
     yield "Test motions", "Content", "Frames", "Mean distance [deg]", "Largest distance [deg]"
-    motions: dict[str, list[str]] = {}
-    for name in sorted(ROLES["test"], key=lambda name: (clip_of(name) not in CLIPS, name)):
-        motions.setdefault(clip_of(name), []).append(name)
-    for names in motions.values():
-        degrees = np.concatenate([_distances(name) for name in names])
-        listed = f"`{names[0]}` to `{names[-1]}`" if len(names) > 1 else f"`{names[0]}`"
-        mean, largest = f"{degrees.mean():.1f}", f"{degrees.max():.1f}"
-        yield listed, _content(names[0]), str(len(degrees)), mean, largest
-
-
-def _content(name: str) -> str:
-    motion = make_motion(name)
-    return motion.kind if clip_of(name) in CLIPS else f"{motion.kind}, by code"
-
-
-@cache
-def _training_poses() -> np.ndarray:
-    return np.concatenate([make_motion(name).poses for name in TRAIN])
-
-
-@cache
-def _distances(name: str) -> np.ndarray:
-    """Return the distance of each frame of a motion to the nearest training pose, (T,) [deg]."""
-    return np.rad2deg(nearest_pose(make_motion(name).poses, _training_poses()))
+    training = np.concatenate([make_motion(name).poses for name in TRAIN])
+    by_recording = sorted(TEST, key=lambda name: (clip_of(name) not in CLIPS, name))
+    for clip, names in groupby(by_recording, key=clip_of):
+        first, *others = names
+        motions = [make_motion(name) for name in (first, *others)]
+        distances = [np.rad2deg(nearest_pose(motion.poses, training)) for motion in motions]
+        degrees = np.concatenate(distances)
+        listed = f"`{first}` to `{others[-1]}`" if others else f"`{first}`"
+        content = motions[0].kind if clip in CLIPS else f"{motions[0].kind}, by code"
+        yield listed, content, str(len(degrees)), f"{degrees.mean():.1f}", f"{degrees.max():.1f}"

@@ -31,7 +31,6 @@ import numpy as np
 import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
-from snug.motion.clips.posture import SPINE_SHARES
 from snug.motion.motion import (
     Motion,
     arm_clearance,
@@ -43,6 +42,7 @@ from snug.motion.motion import (
     transition,
     turn_about_vertical,
 )
+from snug.motion.posture import SPINE_SHARES
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import DEFAULT, Recipe
 from snug.training.kinds import Kind

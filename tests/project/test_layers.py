@@ -46,7 +46,6 @@ EXCEPTIONS = {
     ("reports/text/code_parts.py", "benchmarks.presets.PRESETS"),
     ("reports/text/code_parts.py", "snug.named_recipes.RECIPES"),
     ("reports/text/published_parts.py", "snug.motion.library.clip_rows"),
-    ("reports/text/published_parts.py", "snug.motion.library.distance_rows"),
     ("reports/text/published_parts.py", "snug.motion.library.source_rows"),
 }
 # Headline geometry must not share an error with the physics.

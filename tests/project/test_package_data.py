@@ -14,21 +14,24 @@ SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 def data_files() -> list[Path]:
     """Return the files of the packages that are no source, as paths below the root."""
-    folders = [path.parent for layer in LAYERS for path in (ROOT / layer).rglob("__init__.py")]
-    files = [path for folder in folders for path in folder.iterdir() if path.is_file()]
+    files = [path for layer in LAYERS for path in (ROOT / layer).rglob("*") if path.is_file()]
     return [path.relative_to(ROOT) for path in files if path.suffix not in SOURCE]
+
+
+def is_named(path: Path, patterns: dict[str, list[str]]) -> bool:
+    """Return whether a pattern of a package above a file has it."""
+    return any(
+        fnmatchcase(path.relative_to(above).as_posix(), pattern)
+        for above in path.parents
+        for pattern in patterns.get(".".join(above.parts), ())
+    )
 
 
 def test_every_data_file_is_named_among_the_data_of_its_package():
     patterns = SETTINGS["tool"]["setuptools"]["package-data"]
     files = data_files()
     assert any(path.suffix == ".safetensors" for path in files) and len(files) > 8
-    left_out = [
-        path.as_posix()
-        for path in files
-        if not any(fnmatchcase(path.name, p) for p in patterns.get(".".join(path.parts[:-1]), ()))
-    ]
-    assert left_out == []
+    assert [path.as_posix() for path in files if not is_named(path, patterns)] == []
 
 
 def test_the_licences_are_there():

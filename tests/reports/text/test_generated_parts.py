@@ -121,12 +121,10 @@ def test_a_later_run_judges_what_those_before_it_cannot_and_nothing_else():
     assert {after[-1] for _, after in judged} == {"paper_text |", "ablations |", "equal_data |"}
 
 
-def test_files_of_the_library_are_documents_and_have_every_clip_and_motion():
+def test_the_file_of_the_library_has_every_clip():
     lines = library_file("library_clips.csv").splitlines()
     assert lines[0] == "Clip,Content,Frames,Role,Digest" and len(lines) == len(CLIPS) + 1
     assert '07_02,"walk, 1.5 m/s",82,test,da604aa37de1' in lines
-    names = [line.split(",")[0] for line in library_file("library_distances.csv").splitlines()[1:]]
-    assert names[: len(TEST)] == list(TEST)
 
 
 def test_segments_of_a_recording_are_one_source_of_test_motions():

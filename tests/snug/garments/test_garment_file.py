@@ -275,11 +275,10 @@ def test_an_option_that_means_nothing_is_refused(arguments, expected):
 
 def test_check_says_what_was_found_and_how_to_mend_it(tmp_path, capsys, tube):
     good = saved(tmp_path, tube, faces=tube.faces[:, ::-1], name="good.obj")
-    picture = tmp_path / "good.png"
-    assert check.main([str(good), "--picture", str(picture)]) == check.USABLE
+    assert check.main([str(good)]) == check.USABLE
     output = capsys.readouterr().out
     assert "good.obj: can be used" in output and "inside out; turned as it is read" in output
-    assert "neck (15 vertices), hem (15 vertices)" in output and picture.read_bytes()[:4] == b"\x89PNG"
+    assert "neck (15 vertices), hem (15 vertices)" in output
 
     bad = saved(tmp_path, tube, positions=1000 * tube.rest_positions, name="bad.obj")
     assert check.main([str(good), str(bad)]) == check.UNUSABLE

@@ -14,8 +14,7 @@ from snug.body.skeleton import (
     rotation_matrices,
     sole_points,
 )
-from snug.motion.clips.make_clip import ACTIONS, GAITS, STOPS
-from snug.motion.clips.posture import poses_from_angles
+from snug.motion.actions import ACTIONS
 from snug.motion.library import CLIPS, CONTROL, DYNAMIC_VALIDATION, TEST, VALIDATION, clip_of, make_motion
 from snug.motion.motion import (
     ARMS_CLEAR,
@@ -31,6 +30,8 @@ from snug.motion.motion import (
     transition,
     turn_about_vertical,
 )
+from snug.motion.posture import poses_from_angles
+from snug.motion.walks import GAITS, STOPS
 from tests.snug.motion.joint_speeds import joint_speeds
 
 # Those made by code; tests of recorded clips are in test_recorded.

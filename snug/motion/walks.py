@@ -1,9 +1,7 @@
-"""Walking, running and coming to a stop, from published normative joint-angle curves.
+"""Walking, running and stopping, from published normative joint-angle curves.
 
-Twists and turning walks that end within one frame: they set a wide hem swinging, and let it ring.
-
-A body cannot stop within a frame. That is the point: the cloth then moves by itself, and its motion cannot be
-told from the pose.
+Twists and turning walks end within one frame, as no body can: they set a wide hem swinging and let it ring,
+so that the cloth moves by itself and its motion cannot be told from the pose.
 """
 
 from __future__ import annotations
@@ -16,8 +14,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
-from snug.motion.clips.posture import LIBRARY_FPS, RATE, SPINE_SHARES, STANDING, poses_from_angles, root_path
 from snug.motion.motion import smoothstep
+from snug.motion.posture import LIBRARY_FPS, RATE, SPINE_SHARES, STANDING, poses_from_angles, root_path
 
 START_SECONDS = 0.7  # from standing to the full stride
 Curve = tuple[tuple[float, float], ...]  # (percent of the stride from that foot's contact, degrees)
@@ -74,6 +72,49 @@ RUN = Stride(
     arm_mean=-5.0, arm_swing=34.0, elbow_mean=80.0, elbow_swing=15.0, trunk_lean=5.0,
 )  # fmt: skip
 
+# Approximate values of the mean curves of R. Riener, M. Rabuffetti and C. Frigo, Stair ascent and descent at
+# different inclinations, Gait and Posture 15 (2002), at their middle inclination.
+CLIMB = Stride(
+    seconds=1.42,
+    hip=((0, 52), (10, 46), (20, 36), (30, 24), (40, 14), (50, 7), (60, 9), (70, 30), (80, 53), (90, 60)),
+    knee=((0, 62), (8, 61), (18, 50), (28, 34), (38, 20), (48, 11), (58, 20), (66, 55), (76, 88), (84, 92),
+          (92, 78)),
+    ankle=((0, 10), (10, 14), (20, 14), (32, 9), (44, 6), (54, -4), (63, -20), (72, -4), (82, 9), (92, 8)),
+    toe_off=62.0, pelvis_pitch=8.0, pelvis_yaw=5.0, pelvis_roll=4.0,
+    arm_mean=2.0, arm_swing=16.0, elbow_mean=35.0, elbow_swing=10.0, trunk_lean=8.0, rises=True,
+)  # fmt: skip
+
+STOP_SECONDS = 0.35  # from the full stride to standing
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A stride repeated for some seconds, at a share `pace` of its normal rate, braked from `stop` [s] on."""
+
+    kind: str
+    stride: Stride
+    seconds: float
+    pace: float = 1.0
+    stop: float | None = None
+
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return poses (T, 24, 3) [rad] and root translations (T, 3) [m] at RATE."""
+        time = np.arange(round(self.seconds * RATE)) / RATE
+        size = smoothstep(time / START_SECONDS)
+        if self.stop is None:
+            return gait_motion(self.stride, self.pace, size, {})
+        size *= 1.0 - smoothstep((time - self.stop) / STOP_SECONDS)
+        return gait_motion(self.stride, self.pace, size, _brake(time - self.stop))
+
+
+GAITS = {
+    "walk": Gait("walk", WALK, 4.0),
+    "brisk_walk": Gait("walk", WALK, 3.0, pace=1.25),
+    "run": Gait("run", RUN, 3.0),
+    "sudden_stop": Gait("sudden stop", RUN, 3.0, pace=0.9, stop=1.53),
+    "climbing_steps": Gait("climbing steps", CLIMB, 2.4),
+}
+
 
 def gait_motion(
     stride: Stride, pace: float, size: np.ndarray, added: Mapping[str, np.ndarray]
@@ -97,6 +138,22 @@ def gait_motion(
         height_smoothing=0.045, speed_smoothing=0.08, rises=stride.rises,
     )  # fmt: skip
     return poses, path
+
+
+def _brake(since: np.ndarray) -> dict[str, np.ndarray]:
+    """Return angles (T,) [degrees] to add `since` (T,) [s] the stop, by name.
+
+    Knees give way, the trunk tips forward and comes back, the arms fly forward.
+    """
+    give = smoothstep(since / 0.3) * (1.0 - smoothstep((since - 0.4) / 0.7))
+    follow = smoothstep((since - 0.05) / 0.25) * (1.0 - smoothstep((since - 0.3) / 0.6))
+    added = {"pelvis_pitch": 10.0 * give, "trunk_flexion": 20.0 * follow, "head_pitch": -22.0 * follow}
+    for side in ("left", "right"):
+        added[f"{side}_hip_flexion"] = 48.0 * give
+        added[f"{side}_knee_flexion"] = 58.0 * give
+        added[f"{side}_arm_flexion"] = 45.0 * follow
+        added[f"{side}_elbow_flexion"] = 20.0 * follow
+    return added
 
 
 def gait_angles(stride: Stride, phase: np.ndarray, size: np.ndarray) -> dict[str, np.ndarray]:

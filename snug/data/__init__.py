@@ -1,1 +1,0 @@
-"""Data of the package: the human body, and its notice."""

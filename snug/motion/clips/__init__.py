@@ -1,1 +1,0 @@
-"""Motions of the embedded library, as readable tables of angles and published curves."""
