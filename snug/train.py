@@ -1,26 +1,44 @@
-"""The command `python -m snug.train`: train garment networks and write each to a file."""
+"""The command `python -m snug.train`: train a garment network and write it to a file."""
 
 from __future__ import annotations
 
 import argparse
-import os
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
+from typing import TYPE_CHECKING
 
 from reference_sim.command_line import Parser, command
-from snug.file_options import add_garment_options, add_motion_options
+from reference_sim.files.atomic_files import demand_writable_folder
+from snug.file_options import (
+    add_garment_options,
+    add_motion_options,
+    demand_garment_file,
+    is_garment_file,
+    make_garment_file,
+    parse_motion_options,
+)
 from snug.named_recipes import RECIPES
+
+if TYPE_CHECKING:
+    from snug.body.parametric_body import Body
+    from snug.garments.garment import Garment
+    from snug.motion.motion import Motion
+    from snug.networks.trained_model import TrainedModel
 
 MODELS = (
     "snug", "pbns", "supervised", "santesteban2019", "tailornet", "ncs", "ncs-static", "handles-20",
     "handles-40", "handles-80", "handles-80-dynamic",
 )  # fmt: skip
+CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
+GONE = {
+    "--threads": "a training has one thread",
+    "--checkpoint-minutes": "a checkpoint is written every minute",
+    "--checkpoint-steps": "a checkpoint is written every minute",
+    "--validate-every": "validations are 200 steps apart; Validation(every=...) in Python",
+}
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
-  python -m snug.train --garment tshirt --garment tunic  one network for each garment
   python -m snug.train --garment shirt.obj --body mine.npz    your own garment (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
@@ -28,7 +46,6 @@ EXAMPLES = """examples:
   python -m snug.train --recipe paper --vertices 4400    the paper's text (see snug.named_recipes on contact)
   python -m snug.train --dataset motions.h5 --model supervised    learn from simulated motions
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
-  torchrun --nproc-per-node 2 -m snug.train              two processes share every batch
 
 supervised, santesteban2019 and tailornet learn from simulated motions, which python -m benchmarks.export
 GARMENT/training-motions writes; python -m benchmarks.run makes its own. With --dataset, name the --garment,
@@ -41,72 +58,40 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         prog="python -m snug.train",
         description="Train a garment network on a dressed body and write it to one file.",
         epilog=EXAMPLES,
+        replaced=GONE,
     )
-    add = parser.add_argument_group("model").add_argument
+    add = parser.add_argument
     add("--model", choices=MODELS, default="snug", help="network and loss (default: %(default)s)")
     add("--recipe", choices=tuple(RECIPES), help="named options (default: the model's own)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
-    add("--garment", metavar="NAME|FILE", action="append", default=[],
+    add("--garment", metavar="NAME|FILE", default="tshirt",
         help="tshirt, tunic, skirt, tank_top, long_sleeves, trousers, shorts, dress, or a mesh made for the "
-        "body; repeat for one model each (default: tshirt)")  # fmt: skip
+        "body (default: tshirt)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
-    add(
-        "--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl (default: the package's)"
-    )
+    add("--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
-    add("--dataset", metavar="FILE", help="simulated motions, read from the file a few frames at a time")
-    add_motion_options(add)
+    add("--dataset", metavar="FILE", help="a file of simulated motions")
     add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
-    add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
-    add("-o", "--out", metavar="FILE",
-        help="file to write; of several garments each adds its name (default: by --model)")  # fmt: skip
-    add = parser.add_argument_group("early stop").add_argument
     add("--validation", metavar="NAME", action="append", default=[],
         help="roll this motion out now and then: one held out of training, or of the library a validation "
         "motion or one without a role; may be repeated. The weights that do best are kept")  # fmt: skip
-    add("--validate-every", metavar="STEPS", type=int, default=200, help="(default: %(default)s)")
     add("--patience", metavar="N", type=int, default=0,
         help="validations without a better value, after which training stops (default: never)")  # fmt: skip
-    add = parser.add_argument_group("where and how long").add_argument
+    add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where the whole step runs (default: cpu)")
-    add("--threads", type=int, default=1, help="of torch on the CPU (default: %(default)s)")
-    add(
-        "--checkpoint-minutes", metavar="M", type=float, default=5.0, help="0 for none (default: %(default)s)"
-    )
-    add("--checkpoint-steps", metavar="N", type=int, default=0, help="a checkpoint every N steps as well")
     add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
+    add("-o", "--out", metavar="FILE", help="file to write (default: by --model)")
+    add_motion_options(parser.add_argument_group("motions in files").add_argument)
     add_garment_options(parser)
     options = parser.parse_args(arguments)
-    options.out = options.out or f"{options.model}.safetensors"
+    options.out = Path(options.out or f"{options.model}.safetensors")
     return options
 
 
-SMALLEST = {
-    "seed": 0,
-    "threads": 1,
-    "validate_every": 1,
-    "patience": 0,
-    "checkpoint_minutes": 0,
-    "checkpoint_steps": 0,
-    "steps": 1,
-    "vertices": 1,
-}
-
-
-def _largest(name: str) -> int:
-    """Return the largest value: more threads than cores only wait for each other; a seed has 63 bits."""
-    return {"seed": (1 << 63) - 1, "threads": os.cpu_count() or 1}.get(name, 10**9)
-
-
 def check_options(options: argparse.Namespace) -> None:
-    """Raise ValueError for an option that is out of range, or means nothing without another."""
+    """Raise ValueError for an option that means nothing without another, or a file that cannot be written."""
     from snug.training.kinds import find_kind  # loads torch
 
-    for name, smallest in SMALLEST.items():
-        value, largest = getattr(options, name), _largest(name)
-        if not smallest <= value <= largest:
-            limit = f"at most {largest}" if value > largest else f"at least {smallest}"
-            raise ValueError(f"--{name.replace('_', '-')} {str(value)[:40]}: {limit}")
     if options.dataset and options.motions:
         raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
     simulated = not find_kind(options.model).physics
@@ -116,6 +101,55 @@ def check_options(options: argparse.Namespace) -> None:
         raise ValueError(f"--recipe {options.recipe}: {options.model} has its own; leave out --recipe")
     if options.patience and not options.validation:
         raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")
+    if options.out.is_dir():
+        raise ValueError(f"--out {options.out}: is a folder; name a file")
+    try:
+        demand_writable_folder(options.out.parent)
+    except ValueError as error:
+        raise ValueError(f"--out {options.out}: {error}") from None
+
+
+def choose_garment(options: argparse.Namespace, body: Body) -> Garment:
+    """Return the garment to train for, tailored or read. Raises ValueError."""
+    if not is_garment_file(options.garment):
+        from snug.garments.templates import find_template
+
+        demand_garment_file(options)
+        return find_template(options.garment).tailor(body, vertices=options.vertices)
+    from snug.garments.reading import read_garment  # a tailored garment needs no reader of meshes
+
+    return read_garment(make_garment_file(options.garment, options), body)
+
+
+def choose_motions(
+    options: argparse.Namespace, simulated: Sequence[Motion] = ()
+) -> tuple[list[Motion], list[Motion]]:
+    """Return the motions to train on and those to validate with. Raises ValueError for an unknown name.
+
+    Args:
+        options: of the command line.
+        simulated: motions of a data set, which take the place of the library's.
+    """
+    from snug.motion.files import load_motions
+    from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion
+
+    reading = parse_motion_options(options)
+    motions = list(simulated) or [make_motion(name) for name in TRAIN]
+    if options.motions:
+        motions = load_motions(options.motions, options=reading)
+    names = [motion.name for motion in motions]
+    # Of the library; they never train.
+    others = [name for name in (*VALIDATION, *DYNAMIC_VALIDATION, *CONTROL) if name not in names]
+    for option, known in (("hold_out", names), ("validation", [*names, *others])):
+        for name in getattr(options, option):
+            if name not in known:
+                option = option.replace("_", "-")
+                raise ValueError(f"--{option} {name}: no such motion among {', '.join(known)}")
+    left_out = {*options.hold_out, *options.validation}
+    training = [motion for motion in motions if motion.name not in left_out]
+    validating = [motion for motion in motions if motion.name in options.validation]
+    validating += [make_motion(name) for name in others if name in options.validation]
+    return training, validating
 
 
 @command("snug.train", goes_on="--resume goes on from there")
@@ -126,60 +160,62 @@ def main(arguments: Sequence[str] | None = None) -> int:
     import torch
 
     from snug.body.smpl_files import read_body
-    from snug.training.device import find_device
-    from snug.training.process_group import join_group, leave_group
-    from snug.training.simulated_data import DataSet
-    from snug.training.train_to_file import choose_garments, choose_motions, output_files, train_to_file
-    from snug.training.training_loop import Interrupted
+    from snug.networks.dressed_body import DressedBody
+    from snug.training.checkpoint import Checkpoint
+    from snug.training.simulated_data import read_data_set
+    from snug.training.train_network import train_network
+    from snug.training.validation import Validation
 
     check_options(options)
-    garments = choose_garments(options)
-    outputs = output_files(Path(options.out), garments)
-    device = find_device(options.device)
-    torch.set_num_threads(options.threads)
-    data = DataSet.read(options.dataset) if options.dataset else None
-    motions, held_out = choose_motions(options, data)
-    stop = _StopRequest()
-    group, device = join_group(device)
-    if options.motions and group.writes:
-        for motion in [*motions, *held_out]:
-            print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
-    try:
-        body = read_body(options.body)
-        outputs[0].parent.mkdir(parents=True, exist_ok=True)
-        for garment, output in zip(garments, outputs):
-            train_to_file(
-                options, body, garment, motions, held_out, data, output,
-                device=str(device), group=group, stop=stop,
-            )  # fmt: skip
-    except Interrupted as interrupted:
-        if group.writes:
-            print(f"snug.train: {interrupted}; go on with --resume", file=sys.stderr)
-        return 130
-    finally:
-        leave_group()
-        stop.restore()
+    torch.set_num_threads(1)
+    body = read_body(options.body)
+    dressed = DressedBody(body, choose_garment(options, body))
+    simulated: list[Motion] = []
+    trajectories = None
+    if options.dataset:
+        simulated, trajectories = read_data_set(Path(options.dataset), body, dressed.garment)
+    motions, held_out = choose_motions(options, simulated)
+    for motion in [*motions, *held_out] if options.motions else ():
+        print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
+    out = options.out
+    checkpoint = Checkpoint(
+        path=out.with_name(f"{out.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
+        resume=options.resume,
+    )  # fmt: skip
+    if checkpoint.path.is_file() and not options.resume:
+        print(f"note: {checkpoint.path} of a stopped run will be replaced; --resume would go on with it")
+    if options.resume and out.is_file() and not checkpoint.path.is_file():
+        print(f"{out}: is there, and no checkpoint beside it; nothing to resume")
+        return 0
+    frames = sum(motion.frames for motion in motions)
+    print(f"{dressed.garment.name}: {dressed.vertices} vertices, {len(motions)} motions, {frames} frames")
+    validation = None
+    if held_out:
+        validation = Validation(motions=held_out, patience=options.patience, trajectories=trajectories)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    model = train_network(
+        options.model, dressed, motions, steps=options.steps, seed=options.seed,
+        recipe=RECIPES.get(options.recipe), trajectories=trajectories, device=options.device,
+        checkpoint=checkpoint, validation=validation,
+    )  # fmt: skip
+    print_summary(model)
+    print(model.save(out))
+    checkpoint.delete()
     return 0
 
 
-class _StopRequest:
-    """True once the process was asked to end; a second request ends it at once."""
-
-    def __init__(self) -> None:
-        self.received = False
-        self._before = {n: signal.signal(n, self._receive) for n in (signal.SIGINT, signal.SIGTERM)}
-
-    def _receive(self, number: int, frame: FrameType | None) -> None:
-        self.received = True
-        signal.signal(number, signal.SIG_DFL)
-
-    def __call__(self) -> bool:
-        return self.received
-
-    def restore(self) -> None:
-        """Put back the handlers that were there before: `main` may be called by a longer program."""
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
+def print_summary(model: TrainedModel) -> None:
+    """Print the last losses, high windows, the best validation and the size of a model."""
+    terms = [f"{name} {value:.4g}" for name, value in model.history[-1].items()
+             if "/" not in name and name not in ("step", "seconds")]  # fmt: skip
+    print(f"recipe {model.recipe.name}, last steps, {model.unit}, mean over frames: " + "  ".join(terms))
+    for window in model.summary["named_windows"][:5]:
+        print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
+    if validation := model.summary.get("validation"):
+        best, step = validation["best"], validation["best_step"]
+        print(f"validation {best:.4g} {model.unit} at step {step}, whose weights are kept")
+    print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
+          f"{model.megabytes:.1f} MB")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -40,13 +40,12 @@ class CapturedStep:
     def serves(trainer: Trainer) -> bool:
         """Return whether a trainer's step can be captured.
 
-        The step must be of one process and on the energies alone. The network must read no frames before its
-        windows, and no motion may have a body of its own.
+        The step must be on the energies alone. The network must read no frames before its windows, and no
+        motion may have a body of its own.
         """
         return bool(
             trainer.loss
             and not trainer.kernels
-            and trainer.group.size == 1
             and trainer.past is None
             and not trainer.network.lead
             and trainer.data.shapes is None

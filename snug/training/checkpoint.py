@@ -17,7 +17,7 @@ from snug.training.validation import Validator
 
 CHECKPOINT_FORMAT = "snug-checkpoint-7"
 # Facts of a run that are short enough to be named in a message.
-NAMED_FACTS = ("kind", "seed", "steps", "threads", "processes", "vertices", "every")
+NAMED_FACTS = ("kind", "seed", "steps", "threads", "vertices", "every")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,6 @@ class Checkpoint:
 
     Attributes:
         path: the file.
-        steps: after every so many steps; 0 for never.
         minutes: after so many minutes; 0 for never.
         resume: continue from the file, if there is one.
         key: further facts that the run depends on, as the version of the code. A checkpoint that has another
@@ -37,7 +36,6 @@ class Checkpoint:
     """
 
     path: Path
-    steps: int = 0
     minutes: float = 5.0
     resume: bool = False
     key: str = ""
@@ -51,9 +49,9 @@ class Checkpoint:
         """True if there is a file to continue from, and that is wanted."""
         return self.resume and self.path.is_file()
 
-    def is_due(self, step: int, seconds: float) -> bool:
-        """Return whether to write one after that step, `seconds` [s] after the last."""
-        return bool(self.steps and step % self.steps == 0) or 0 < 60 * self.minutes < seconds
+    def is_due(self, seconds: float) -> bool:
+        """Return whether to write one `seconds` [s] after the last."""
+        return 0 < 60 * self.minutes < seconds
 
     def write(
         self, identity: Mapping[str, Any], tensors: Mapping[str, Tensor], state: Mapping[str, Any]
@@ -97,7 +95,7 @@ class Checkpoint:
 def describe_run(trainer: Trainer, validator: Validator | None, **facts: Any) -> dict[str, Any]:
     """Return the facts that must be equal for two runs to be the same run."""
     digest = hashlib.sha256()
-    targets = trainer.targets.fingerprint() if trainer.targets else _bytes(trainer.data.ahead)
+    targets = _bytes(trainer.targets.vertices if trainer.targets else trainer.data.ahead)
     past = [_bytes(trainer.past.frames)] if trainer.past else []
     data, weights = trainer.data, trainer.dressed.weights(trainer.recipe.smoothing)
     sets = [data, validator.data] if validator else [data]
@@ -113,9 +111,8 @@ def describe_run(trainer: Trainer, validator: Validator | None, **facts: Any) ->
         "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},
         "seed": trainer.seed,
         "steps": trainer.steps,
-        # Both change the order of sums, and so the last bits.
+        # They change the order of sums, and so the last bits.
         "threads": torch.get_num_threads(),
-        "processes": trainer.group.size,
         "vertices": trainer.dressed.vertices,
         "data": digest.hexdigest(),
         "material": asdict(trainer.dressed.cloth.material),

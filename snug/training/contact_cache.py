@@ -132,7 +132,7 @@ def quantise(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tup
 
 
 class ContactCache:
-    """One anchor per frame and sample, and the steps since each frame's were last searched or propagated."""
+    """One anchor per frame and sample."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
         faces, barycentric = quantise(
@@ -141,7 +141,6 @@ class ContactCache:
         self.patch = patch
         self.faces = np.repeat(faces[None], frames, axis=0)
         self.barycentric = np.repeat(barycentric[None], frames, axis=0)
-        self.age = np.zeros(frames, np.int64)
 
     def energy(
         self,
@@ -200,12 +199,6 @@ class ContactCache:
         """
         anchors = self.patch.search(points, positions, self.faces[frame], exact=exact)
         self.faces[frame], self.barycentric[frame] = quantise(*anchors, len(self.patch.faces))
-        self.age[frame] = 0
-
-    def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """Return the places in `frames` of the `count` oldest anchors; every one of `frames` grows older."""
-        self.age[frames] += 1
-        return np.argsort(-self.age[frames], kind="stable")[:count]
 
 
 @lru_cache(maxsize=16)

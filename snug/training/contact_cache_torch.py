@@ -6,8 +6,6 @@ force: of all allowed body vertices the nearest few, and of the faces around tho
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 import torch
 from torch import Tensor
@@ -25,11 +23,11 @@ FORBIDDEN = 1.0
 
 
 class TensorContactCache:
-    """One anchor per frame and sample on `device`; the ages of the frames are on the CPU."""
+    """One anchor per frame and sample on `device`."""
 
     def __init__(self, patch: Patch, frames: int, device: torch.device) -> None:
         start = ContactCache(patch, 1)
-        self.patch, self.age = patch, np.zeros(frames, np.int64)
+        self.patch = patch
         self.faces = torch.as_tensor(start.faces, device=device).repeat(frames, 1)
         self.barycentric = torch.as_tensor(start.barycentric, device=device).repeat(frames, 1, 1)
         self.corners = torch.as_tensor(patch.faces, device=device).long()  # (Q, 3)
@@ -42,10 +40,6 @@ class TensorContactCache:
         self.around = torch.as_tensor(around, device=device)  # (P, K) faces, -1 beyond the last
         self._walked_from, self.planes_at = compiled(self._walked, device), compiled(self._planes, device)
         self._closest = CudaGraph(self._searched_in_parts, device)
-
-    def oldest(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """Return the places of the oldest anchors, see ContactCache.oldest."""
-        return ContactCache.oldest(cast(ContactCache, self), frames, count)
 
     def normals(self, positions: Tensor) -> Tensor:
         """Return area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
@@ -139,7 +133,6 @@ class TensorContactCache:
         Brute force has no use for old anchors, so that `exact` changes nothing.
         """
         self.faces[frame], self.barycentric[frame] = self._closest(points, positions)
-        self.age[frame] = 0
 
     def _searched_in_parts(self, points: Tensor, positions: Tensor) -> Anchors:
         """Return the closest anchors of samples (S, 3) on a body (P, 3), part by part."""

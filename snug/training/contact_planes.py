@@ -23,7 +23,6 @@ from snug.training.contact_cache import ContactCache, Patch
 from snug.training.contact_cache_torch import Anchors, TensorContactCache
 from snug.training.device import compiled
 from snug.training.physics_loss import Planes
-from snug.training.process_group import ALONE, Group
 from snug.training.training_set import Batch, TrainingSet
 
 # Patches in the frames of a batch: rows (N T,) into positions and normals (R, P, 3), arrays or tensors.
@@ -73,7 +72,6 @@ class BodyPatches:
     @cached_property
     def marks(self) -> np.ndarray:
         """Some vertices of the patch in every frame, (F, M, 3) [m], by which poses are compared."""
-        # On the CPU whatever the device, so that processes that share a run propagate alike.
         weights = self.weights[::MARKED].cpu()
         return np.concatenate([
             skin(self._corrected(rest.cpu(), part, MARKED), weights, part).numpy()
@@ -141,7 +139,7 @@ NEAR, FIRST_NEAR = 0.03, 0.07
 
 
 class TrainingContact:
-    """Anchors of all training frames; a group shares the work, and every process of it keeps all anchors.
+    """Anchors of all training frames, and the steps since each frame's were last searched or propagated.
 
     Args:
         data: the training set.
@@ -149,7 +147,6 @@ class TrainingContact:
         refresh: see Recipe.contact_refresh.
         kept: whether each frame has one body for good; the kernels then pose them all once.
         kernels: in numpy and numba, else in torch on the set's device.
-        group: processes that share the training.
     """
 
     def __init__(
@@ -160,11 +157,10 @@ class TrainingContact:
         refresh: float,
         kept: bool,
         kernels: bool = True,
-        group: Group = ALONE,
     ) -> None:
         body, device = data.dressed.body, data.device
         self.data, self.contact, self.refresh = data, contact, refresh
-        self.kernels, self.group = kernels, group
+        self.kernels, self.age = kernels, np.zeros(data.frames, np.int64)
         self.patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
         frames = data.frames
         self.cache: ContactCache | TensorContactCache
@@ -223,8 +219,7 @@ class TrainingContact:
         walk = x is not None
         if walk:
             held = np.unique(batch.frames)
-            # Ages of all frames: in a group every process keeps those of the others' windows too.
-            self._before = self.cache.age.copy(), held, *(table[held] for table in self._tables())
+            self._before = self.age.copy(), held, *(table[held] for table in self._tables())
         if isinstance(self.cache, ContactCache):
             cache, (of_body, *body) = self.cache, posed
             rows = of_body.reshape(batch.frames.shape)
@@ -262,15 +257,16 @@ class TrainingContact:
 
         Args:
             frames: (N, T), of the whole batch.
-            posed: bodies of the windows that this process works on.
-            x: (n, T, V, 3), predicted vertices of these windows.
+            posed: bodies of its windows.
+            x: (N, T, V, 3), predicted vertices.
         """
         self._credit += self.refresh * frames.size
         count = int(self._credit)
         self._credit -= count
         window = frames.shape[1]
         middle = frames[:, window // 2]
-        oldest = self.cache.oldest(middle, count)
+        self.age[middle] += 1
+        oldest = np.argsort(-self.age[middle], kind="stable")[:count]
         self.search(oldest * window + window // 2, frames, posed, x)
         searched = np.unique(middle[oldest])
         for frame in searched:
@@ -295,29 +291,20 @@ class TrainingContact:
         """Copy the anchors of a frame to others (n,), as if they had been searched."""
         for table in self._tables():
             table[others] = table[[frame]]  # a copy: torch writes no tensor onto itself
-        self.cache.age[others], self._changed[others] = 0, True
+        self.age[others], self._changed[others] = 0, True
 
     def settle(self, frames: np.ndarray, *, trusted: bool) -> None:
         """Keep the anchors' places since `planes` if the prediction is trusted, else put them back.
 
-        Then every process gives its own to the others. frames: see `requery`.
+        frames: see `requery`.
         """
         if self._before and not trusted:
             age, rows, *before = self._before
-            self.cache.age[:] = age
+            self.age[:] = age
             for table, held in zip(self._tables(), before):
                 table[rows] = held
         self._before = None
-        flat = frames.ravel()
-        self._changed[flat] = True
-        if self.group.size == 1:
-            return
-        mine = flat[self.group.part(len(flat))]
-        for table in self._tables():
-            # As bytes, for not every backend sends integers of two; row by row, for a frame may come twice.
-            given = torch.as_tensor(table[mine]).view(torch.uint8)
-            for frame, row in zip(flat, self.group.gathered(given)):
-                torch.as_tensor(table[frame]).view(torch.uint8).copy_(row)  # shares memory
+        self._changed[frames.ravel()] = True
 
     def search(
         self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor, *, exact: bool = False
@@ -328,14 +315,10 @@ class TrainingContact:
         """
         flat, (rows, positions, _) = frames.ravel(), posed
         vertices, window = x.detach(), frames.shape[1]
-        share = vertices.shape[0] * window
-        for place in places:
-            owner, mine = divmod(int(place), share)
-            if owner == self.group.rank:
-                samples = self._samples(vertices[divmod(mine, window)])
-                self.cache.requery(int(flat[place]), samples, positions[rows[mine]], exact=exact)
-            self.cache.age[flat[place]] = 0
-            self._send(int(flat[place]), owner)
+        for place in places.tolist():
+            samples = self._samples(vertices[divmod(place, window)])
+            self.cache.requery(int(flat[place]), samples, positions[rows[place]], exact=exact)
+            self.age[flat[place]] = 0
 
     def _samples(self, vertices: Tensor) -> Any:  # as the cache's, an array or a tensor
         """Return contact samples (S, 3) of vertices (V, 3); of tensors also (..., S, 3) of (..., V, 3)."""
@@ -347,11 +330,6 @@ class TrainingContact:
         """Return faces (F, S) and barycentric coordinates (F, S, 2) of all anchors."""
         return self.cache.faces, self.cache.barycentric
 
-    def _send(self, frame: int, owner: int) -> None:
-        for table in self._tables():
-            # Shares memory with the row; as bytes, for not every backend sends integers of two.
-            self.group.sent(torch.as_tensor(table[frame]).view(torch.uint8), owner)
-
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Return the state for a checkpoint: changed anchors, ages of all, a search not yet due."""
         changed = torch.as_tensor(np.flatnonzero(self._changed))
@@ -359,7 +337,7 @@ class TrainingContact:
         rows = changed.to(faces.device)
         return {
             "changed": changed, "faces": faces[rows], "barycentric": barycentric[rows],
-            "age": torch.as_tensor(self.cache.age.copy()),
+            "age": torch.as_tensor(self.age.copy()),
         }, {"credit": self._credit}  # fmt: skip
 
     def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
@@ -369,5 +347,5 @@ class TrainingContact:
         for table, name in zip(self._tables(), ("faces", "barycentric")):
             held = torch.as_tensor(table)  # shares memory
             held[torch.as_tensor(changed, device=held.device)] = tensors[name].to(held.device)
-        self.cache.age[:] = tensors["age"].numpy()
+        self.age[:] = tensors["age"].numpy()
         self._credit = facts["credit"]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, cast
 
@@ -30,10 +30,9 @@ from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.kinds import find_kind
 from snug.training.physics_loss import PhysicsLoss
-from snug.training.process_group import ALONE, Group, GroupError
 from snug.training.simulated_data import SimulatedPast
 from snug.training.training_set import Batch, HiddenStateCache, TrainingError, TrainingSet
-from snug.training.vertex_targets import Targets, VertexTargets
+from snug.training.vertex_targets import Trajectories, VertexTargets
 
 # On a GPU "captured" is all from the windows to the gradients; see snug.training.captured_step.
 PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "captured", "optimiser", "requery")
@@ -100,20 +99,21 @@ class Trainer:
         steps: int,
         seed: int,
         recipe: Recipe,
-        trajectories: Mapping[str, Targets] | None = None,
+        trajectories: Trajectories | None = None,
         device: torch.device = CPU,
         kernels: bool | None = None,
-        group: Group = ALONE,
     ) -> None:
         if steps < 1:
             raise TrainingError(f"steps={steps}: training needs at least one step")
+        if not 0 <= seed < 1 << 63:
+            raise TrainingError(f"seed={seed}: give a number from 0 to 2^63 - 1")
         if not motions:
             raise TrainingError("no motions to train on")
         if kernels and device.type != "cpu":
             raise TrainingError(f"kernels=True, device={device}: the kernels run on a CPU alone")
         how = find_kind(kind)
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
-        self.device, self.group, self.clock = device, group, Stopwatch(device)
+        self.device, self.clock = device, Stopwatch(device)
         self.kernels = device.type == "cpu" if kernels is None else kernels
         self.posed_by = FastSkin.apply if self.kernels else compiled(skin, device)
         self.data = make_training_set(how, dressed, motions, recipe, seed=seed, device=device)
@@ -150,21 +150,13 @@ class Trainer:
         self._set_up_supervision(motions, trajectories)
         self.hidden_states = self._hidden_state_cache()
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
-        self._callable = group.wrapped(self.network)
         self.captured = CapturedStep(self) if on_gpu and CapturedStep.serves(self) else None
 
-    def _set_up_supervision(
-        self, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
-    ) -> None:
+    def _set_up_supervision(self, motions: Sequence[Motion], trajectories: Trajectories | None) -> None:
         """Prepare the loss: simulated vertices, or the energies, perhaps about a simulated past."""
         how, recipe, data = self.how, self.recipe, self.data
         if how.targets:
-            if self.group.size > 1:
-                raise GroupError(
-                    f"{self.kind} is trained by one process: only the energies are shared by several"
-                )
-            on_cpu = (self.dressed.weights(recipe.smoothing), data.transforms.cpu())
-            self.targets = how.targets(self.dressed, motions, trajectories, *on_cpu).to(self.device)
+            self.targets = how.targets(data, motions, trajectories, self.weights)
             return
         self.loss = PhysicsLoss(
             self.dressed.cloth, recipe, dt=data.dt, device=self.device, kernels=self.kernels
@@ -201,7 +193,6 @@ class Trainer:
             refresh=self.recipe.contact_refresh,
             kept=not self.shaped,
             kernels=self.kernels,
-            group=self.group if data is self.data else ALONE,
         )
 
     def draw(self) -> np.ndarray:
@@ -227,13 +218,12 @@ class Trainer:
             if self.shaped:
                 shapes = self.dressed.body.shape_count
                 betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
-            mine = self.group.part(len(windows))
             frames = self.data.frames_of(windows)
-            state = self.start_state(len(windows), mine, frames[mine])
+            state = self.start_state(frames)
         if self.captured and (means := self.captured.take(number, windows, frames, betas, state)):
             return {"loss": sum(means.values()), **means}
         with self.clock.part("draw"):
-            batch = self.data.batch(windows[mine], None if betas is None else betas[mine])
+            batch = self.data.batch(windows, betas)
         if self.loss is None:
             assert self.targets is not None
             with self.clock.part("forward"):
@@ -246,7 +236,7 @@ class Trainer:
     def _physics_step(
         self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Tensor | None
     ) -> dict[str, float]:
-        """Take a step on the energies. windows (N,), frames (N, T): of all processes; batch: of this one."""
+        """Take a step on the energies of windows (N,) with frames (N, T)."""
         assert self.loss is not None
         x, after = self.predict(batch, state)
         planes = posed = None
@@ -263,7 +253,7 @@ class Trainer:
                 terms |= self.past.terms(x, batch)
         means, trusted = self._update(number, windows, terms)
         if trusted and self.hidden_states and after is not None:
-            self.hidden_states.keep(batch.frames[:, -1], after, self.group)
+            self.hidden_states.keep(batch.frames[:, -1], after)
         if self.contact and posed:
             with self.clock.part("requery"):
                 self.contact.settle(frames, trusted=trusted)
@@ -284,32 +274,29 @@ class Trainer:
         if number < SETTLING:
             return False
         joules = torch.stack(list(terms.values())).detach().sum(0).mean(1)
-        high = np.flatnonzero(self.group.gathered(joules > self.recipe.spike).cpu().numpy())
+        high = np.flatnonzero((joules > self.recipe.spike).cpu().numpy())
         if not 0 < len(high) <= MOSTLY_FINE * len(frames):
             return False
         places = (high[:, None] * self.data.window + np.arange(self.data.window)).ravel()
         self.contact.search(places, frames, posed, x, exact=True)
         return True
 
-    def start_state(self, count: int, mine: slice, frames: np.ndarray) -> Tensor | None:
+    def start_state(self, frames: np.ndarray) -> Tensor | None:
         """Return the state before windows with frames (N, T): noise of the recipe plus the cached state.
 
         For TailorNet it is the dropout masks; a network with a lead reads the frames before.
-
-        Noise is drawn for all `count` windows of the step; only that of this process is kept.
         """
         if self.network.lead:
             return self.network.state_after(self.data.before(frames[:, 0], self.network.lead))
-        state = self.network.random_state(count, self.recipe.h0_sigma, self.noise)
+        state = self.network.random_state(len(frames), self.recipe.h0_sigma, self.noise)
         if state is None:
             return None
-        state = state[:, mine].contiguous()  # as cuDNN wants it
         return state + self.hidden_states.at(frames[:, 0]) if self.hidden_states else state
 
     def predict(self, batch: Batch, state: Tensor | None) -> tuple[Tensor, Tensor | None]:
         """Return vertices (N, T, V, 3) [m] relative to the pelvis, and the state after them."""
         with self.clock.part("forward"):
-            offsets, after = self._callable(batch.features, state)
+            offsets, after = self.network(batch.features, state)
         with self.clock.part("skinning"):
             # Offsets first: the sum then lies in memory as they do.
             return self.posed_by(offsets + batch.rest, self.weights, batch.transforms), after
@@ -336,7 +323,7 @@ class Trainer:
         Returns the means by term, and whether the prediction is good enough to search contact anchors with.
         """
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
-        whole = self.group.gathered(stacked.detach())
+        whole = stacked.detach()
         joules = whole.sum(1).mean(1).cpu().numpy()
         means = dict(zip(terms, whole.mean((0, 2)).tolist()))
         name = self.namer(windows)

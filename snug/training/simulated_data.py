@@ -1,8 +1,8 @@
-"""Simulated motions in one file, which training reads a few frames at a time.
+"""Simulated motions in one file, and a loss with respect to a simulated past.
 
 The file is HDF5: attribute `settings` says of what body and garment the simulations are (`settings_of`); a
-group for each motion, called by its place, has attributes `name`, `fps` and `digest` of its vertices, and
-poses (T,24,3) [rad], translations (T,3) [m] and vertices (T,V,3) [m] from the pelvis, float32.
+group for each motion, called by its place, has attributes `name` and `fps`, and poses (T,24,3) [rad],
+translations (T,3) [m] and vertices (T,V,3) [m] from the pelvis, float32.
 `python -m benchmarks.export GARMENT/training-motions` writes such a file.
 
 Inertia and distance with respect to a simulation, for a network that learns from the energies.
@@ -30,8 +30,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,12 +46,11 @@ from snug.motion.motion import Motion
 from snug.networks.garment_network import seeded
 from snug.networks.regressor import MotionPerceptron
 from snug.training.training_set import Batch, TrainingSet
-from snug.training.vertex_targets import Targets, load_relative, match_targets
+from snug.training.vertex_targets import Trajectories, relative_vertices
 
 if TYPE_CHECKING:
     from snug.body.parametric_body import Body
     from snug.garments.garment import Garment
-    from snug.training.vertex_targets import StoredVertices
 
 DATA_SET_FORMAT = 2
 MICROMETRES = 6  # decimals of positions [m] that count: another processor may tailor the last bits otherwise
@@ -61,57 +60,38 @@ class DataSetError(ValueError):
     """A file that holds no simulated motions, or not the ones that are wanted; the message names it."""
 
 
-@dataclass(frozen=True)
-class DataSet:
-    """Simulated motions and the file that holds their vertices.
+def read_data_set(path: Path, body: Body, garment: Garment) -> tuple[list[Motion], dict[str, np.ndarray]]:
+    """Return the motions of a file, and their simulated world vertices (T, V, 3) [m] by name.
 
-    Attributes:
-        path: the file.
-        settings: common to all simulations, see `settings_of`.
-        motions: that were simulated.
-        targets: name -> vertices of each motion, which stay in the file.
+    Raises:
+        DataSetError: no file of simulated motions, or simulations of another body or garment.
     """
-
-    path: Path
-    settings: Mapping[str, Any]
-    motions: list[Motion]
-    targets: dict[str, StoredVertices]
-
-    @classmethod
-    def read(cls, file: str | Path) -> DataSet:
-        """Read everything but the vertices. Raises DataSetError."""
-        from snug.training.vertex_targets import StoredVertices
-
-        path, motions, targets = Path(file), list[Motion](), dict[str, StoredVertices]()
-        if not path.is_file():
-            raise DataSetError(f"{path}: no such file; python -m benchmarks.export writes one")
-        try:
-            with h5py.File(path) as data:
-                if (number := int(data.attrs["format"])) != DATA_SET_FORMAT:
-                    raise DataSetError(f"{path}: format {number}; this version reads {DATA_SET_FORMAT}")
-                settings = dict(json.loads(data.attrs["settings"]))
-                for place in map(str, range(len(data))):
-                    group = data[place]
-                    name, fps = str(group.attrs["name"]), float(group.attrs["fps"])
-                    poses, translations = group["poses"][:], group["translations"][:]
-                    motions.append(Motion(name, poses, translations, fps, "simulated"))
-                    shape = (len(poses), int(settings["vertices"]), 3)
-                    targets[name] = StoredVertices(
-                        path, shape, str(group.attrs["digest"]), f"{place}/vertices"
-                    )
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, RuntimeError) as error:
-            if isinstance(error, DataSetError):
-                raise
-            reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
-            raise DataSetError(f"{path}: no file of simulated motions ({reason})") from None
-        return cls(path, settings, motions, targets)
-
-    def check(self, settings: Mapping[str, Any]) -> None:
-        """Raise DataSetError unless the simulations have these settings."""
-        for name, value in settings.items():
-            if (stored := self.settings.get(name)) != value:
-                values = f": {stored} there, {value} here" if isinstance(value, str | int | float) else ""
-                raise DataSetError(f"{self.path}: simulations of another {name}{values}")
+    if not path.is_file():
+        raise DataSetError(f"{path}: no such file; python -m benchmarks.export writes one")
+    motions, trajectories = list[Motion](), dict[str, np.ndarray]()
+    try:
+        with h5py.File(path) as data:
+            if (number := int(data.attrs["format"])) != DATA_SET_FORMAT:
+                raise DataSetError(f"{path}: format {number}; this version reads {DATA_SET_FORMAT}")
+            settings = dict(json.loads(data.attrs["settings"]))
+            for name, value in settings_of(body, garment).items():
+                if (stored := settings.get(name)) != value:
+                    values = f": {stored} there, {value} here" if isinstance(value, str | int) else ""
+                    raise DataSetError(f"{path}: simulations of another {name}{values}")
+            for group in (data[str(place)] for place in range(len(data))):
+                motion = Motion(
+                    str(group.attrs["name"]), group["poses"][:], group["translations"][:],
+                    float(group.attrs["fps"]), "simulated",
+                )  # fmt: skip
+                pelvis = body.joints()[0] + motion.translations
+                motions.append(motion)
+                trajectories[motion.name] = group["vertices"][:] + pelvis[:, None]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RuntimeError) as error:
+        if isinstance(error, DataSetError):
+            raise
+        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
+        raise DataSetError(f"{path}: no file of simulated motions ({reason})") from None
+    return motions, trajectories
 
 
 def write_data_set(
@@ -133,7 +113,7 @@ def write_data_set(
             pelvis = joint + motion.translations
             vertices = (positions - pelvis[:, None]).astype(np.float32)
             group = data.create_group(str(place))
-            group.attrs.update(name=motion.name, fps=motion.fps, digest=_digest([vertices]))
+            group.attrs.update(name=motion.name, fps=motion.fps)
             group["poses"], group["translations"] = motion.poses, motion.translations
             group["vertices"] = vertices
 
@@ -178,11 +158,10 @@ class SimulatedPast:
     """
 
     def __init__(
-        self, data: TrainingSet, motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None
+        self, data: TrainingSet, motions: Sequence[Motion], trajectories: Trajectories | None
     ) -> None:
         self.data, dressed = data, data.dressed
-        targets = match_targets(motions, trajectories, dressed.vertices)
-        self.frames = load_relative(dressed, motions, targets).to(data.device)
+        self.frames = relative_vertices(dressed, motions, trajectories).to(data.device)
         third = [torch.arange(motion.frames) >= 2 for motion in motions]  # with two before it in its motion
         self.third = torch.cat(third).to(data.device)
         masses = torch.as_tensor(dressed.cloth.masses, dtype=torch.float32, device=data.device)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
 
@@ -20,11 +20,10 @@ from snug.training.checkpoint import Checkpoint
 from snug.training.device import find_device
 from snug.training.kinds import find_kind
 from snug.training.optimisation_step import Trainer
-from snug.training.process_group import ALONE, Group
 from snug.training.training_loop import TrainingLoop
 from snug.training.training_set import TrainingSet
 from snug.training.validation import Validation
-from snug.training.vertex_targets import Targets, load_relative, match_targets, vertex_loss
+from snug.training.vertex_targets import Trajectories, relative_vertices, vertex_loss
 
 DAMPING = 0.01  # of the offsets that fitted networks learn, see unskin_damped
 PIECE = 256  # frames whose loss is taken at once
@@ -37,7 +36,7 @@ def train_network(
     *,
     steps: int,
     seed: int,
-    trajectories: Mapping[str, Targets] | None = None,
+    trajectories: Trajectories | None = None,
     recipe: Recipe | None = None,
     log: Callable[[dict[str, float]], None] | None = None,
     progress: bool = True,
@@ -46,8 +45,6 @@ def train_network(
     kernels: bool | None = None,
     checkpoint: Checkpoint | None = None,
     validation: Validation | None = None,
-    group: Group = ALONE,
-    stop: Callable[[], bool] = lambda: False,
 ) -> TrainedModel:
     """Train one network for a number of steps; on a CPU equal arguments give equal weights, bit for bit.
 
@@ -62,7 +59,7 @@ def train_network(
         steps: number of updates.
         seed: of everything random.
         trajectories: for kinds that learn from a simulation, motion name -> simulated world vertices
-            (T, V, 3) [m], or where they are stored.
+            (T, V, 3) [m].
         recipe: options of network and training; None: those of the kind (snug.named_recipes.RECIPE_OF_KIND).
         log: called with each row of the history, every `every` steps.
         progress: whether a bar is shown on standard error.
@@ -74,8 +71,6 @@ def train_network(
             unbroken run. The last one stays until the caller has stored the model and calls
             `checkpoint.delete()`.
         validation: held-out motions; the weights that do best on them are kept.
-        group: processes of torchrun that share the batch.
-        stop: asked after each step; True writes a checkpoint and ends the run.
 
     Returns:
         The trained model.
@@ -83,7 +78,6 @@ def train_network(
     Raises:
         ValueError: TrainingError, TargetError, RecipeError, DeviceError or TensorFileError, naming what is
             missing or diverged.
-        snug.training.training_loop.Interrupted: when `stop` returned True.
 
     >>> model = train_network("snug", dressed, motions, steps=2000, seed=0)  # doctest: +SKIP
     """
@@ -94,11 +88,11 @@ def train_network(
         return _fitted_model(model_kind, dressed, motions, trajectories, seed=seed, recipe=recipe)
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
-        device=find_device(device), kernels=kernels, group=group,
+        device=find_device(device), kernels=kernels,
     )  # fmt: skip
     loop = TrainingLoop(
         trainer, log=log, progress=progress, every=every, checkpoint=checkpoint, validation=validation,
-        stop=stop, setup_seconds=time.perf_counter() - start,
+        setup_seconds=time.perf_counter() - start,
     )  # fmt: skip
     return loop.run()
 
@@ -115,7 +109,7 @@ def _fitted_model(
     model_kind: str,
     dressed: DressedBody,
     motions: Sequence[Motion],
-    trajectories: Mapping[str, Targets] | None,
+    trajectories: Trajectories | None,
     *,
     seed: int,
     recipe: Recipe,
@@ -124,7 +118,7 @@ def _fitted_model(
     begun = time.perf_counter()
     kind = find_kind(model_kind)
     data = TrainingSet(dressed, motions, recipe, features=kind.network.feature_set, sequences=False)
-    vertices = load_relative(dressed, motions, match_targets(motions, trajectories, dressed.vertices))
+    vertices = relative_vertices(dressed, motions, trajectories)
     weights = dressed.weights(recipe.smoothing)
     pins = dressed.garment.pins
     network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)

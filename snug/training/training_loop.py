@@ -19,10 +19,6 @@ from snug.training.validation import Validation, Validator
 Log = Callable[[dict[str, float]], None]
 
 
-class Interrupted(Exception):
-    """Training was asked to stop, and has written a checkpoint; the message says where."""
-
-
 class TrainingLoop:
     """One trainer taken through all its steps by `run`.
 
@@ -33,7 +29,6 @@ class TrainingLoop:
         every: steps between two rows of the history.
         checkpoint: file and times of checkpoints; None writes none.
         validation: held-out motions; None validates with none.
-        stop: asked after each step whether to stop.
         setup_seconds: time [s] that making the trainer took; its pretraining counts as training.
     """
 
@@ -46,12 +41,10 @@ class TrainingLoop:
         every: int = 50,
         checkpoint: Checkpoint | None = None,
         validation: Validation | None = None,
-        stop: Callable[[], bool] = lambda: False,
         setup_seconds: float = 0.0,
     ) -> None:
         self.trainer, self.log, self.every, self.checkpoint = trainer, log, every, checkpoint
-        self.stop = stop
-        self.progress = progress and trainer.group.writes
+        self.progress = progress
         self.patience = validation.patience if validation else 0
         self.validator = Validator(trainer, validation) if validation else None
         self.validated_every = validation.every if validation else 0
@@ -70,7 +63,6 @@ class TrainingLoop:
         Raises:
             TrainingError: when training diverges.
             TensorFileError: for a checkpoint of another run.
-            Interrupted: when asked to stop.
         """
         trainer = self.trainer
         self._resume()
@@ -94,18 +86,10 @@ class TrainingLoop:
             row = self._row()
             self.history.append(row)
             bar.set_postfix(loss=f"{row['loss']:.4g}", refresh=False)
-            if self.log and self.trainer.group.writes:
+            if self.log:
                 self.log(row)
-        stopping = self.trainer.group.agreed(float(self.stop())) > 0
-        if self.checkpoint and self.trainer.group.writes:
-            seconds = time.perf_counter() - self._saved
-            if stopping or (not last and self.checkpoint.is_due(self.done, seconds)):
-                self._save(self.checkpoint)
-        if stopping:
-            where = (
-                f", checkpoint {self.checkpoint.path}" if self.checkpoint else ", no checkpoint was asked for"
-            )
-            raise Interrupted(f"stopped after step {self.done} of {self.trainer.steps}{where}")
+        if self.checkpoint and not last and self.checkpoint.is_due(time.perf_counter() - self._saved):
+            self._save(self.checkpoint)
 
     def _row(self) -> dict[str, float]:
         """Return the row of the history over the recent steps, and begin the next."""

@@ -23,7 +23,6 @@ from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import Recipe
 from snug.training.device import CPU, compiled
-from snug.training.process_group import ALONE, Group
 
 # Smallest spread by which an input is divided: rotations are numbers up to 1 in size, and one that hardly
 # moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
@@ -244,10 +243,8 @@ class HiddenStateCache:
         """Return the states (L, N, H) before frames (N,)."""
         return self.states[:, self.before[torch.as_tensor(frames, device=self.before.device)]]
 
-    def keep(self, frames: np.ndarray, states: Tensor, group: Group = ALONE) -> None:
-        """Cache states (L, N, H) after frames (N,); in a group each process gives its own."""
-        rows = group.gathered(torch.as_tensor(frames, device=self.before.device)).cpu().numpy()
+    def keep(self, frames: np.ndarray, states: Tensor) -> None:
+        """Cache states (L, N, H) after frames (N,)."""
         # Of a frame that comes twice the first: which of two writes lands last is not a GPU's to choose.
-        once = torch.as_tensor(np.unique(rows, return_index=True)[1], device=states.device)
-        after = group.gathered(states.detach().transpose(0, 1)).transpose(0, 1)
-        self.states[:, torch.as_tensor(rows, device=states.device)[once]] = after[:, once]
+        once = torch.as_tensor(np.unique(frames, return_index=True)[1], device=states.device)
+        self.states[:, torch.as_tensor(frames, device=states.device)[once]] = states.detach()[:, once]

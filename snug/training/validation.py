@@ -8,7 +8,7 @@ validation, which has none, would look best. Nothing is random.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from snug.training.training_set import Batch, TrainingError, TrainingSet
 
 if TYPE_CHECKING:
     from snug.training.optimisation_step import Trainer
-    from snug.training.vertex_targets import Targets
+    from snug.training.vertex_targets import Trajectories
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class Validation:
     motions: Sequence[Motion]
     every: int = 200
     patience: int = 10
-    trajectories: Mapping[str, Targets] | None = None
+    trajectories: Trajectories | None = None
 
 
 class Validator:
@@ -65,9 +65,7 @@ class Validator:
         self.contact = trainer.contact_of(self.data)
         self.targets = None
         if how.targets:
-            on_cpu = (trainer.weights.cpu(), self.data.transforms.cpu())
-            targets = how.targets(trainer.dressed, motions, validation.trajectories, *on_cpu)
-            self.targets = targets.to(trainer.device)
+            self.targets = how.targets(self.data, motions, validation.trajectories, trainer.weights)
 
     @torch.no_grad()
     def value(self) -> float:
@@ -77,7 +75,7 @@ class Validator:
             # One long window, or, for a static network, windows of one frame: it has no inertia.
             rows = np.arange(first, end).reshape((1, -1) if self.trainer.how.network.sequential else (-1, 1))
             total += float(torch.stack(list(self._terms(self.data.at(rows)).values())).sum())
-        return self.trainer.group.agreed(total / self.data.frames)
+        return total / self.data.frames
 
     def _terms(self, batch: Batch) -> dict[str, Tensor]:
         trainer = self.trainer

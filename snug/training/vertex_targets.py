@@ -9,11 +9,8 @@ The first trains the supervised baseline, SNUG's own network, and Santesteban 20
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-import h5py
 import numpy as np
 import torch
 from torch import Tensor
@@ -24,10 +21,11 @@ from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.tailornet import FrequencyMixture
-from snug.training.device import CPU
 
 if TYPE_CHECKING:
-    from snug.training.training_set import Batch
+    from snug.training.training_set import Batch, TrainingSet
+
+Trajectories = Mapping[str, np.ndarray]  # motion name -> simulated world vertices (T, V, 3) [m]
 
 CM2_PER_M2 = 1e4
 CM_PER_M = float(np.sqrt(CM2_PER_M2))
@@ -49,118 +47,26 @@ def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
     return CM_PER_M * (predicted - target).abs().sum(-1).mean(-1)
 
 
-@dataclass(frozen=True)
-class StoredVertices:
-    """Simulated vertices (T, V, 3) [m] relative to the pelvis, float32 in an HDF5 file.
-
-    Attributes:
-        path: the file.
-        shape: expected, (T, V, 3).
-        content: digest of them, which tells them from others.
-        place: in the file.
-    """
-
-    path: Path
-    shape: tuple[int, int, int]
-    content: str
-    place: str
-
-    def read(self, frames: slice, motion: str) -> Tensor:
-        """Read those frames. Raises TargetError for a file that does not hold them, or no finite numbers."""
-        try:
-            with h5py.File(self.path) as file:
-                whole = file[self.place]
-                shape, dtype = whole.shape, whole.dtype
-                positions = whole[frames] if shape == self.shape else np.empty(0)
-        except (OSError, ValueError, KeyError, AttributeError, RuntimeError) as error:
-            raise TargetError(f"{self.path}: {motion}: {' '.join(str(error).split())[:200]}") from None
-        if shape != self.shape or dtype != np.float32:
-            raise TargetError(f"{self.path}: {motion}: {shape} of {dtype}, expected {self.shape} of float32")
-        _check_finite(positions, motion, frames.start or 0)
-        return torch.from_numpy(positions)
-
-
-# Simulated vertices of one motion: world positions (T, V, 3) [m] in memory, or still in their file.
-Targets = np.ndarray | StoredVertices
-
-
-class StoredFrames:
-    """The frames of several files in a row, read when they are asked for."""
-
-    def __init__(self, motions: Sequence[Motion], parts: Sequence[StoredVertices]) -> None:
-        self.names, self.parts = [motion.name for motion in motions], parts
-        self.first = np.cumsum([0, *(part.shape[0] for part in parts)])
-        self.device = CPU
-
-    @property
-    def fingerprint(self) -> bytes:
-        """Digest input, equal for the same files."""
-        return repr([[name, part.content, part.shape] for name, part in zip(self.names, self.parts)]).encode()
-
-    def to(self, device: torch.device) -> StoredFrames:
-        """Return itself, giving tensors on that device from now on."""
-        self.device = device
-        return self
-
-    def __getitem__(self, frames: Tensor) -> Tensor:
-        """Read windows of consecutive frames of one motion each, row numbers (N, T) -> (N, T, V, 3) [m]."""
-        return torch.stack([self._window(int(row[0]), len(row)) for row in frames]).to(self.device)
-
-    def _window(self, first: int, count: int) -> Tensor:
-        part = int(np.searchsorted(self.first, first, side="right")) - 1
-        start = first - int(self.first[part])
-        return self.parts[part].read(slice(start, start + count), self.names[part])
-
-
 class VertexTargets:
-    """Simulated vertices (F, V, 3) [m] relative to the pelvis, all training frames in a row.
-
-    Where all of them are StoredVertices they stay in their files, and each batch reads its own: the numbers
-    are those of trajectories in memory, bit for bit.
+    """Simulated vertices (F, V, 3) [m] relative to the pelvis, all training frames in a row, on a device.
 
     Args:
-        dressed: body and garment.
+        data: the training set, of the same motions.
         motions: whose frames stand in a row.
-        trajectories: motion name -> simulated vertices.
-        weights: skinning weights (V, J) of the prediction.
-        transforms: joint transforms (F, J, 3, 4) of all frames.
+        trajectories: motion name -> simulated world vertices (T, V, 3) [m].
+        weights: skinning weights (V, J) of the prediction, on the device of the set.
 
     Raises:
         TargetError: for a motion without a fitting trajectory.
     """
 
     unit = "cm²"  # of the loss
-    from_files = True  # whether a batch needs nothing but its own frames
 
     def __init__(
-        self,
-        dressed: DressedBody,
-        motions: Sequence[Motion],
-        trajectories: Mapping[str, Targets] | None,
-        weights: Tensor,
-        transforms: Tensor,
+        self, data: TrainingSet, motions: Sequence[Motion], trajectories: Trajectories | None, weights: Tensor
     ) -> None:
-        targets = match_targets(motions, trajectories, dressed.vertices)
-        self.weights, self.transforms = weights, transforms
-        stored = [target for target in targets if isinstance(target, StoredVertices)]
-        self.vertices: Tensor | StoredFrames
-        if self.from_files and len(stored) == len(targets):
-            self.vertices = StoredFrames(motions, stored)
-        else:
-            self.vertices = load_relative(dressed, motions, targets)
-
-    def to(self, device: torch.device) -> VertexTargets:
-        """Move every tensor to the device; return itself."""
-        for name, value in vars(self).items():
-            if isinstance(value, Tensor | StoredFrames):
-                setattr(self, name, value.to(device))
-        return self
-
-    def fingerprint(self) -> bytes:
-        """Return bytes that are equal for equal vertices in the same place: in memory, or in files."""
-        if isinstance(self.vertices, Tensor):
-            return self.vertices.cpu().numpy().tobytes()
-        return self.vertices.fingerprint
+        self.weights = weights
+        self.vertices = relative_vertices(data.dressed, motions, trajectories).to(data.device)
 
     def terms(
         self,
@@ -176,28 +82,19 @@ class VertexTargets:
 
 
 class BandTargets(VertexTargets):
-    """Simulated vertices, unposed and taken apart into two bands; arguments as for VertexTargets.
-
-    All of it is in memory, also of trajectories in files: smoothing a batch takes longer than its step.
-    """
+    """Simulated vertices, unposed and taken apart into two bands; arguments as for VertexTargets."""
 
     unit = "cm"
-    from_files = False
 
     def __init__(
-        self,
-        dressed: DressedBody,
-        motions: Sequence[Motion],
-        trajectories: Mapping[str, Targets] | None,
-        weights: Tensor,
-        transforms: Tensor,
+        self, data: TrainingSet, motions: Sequence[Motion], trajectories: Trajectories | None, weights: Tensor
     ) -> None:
-        super().__init__(dressed, motions, trajectories, weights, transforms)
-        assert isinstance(self.vertices, Tensor)
-        offsets = unskin(self.vertices, self.weights, self.transforms) - dressed.rest()
-        low = smooth_offsets(offsets.numpy(), np.asarray(dressed.garment.faces))
-        self.low = torch.as_tensor(low, dtype=torch.float32)
-        self.high = offsets - self.low
+        super().__init__(data, motions, trajectories, weights)
+        vertices, transforms = self.vertices.cpu(), data.transforms.cpu()
+        offsets = unskin(vertices, weights.cpu(), transforms) - data.dressed.rest()
+        low = smooth_offsets(offsets.numpy(), np.asarray(data.dressed.garment.faces))
+        self.low = torch.as_tensor(low, dtype=torch.float32).to(data.device)
+        self.high = offsets.to(data.device) - self.low
 
     def terms(
         self,
@@ -236,49 +133,30 @@ def smooth_offsets(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return flat.reshape(count, len(offsets), 3).transpose(1, 0, 2)
 
 
-def load_relative(dressed: DressedBody, motions: Sequence[Motion], parts: Sequence[Targets]) -> Tensor:
-    """Return the vertices of all frames of all motions, (F, V, 3) [m], relative to the pelvis.
+def relative_vertices(
+    dressed: DressedBody, motions: Sequence[Motion], trajectories: Trajectories | None
+) -> Tensor:
+    """Return the simulated vertices of all frames of all motions, (F, V, 3) [m], relative to the pelvis.
 
-    Raises TargetError for a number that is not finite.
-    """
-    relative = []
-    for motion, part in zip(motions, parts):
-        if isinstance(part, StoredVertices):
-            relative.append(part.read(slice(None), motion.name))
-            continue
-        _check_finite(part, motion.name)
-        relative.append(torch.as_tensor(part - dressed.pelvis(motion)[:, None]).float())
-    return torch.cat(relative)
-
-
-def match_targets(
-    motions: Sequence[Motion], trajectories: Mapping[str, Targets] | None, vertices: int
-) -> list[Targets]:
-    """Return the simulated vertices of each motion.
-
-    Raises TargetError for a missing or unfit one.
+    Raises:
+        TargetError: for a missing or unfit trajectory, or a number that is not finite.
     """
     if not trajectories:
         raise TargetError("supervised training needs trajectories: a simulation of each training motion")
-    matched: list[Targets] = []
+    relative = []
     for motion in motions:
         if motion.name not in trajectories:
             raise TargetError(
                 f"no simulated trajectory for motion {motion.name!r}: simulate it, or leave it out"
             )
-        positions = trajectories[motion.name]
-        if not isinstance(positions, StoredVertices):
-            positions = np.asarray(positions)
-        expected = (motion.frames, vertices, 3)
+        positions = np.asarray(trajectories[motion.name])
+        expected = (motion.frames, dressed.vertices, 3)
         if positions.shape != expected:
             raise TargetError(
                 f"trajectory of motion {motion.name!r} has shape {positions.shape}, expected {expected}"
             )
-        matched.append(positions)
-    return matched
-
-
-def _check_finite(positions: np.ndarray, motion: str, first: int = 0) -> None:
-    if not np.isfinite(positions).all():
-        frame = first + int(np.argwhere(~np.isfinite(positions).all(axis=(1, 2)))[0, 0])
-        raise TargetError(f"trajectory of motion {motion!r} is not finite at frame {frame}")
+        if not (finite := np.isfinite(positions).all(axis=(1, 2))).all():
+            frame = int(np.argmin(finite))
+            raise TargetError(f"trajectory of motion {motion.name!r} is not finite at frame {frame}")
+        relative.append(torch.as_tensor(positions - dressed.pelvis(motion)[:, None]).float())
+    return torch.cat(relative)

@@ -128,10 +128,10 @@ def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(checkpoints, "write_tensors", second_is_too_large)
         with pytest.raises(OSError, match="File too large") as full:
-            short(steps=12, checkpoint=Checkpoint(path=path, steps=4))
-    assert saved == [4, 8] and disk_full(full.value).startswith(f"{path}: ")
-    assert os.listdir(tmp_path) == ["run.safetensors"] and read_tensors(path)[1]["done"] == 4
-    same_model(short(steps=12, checkpoint=Checkpoint(path=path, steps=4, resume=True)), whole)
+            short(steps=12, checkpoint=Checkpoint(path=path, minutes=1e-9))
+    assert saved == [1, 2] and disk_full(full.value).startswith(f"{path}: ")
+    assert os.listdir(tmp_path) == ["run.safetensors"] and read_tensors(path)[1]["done"] == 1
+    same_model(short(steps=12, checkpoint=Checkpoint(path=path, minutes=0, resume=True)), whole)
 
 
 def in_process(folder, assets, workers) -> InProcess:

@@ -49,7 +49,7 @@ def overwrite(held, new):
 def capturing(monkeypatch, recipe, **options):
     """A trainer whose step is captured, and one that takes the same steps in single operations."""
     plain = made(recipe, **options)
-    for module in ("captured_step", "contact.cache_torch"):
+    for module in ("captured_step", "contact_cache_torch"):
         monkeypatch.setattr(f"snug.training.{module}.CudaGraph", Replayed)
     captured = made(recipe, **options)
     assert CapturedStep.serves(captured) and plain.captured is captured.captured is None  # on a CPU
@@ -122,8 +122,8 @@ def test_what_a_gpu_compiles_is_traced_whole(monkeypatch):
         return torch.compile(function, dynamic=False, fullgraph=True, backend="eager")
 
     plain = made(PAPER)
-    for module in ("optimisation_step", "training_set", "losses.physics_loss", "contact.body_patches",
-                   "contact.cache_torch"):  # fmt: skip
+    for module in ("optimisation_step", "training_set", "physics_loss", "contact_planes",
+                   "contact_cache_torch"):  # fmt: skip
         monkeypatch.setattr(f"snug.training.{module}.compiled", traced)
     compiled = made(PAPER)
     for number in range(2):

@@ -92,7 +92,7 @@ def test_torch_search_is_no_worse_than_the_walk():
         assert last.min() > -1e-5 and last.sum(1).max() < 1 + 1e-5
     # Away from the skin the walk keeps an old anchor unless there is one half as far.
     assert (distances[1] < distances[0] + 1e-5).all() and (distances[0] < 2 * distances[1] + 1e-5).all()
-    assert list(walk.age) == list(brute.age) and (brute.faces[0].numpy() == walk.faces[0]).all()
+    assert (brute.faces[0].numpy() == walk.faces[0]).all()
 
 
 @pytest.mark.parametrize("region", [0.2, 0.06])

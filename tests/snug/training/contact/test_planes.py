@@ -69,7 +69,7 @@ def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
         ]  # fmt: skip
         assert any((anchors.faces[frame] == anchors.faces[other]).all() for other in near), frame
         assert (anchors.faces[frame] != at_rest).any()
-    assert len(set(searched)) == len(searched) and (anchors.age == 0).all()
+    assert len(set(searched)) == len(searched) and (trainer.contact.age == 0).all()
     assert 6 <= sum(frame < 30 for frame in searched) <= 20 and sum(frame >= 30 for frame in searched) <= 2
     hint = at_rest
     for frame in searched:
@@ -183,7 +183,7 @@ def test_what_has_just_been_searched_borrows_nothing(monkeypatch):
 
     monkeypatch.setattr(contact.cache, "requery", marked)
     trainer.order = np.array([19, 21, *[0] * 14])  # middle frames 20 and 22
-    contact.cache.age[[20, 22]] = 5
+    contact.age[[20, 22]] = 5
     trainer.step(0)
     assert (contact.cache.faces[[20, 22]] == [[20], [22]]).all()
     assert (contact.cache.faces[[18, 24]] == [[20], [22]]).all()

@@ -1,0 +1,42 @@
+"""The command refuses what it could not do, in one line and before any work."""
+
+import numpy as np
+import pytest
+
+from snug.motion.library import TRAIN
+from snug.train import choose_motions, main, parse_options
+
+DANCE = "--validation dance_turn: no such motion among 07_01"
+
+
+def test_motions_that_validate_do_not_train():
+    training, validation = choose_motions(parse_options(["--validation", "kick", "--validation", "bow"]))
+    assert [motion.name for motion in validation] == ["kick", "bow"]
+    assert [motion.name for motion in training] == list(TRAIN)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        ("-o {0}/file/model.safetensors", "file"),
+        ("-o {0}", "is a folder; name a file"),
+        ("--seed -1", "seed=-1: give a number from 0"),
+        ("--threads 2", "a training has one thread"),
+        ("--patience 3", "--patience 3: add --validation NAME"),
+        ("--motions {0}/nowhere", "nowhere"),
+        ("--repair", "say of which files by --motions"),
+        ("--validation dance_turn", DANCE),
+        ("--motions {0} --motion-fps 30 --hold-out b", "--hold-out b: no such motion among a"),
+        ("--device tpu", "--device tpu"),
+    ],
+)
+def test_command_line_refuses_what_it_could_not_do(arguments, hint, refused, tmp_path, tailored_once):
+    (tmp_path / "file").touch()
+    np.savez(tmp_path / "a.npz", poses=np.zeros((9, 72)), trans=np.zeros((9, 3)))
+    given = ["-o", str(tmp_path / "model.safetensors"), "--vertices", "200"]
+    refused(hint, main, [*given, *arguments.format(tmp_path).split()])
+
+
+def test_each_model_has_a_file_of_its_own():
+    assert parse_options(["--model", "pbns"]).out.name == "pbns.safetensors"
+    assert parse_options(["--model", "pbns", "-o", "mine.safetensors"]).out.name == "mine.safetensors"
