@@ -25,7 +25,7 @@ AGAIN = ("--only", "failed,stale,missing")  # so a task that lacked memory once 
 KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
 EXAMPLES = """examples:
   python -m benchmarks.publish --list                which studies are published, and their commands
-  python -m benchmarks.publish fabric                one of them
+  python -m benchmarks.publish shapes                one of them
   python -m benchmarks.publish --workers 8           all of them, with more processes side by side
   python -m benchmarks.publish --scheduler tcp://HOST:8786 --workers 40      untimed tasks on a cluster
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.declarations import DeclarationError, by_name, load
 
@@ -125,16 +125,6 @@ class Dressed:
         return self.body.joints(self.betas)[0] + self.motion.translations
 
 
-class Specimen(Protocol):
-    """Piece of fabric in a textile test."""
-
-    def measure(self, x: np.ndarray) -> dict[str, float]:
-        """Return what the test reads off positions x (V, 3) [m], by the names of metrics fabric/*."""
-
-    def error(self, x: np.ndarray) -> float | None:
-        """Return how far that is from the exact answer, over it [%]; None where none is known."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BuiltScene:
     """Built scene: all that a method may read. Frame 0 of every array is the start.
@@ -157,7 +147,6 @@ class BuiltScene:
         glitch: the frame whose pose is wrong on purpose.
         kept: frames of the motion that a trajectory holds, or None for all.
         repeated: two sets of frames of the trajectory that show the same motion.
-        specimen: of a textile test, which measures itself, or None.
         minimised: terms of simulations in place of `energies`, with self-contact, which no metric knows; none
             where the cloth may cross itself.
         settle_uncrossed: like `settle`, with self-contact; None where a start is not simulated.
@@ -182,7 +171,6 @@ class BuiltScene:
     glitch: int | None = None
     kept: np.ndarray | None = None
     repeated: tuple[np.ndarray, np.ndarray] | None = None
-    specimen: Specimen | None = None
     minimised: tuple[Energy, ...] = ()
     settle_uncrossed: Callable[[], np.ndarray] | None = None
 

@@ -4,7 +4,7 @@
 | --- | --- |
 | energies | energy/*, excess/*, gap/*, step/*, gradient/norm |
 | surface | curvature/*, wrinkles/*, deformation/*, stretch/*, dihedral/mean, intersections/* |
-| surface | distance/*, surface/*, penetration/*, drift/hem, body/*, mesh/*, fabric/* |
+| surface | distance/*, surface/*, penetration/*, drift/hem, body/*, mesh/* |
 | motion | velocity/error, acceleration/error, dynamics/*, conservation/*, exact/distance |
 | motion | time_error/*, motion/*, roll_out/* |
 | cost | cost/*, solver/*, training_distance/* |
@@ -48,7 +48,6 @@ MODULES = {
 WHERE_NAMED = {
     "extrapolation": "benchmarks.metrics.motion.extrapolation",
     "roll_out": "benchmarks.metrics.motion.long_roll_out",
-    "fabric": "benchmarks.metrics.surface.textile_tests",
     "mesh": "benchmarks.metrics.surface.mesh_size",
     "body_shape": "benchmarks.metrics.surface.body_shape",
 }  # measured only in scenes that name them

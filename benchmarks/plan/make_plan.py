@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.assets import Inputs, read_inputs
 from benchmarks.declarations import DeclarationError, by_name
@@ -25,10 +24,6 @@ from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
 from snug.file_options import GarmentFile, demand_usable_name
-
-if TYPE_CHECKING:
-    from benchmarks.fabrics.fabric import Fabric
-    from benchmarks.validation.case import Case
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 
@@ -139,8 +134,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
         if not installed("ipctk"):
             raise StudyError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
         motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
-    fabric_scenes, fabric_cases = tests_of_fabrics(study)
-    cases = tuple(by_name("known answer", (*CASES, *fabric_cases, *user_cases)).values())
+    cases = tuple(by_name("known answer", (*CASES, *user_cases)).values())
     taken = {case.name for case in cases}
     for scene in user_scenes:
         if scene.name in taken:
@@ -151,34 +145,9 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
     of = motions
     measured = dict.fromkeys((*of.measured, *of.test, *of.validation))
     dynamic = dict.fromkeys((*of.dynamic_measured, *of.dynamic_test, *of.dynamic_validation))
-    known = (*all_scenes(measured, dynamic, of.worn).values(), *fabric_scenes, *scenes, *user_scenes)
+    known = (*all_scenes(measured, dynamic, of.worn).values(), *scenes, *user_scenes)
     methods = by_name("method", (*METHODS, *user_methods))
     return Read(study, inputs, motions, Declared(by_name("scene", known), methods, cases))
-
-
-def tests_of_fabrics(study: Study) -> tuple[Sequence[Scene], Sequence[Case]]:
-    """Return scenes and cases of a user's fabrics. Raises ValueError."""
-    sample: list[Fabric] = []
-    cases: list[Case] = []
-    for field in ("fabrics", "gauge"):
-        if getattr(study, field) and "fabric" not in study.parts:
-            raise StudyError(f"{study.place(field)}: only study fabric tests fabrics: benchmarks.run fabric")
-    if study.fabrics is not None:
-        from benchmarks.fabrics.measured import read_fabrics, spread_sample
-        from benchmarks.validation.fabric.cases import percentiles
-
-        fabrics = read_fabrics(study.fabrics)
-        sample += [replace(fabric, name=f"measured/{fabric.name}") for fabric in spread_sample(fabrics)]
-        cases += percentiles(fabrics)
-    if study.gauge is not None:
-        from benchmarks.fabrics.gauge import read_gauge
-
-        sample += [replace(fabric, name=f"gauge/{fabric.name}") for fabric in read_gauge(study.gauge)]
-    if not sample:
-        return (), cases
-    from benchmarks.scenes.textile_tests import textile_tests
-
-    return textile_tests(sample), cases
 
 
 def choose_metrics(study: Study) -> tuple[str, ...]:

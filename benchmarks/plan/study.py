@@ -109,8 +109,6 @@ class Study:
             match_vertices, other_mesh, ms. The path may have {scene}, the scene's name with hyphens for
             slashes.
         device: where networks train, cpu or cuda.
-        fabrics: measured fabrics, a CSV of density and bending, for part fabric.
-        gauge: a copy of GAUGE-Dataset, whose fabrics part fabric tests too.
         show: pictures and films that the documents show; a study that has it is published.
     """
 
@@ -132,8 +130,6 @@ class Study:
     trained: Path | None = None
     rollouts: Mapping[str, RollOutOption] = field(default_factory=dict)
     device: Literal["cpu", "cuda"] = "cpu"
-    fabrics: Path | None = None
-    gauge: Path | None = None
     show: Show | None = None
     written: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     origin: Callable[[tuple[str, ...]], str] = field(default=".".join, repr=False, compare=False)

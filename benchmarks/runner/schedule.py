@@ -41,7 +41,7 @@ MIXING = (
     "snug/named_recipes.py",
 )  # that are mixed from motions, to be simulated
 NETWORKS = ("snug", "benchmarks/assets.py")
-SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py", "benchmarks/fabrics")
+SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py")
 RUNS = (
     SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
     "benchmarks/runner/isolated_process.py", "benchmarks/runner/cells.py",

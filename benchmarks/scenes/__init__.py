@@ -6,7 +6,6 @@
 | dressed_body | "<garment>/<motion>": a body in a garment, by GARMENT_SCENES |
 | variations | declarations of FURTHER_SCENES: out of distribution, very long, other meshes and steps |
 | out_of_distribution, long_motion, dependence | their build() |
-| textile_tests | a strip and a disc of each fabric of benchmarks.fabrics |
 | from_roll_out | the scene that a stored roll-out brings itself |
 
 >>> [scene.name for scene in SCENES][:2]
@@ -21,7 +20,6 @@ from dataclasses import dataclass, replace
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.presets import PRESETS
 from benchmarks.scene import Scene
-from benchmarks.scenes.textile_tests import TEXTILE_TESTS
 from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 
 
@@ -42,7 +40,6 @@ FURTHER_SCENES = (
     *OUT_OF_DISTRIBUTION,
     *{scene.name: scene for preset in PRESETS for scene in meshes_and_steps(preset.dependence)}.values(),
     *DRAPES,
-    *TEXTILE_TESTS,
 )
 
 

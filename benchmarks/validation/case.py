@@ -145,7 +145,8 @@ def known_answer(
     """Declare a function as one or more cases: their names, or name -> options of the function.
 
     Without names the case has the function's; for several cases at once it returns name -> number. What its
-    docstring says that it returns describes the case. declared: further fields of Case.
+    docstring says that it returns describes the case unless `description` does. declared: further fields of
+    Case.
 
     >>> @known_answer({"sum of two": {"count": 2}, "sum of three": {"count": 3}}, unit="1", tolerance=1e-12)
     ... def sums_of_odd_numbers(count):
@@ -162,8 +163,8 @@ def known_answer(
             values = ", ".join(f"{option} = {value}" for option, value in options.items())
             description = f"{sentence.rstrip('.')}: {values}".removesuffix(": ")
             case = Case(
-                name=name, description=description, module=function.__module__, function=function.__name__,
-                options=dict(options), smoke=smoke, **declared,
+                name=name, module=function.__module__, function=function.__name__, options=dict(options),
+                smoke=smoke, **{"description": description, **declared},
             )  # fmt: skip
             _declared[function.__module__].append(case)
         return function

@@ -1,10 +1,10 @@
 """Large bending with a known answer: elastica, catenary, lateral buckling, slit annulus.
 
-Large bending: a clamped strip against Euler's elastica, which scipy integrates.
+Elastica: a clamped strip against Euler's, which scipy integrates.
 
 Hinges stand for a plate stiffness D that depends on the mesh (see plates.py). So D, and where the clamp acts,
-are calibrated once per mesh from small deflections (see benchmarks.fabrics.strip), and what is judged is the
-shape at large ones.
+are calibrated once per mesh from small deflections (see clamped_strip.py), and what is judged is the shape at
+large ones.
 
 Equilibria with an exact curve: a hanging strip and the elastic catenary, both with lambda = 0.
 
@@ -35,19 +35,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 import reference_sim as sim
 from benchmarks.meshes import ROW, in_space, lying, rectangle, right_grid
 from benchmarks.validation.case import known_answer
+from benchmarks.validation.clamped_strip import Strip, clamped_strip, exact_elastica
 from benchmarks.validation.equilibrium import DeadLoad, demand_converged, fitted_order
 from benchmarks.validation.plates import NU, GaussianCurvature
 from reference_sim import energies
-
-if TYPE_CHECKING:
-    from benchmarks.fabrics.strip import Strip
 
 ELASTICA_STIFFNESS = 1e-3  # [J] hinge stiffness
 # 330 N/m: at Gamma = 1000 the strip weighs 0.9 N per metre of width, and stretches by 0.3 %.
@@ -59,8 +56,6 @@ SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
 @cache
 def strip(family: str, columns: int) -> Strip:
     """Return a strip of 1 m, clamped at x = 0."""
-    from benchmarks.fabrics.strip import clamped_strip
-
     return clamped_strip(family, columns, 1.0, ELASTICA_MATERIAL)
 
 
@@ -68,8 +63,6 @@ def bent_strip(
     family: str, weight: float, load: float, columns: int = COLUMNS
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the chord of the strip and of the elastica, (width, height) each, over the length."""
-    from benchmarks.fabrics.elastica import exact_elastica
-
     made = strip(family, columns)
     cloth, length = made.cloth, made.length
     acceleration = weight * made.stiffness / length**3 / ELASTICA_MATERIAL.areal_density
@@ -91,14 +84,6 @@ def bent_strip(
     result = sim.minimise(sim.Potential(terms), guess, tolerance=1e-6 * strength)
     demand_converged(result, f"the strip of {family} triangles")
     return made.chord(result.positions) / length, np.array([x[-1], drop[-1]])
-
-
-def slenderness(gamma: float, columns: int) -> float:
-    """Return height over width of the chord at that Gamma, over the elastica's, on `columns` cells."""
-    from benchmarks.fabrics.strip import FAMILY
-
-    ours, exact = bent_strip(FAMILY, gamma, 0.0, columns)
-    return float((ours[1] / ours[0]) / (exact[1] / exact[0]))
 
 
 @known_answer(

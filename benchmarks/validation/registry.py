@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from benchmarks.validation.case import Case, cases_of
-from benchmarks.validation.fabric.cases import TEXTILE_TESTS
 
 MODULES = (
     # Closed forms, and laws that hold to round-off or to what the solver may leave.
@@ -14,4 +13,4 @@ MODULES = (
 
 KNOWN_ANSWERS: tuple[Case, ...] = sum((cases_of(f"benchmarks.validation.{name}") for name in MODULES), ())
 STRESS_TESTS: tuple[Case, ...] = cases_of("benchmarks.validation.extreme_steps")
-CASES: tuple[Case, ...] = (*KNOWN_ANSWERS, *STRESS_TESTS, *TEXTILE_TESTS)
+CASES: tuple[Case, ...] = (*KNOWN_ANSWERS, *STRESS_TESTS)

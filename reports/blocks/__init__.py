@@ -9,7 +9,6 @@ from reports.blocks.block import Block, Heading, SentenceBlock, TableBlock
 from reports.blocks.printed_tables import failed_checks, not_converged, with_labels
 from reports.blocks.sentences import headline, unread_files, worst
 from reports.figures.costs import break_even, error_of_page_one, errors_of_scene, errors_of_scenes
-from reports.figures.fabric.textile_errors import textile_errors
 from reports.figures.figure import Figure
 from reports.figures.over_time import energy_series, hem, training_curves
 from reports.figures.values import dots, known_answers
@@ -51,14 +50,6 @@ BLOCKS: tuple[Block, ...] = (
     Figure("energy_series", energy_series, ("energy_series_*",)),
     Heading("Body shapes"),
     TableBlock("shapes"),
-    Heading("Textile tests"),
-    Figure("textile_errors", textile_errors),
-    TableBlock("fabric_order", most=40),
-    TableBlock("fabric_drape"),
-    TableBlock("fabric_bands"),
-    Heading("Engines"),
-    TableBlock("engine_audit"),
-    TableBlock("engine_laws"),
     Heading("Validation"),
     Figure("known_answers", known_answers),
     TableBlock("validation", printed=failed_checks),

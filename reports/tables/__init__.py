@@ -10,11 +10,6 @@ from pathlib import Path
 
 from reports.run.finished_run import Run
 from reports.tables.costs import crossings, error_rivals, reference_uncertainty, trainings
-from reports.tables.fabric.textile_tests import (
-    fabric_bands,
-    fabric_drape,
-    fabric_order,
-)
 from reports.tables.findings import (
     endings,
     errors_in_spreads,
@@ -42,9 +37,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     error_rivals,
     reference_uncertainty,
     shapes,
-    fabric_order,
-    fabric_drape,
-    fabric_bands,
     validation,
     extremes,
     endings,

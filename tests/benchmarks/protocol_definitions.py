@@ -91,13 +91,11 @@ def _probed(scene: Any) -> Iterator[tuple[str, list[str]]]:
 
 
 def _materials() -> dict[str, Any]:
-    from benchmarks.fabrics.fabric import FABRICS
     from reference_sim.energies.contact_penalty import DEFAULT_MARGIN, DEFAULT_STIFFNESS
     from reference_sim.material import GRAVITY, Material
 
     return {
         "cloth": asdict(Material()), "gravity": GRAVITY, "contact": (DEFAULT_STIFFNESS, DEFAULT_MARGIN),
-        "fabrics": [asdict(fabric) for fabric in FABRICS],
     }  # fmt: skip
 
 

@@ -40,7 +40,7 @@ def test_the_list_names_everything(capsys):
         assert name in listing
 
 
-@pytest.mark.parametrize("study", ["smoke", "paper", "fabric", "garments"])
+@pytest.mark.parametrize("study", ["smoke", "paper", "garments"])
 def test_the_list_names_every_scene_that_a_study_has(study, capsys):
     asked = {scene.name for scene in planned(study, "--methods", "simulation,snug").scenes}
     assert run.main(["--list"]) == 0

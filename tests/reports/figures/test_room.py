@@ -84,9 +84,6 @@ def rows_of_all():
         more = {"suite": "speed", "role": "solver", "family": "newton", "level": k}
         for name, x in {"cost/frame": 9.0 * k, "gap/energy": 0.3 / k**3, "curvature/error": 5.0 / k}.items():
             rows.append(row(scene, f"newton-{k}", name, x, **more))
-    for test, (place, (method, role)) in itertools.product(("cantilever", "drape"), enumerate(ROLES.items())):
-        for metric, x in (("fabric/error", 1.0 + place % 4), ("cost/frame", 1.3**place)):
-            rows.append(row(f"fabric/{test}/limp", method, metric, x, suite="fabric", role=role))
     for k in range(60):
         more = {"suite": "validation", "expected": 0.0, "tolerance": 1.0}
         rows.append(row(f"case {k}", "simulation", "check", 0.01 * k, **more))

@@ -55,7 +55,7 @@ def test_sizes_studies_and_options_have_a_row_each():
         "8",
         "at most 150",
     )
-    assert ("`fabric`", "fabric") in [(row[0], row[2]) for row in PARTS["studies"]()]
+    assert ("`handles`", "garments") in [(row[0], row[2]) for row in PARTS["studies"]()]
     assert "`--trained [DIR]`" in dict(PARTS["options of benchmarks.run"]())
     assert all(len(set(map(len, part()))) == 1 for part in PARTS.values())
 

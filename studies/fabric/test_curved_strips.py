@@ -7,8 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
-from benchmarks.validation.fabric import bend_twist, curled_strip, stick_slip
-from benchmarks.validation.fabric.cases import ARCS, CURLS, STRAINS
+import curved_strips
+import stick_slip
+from curved_strips import ARCS, CURLS
+from stick_slip import STRAINS
 
 
 def integrated(slope, start):
@@ -41,7 +43,7 @@ def shot_arc(curvature, stiffness_ratio, clamp, gamma):
      (-2.0, 1.0, 1.0)],
 )  # fmt: skip
 def test_the_weight_of_an_arc_is_that_of_shooting(curvature, stiffness_ratio, clamp):
-    gamma = bend_twist.critical_gamma(curvature, stiffness_ratio, clamp)
+    gamma = curved_strips.critical_gamma(curvature, stiffness_ratio, clamp)
     shot = brentq(lambda g: shot_arc(curvature, stiffness_ratio, clamp, g), 0.95 * gamma, 1.05 * gamma)
     assert shot == pytest.approx(gamma, rel=1e-4)
     # It is the first: the determinant keeps its sign from weightlessness on.
@@ -50,15 +52,15 @@ def test_the_weight_of_an_arc_is_that_of_shooting(curvature, stiffness_ratio, cl
 
 
 def test_a_straight_strip_has_the_closed_form_on_edge_and_hangs_safely():
-    assert bend_twist.critical_gamma(0.0, 4.0, np.pi / 2) == pytest.approx(2 * 12.853, rel=1e-3)
-    assert bend_twist.critical_gamma(0.0, 3.0) == np.inf
+    assert curved_strips.critical_gamma(0.0, 4.0, np.pi / 2) == pytest.approx(2 * 12.853, rel=1e-3)
+    assert curved_strips.critical_gamma(0.0, 3.0) == np.inf
 
 
 def test_numbers_in_the_descriptions_are_the_exact_ones():
-    ratio = bend_twist.TWIST / bend_twist.BENDING
+    ratio = curved_strips.TWIST / curved_strips.BENDING
     assert ratio == pytest.approx(3.0)
     for curvature, gamma in ARCS.items():
-        assert bend_twist.critical_gamma(curvature, ratio) == pytest.approx(gamma, abs=0.05)
+        assert curved_strips.critical_gamma(curvature, ratio) == pytest.approx(gamma, abs=0.05)
     for strain, friction in STRAINS.items():
         assert stick_slip.critical_friction(strain) == pytest.approx(friction, abs=5e-5)
         assert stick_slip.critical_strain(friction) == pytest.approx(strain, rel=1e-3)
@@ -86,7 +88,7 @@ def test_a_strip_hardly_pressed_has_the_load_of_a_column_clamped_and_hinged():
 
 @pytest.mark.parametrize(("curvature", "gamma"), CURLS)
 def test_the_curl_is_that_of_shooting(curvature, gamma):
-    s, aside, depth = curled_strip.exact(curvature, gamma)
+    s, aside, depth = curved_strips.exact_curl(curvature, gamma)
 
     def end(bend):
         def slope(s, y):
@@ -100,7 +102,7 @@ def test_the_curl_is_that_of_shooting(curvature, gamma):
 
 
 def test_without_weight_the_curl_is_an_arc():
-    aside, depth = curled_strip.exact(2.0, 1e-9)[1:, -1]
+    aside, depth = curved_strips.exact_curl(2.0, 1e-9)[1:, -1]
     assert (aside, depth) == pytest.approx(((1 - np.cos(2.0)) / 2, np.sin(2.0) / 2), abs=1e-6)
 
 

@@ -20,18 +20,15 @@ import numpy as np
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
-from benchmarks.fabrics.strip import FAMILY, Strip, clamped_strip
+from benchmarks import known_answer
+from benchmarks.validation.clamped_strip import Strip, clamped_strip
 from benchmarks.validation.contact import box
 from benchmarks.validation.equilibrium import demand_converged
 from benchmarks.validation.large_bending import ELASTICA_MATERIAL
-from reference_sim.energies.bend_hinge import BendHinge
-from reference_sim.energies.contact_friction import ContactFriction
-from reference_sim.energies.contact_penalty import ContactPenalty
-from reference_sim.energies.stretch_stvk import StretchStVK
-from reference_sim.obstacle import Obstacle
-from reference_sim.potential import Potential
-from reference_sim.time_loop import simulate
-from reference_sim.trajectory import Trajectory
+from curved_strips import hanging_along
+from reference_sim import Obstacle, Potential, Trajectory, simulate
+from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, StretchStVK
+from specimens import FAMILY
 
 COLUMNS = 60  # cells along the strip
 CLAMPED_AND_HINGED = 4.4934  # tan k = k: the column's buckling load is k^2 D / L^2
@@ -40,6 +37,8 @@ DT = 100.0  # [s]: inertia is nothing
 SLIDING = 1e-6  # [m] of slip in a step from which on friction no longer grows
 LOOSE = 1e-3  # [m] in a step: the tip slips for good
 STEP = 2e-4  # of the strain, by which the clamp is lowered: in larger steps the solver leaps ahead
+# Strain -> friction below which the tip slips: the elastica's, critical_friction.
+STRAINS = {0.05: 0.1035, 0.1: 0.1528, 0.15: 0.1959, 0.2: 0.2378, 0.25: 0.2807}
 
 
 @cache
@@ -76,14 +75,22 @@ def critical_strain(mu: float) -> float:
     return float(brentq(lambda strain: critical_friction(strain) - mu, 0.01, 0.3, xtol=1e-8))
 
 
+@known_answer(
+    {f"stick_slip_ratio_{strain:g}": {"strain": strain} for strain in STRAINS},
+    expected=1.0, tolerance=0.005, reason="60 cells: at most 0.0012",
+)  # fmt: skip
 def force_ratio(strain: float) -> float:
-    """Return |T| / N of a simulated strip that sticks, over the elastica's."""
+    """Return friction over pressure at the tip of a pressed strip that sticks, over the elastica's."""
     pressed = Pressed()
     x = demand_converged(pressed.lowered(strain, 2 * critical_friction(strain), 4), "the strip").positions[-1]
     aside, normal = pressed.floor_force(x)
     return float(abs(aside / normal) / critical_friction(pressed.strain(x)))
 
 
+@known_answer(
+    {f"stick_slip_breaks_loose_{strain:g}": {"mu": friction} for strain, friction in STRAINS.items()},
+    expected=1.0, tolerance=0.005, reason="steps of 0.0002 of the strain",
+)  # fmt: skip
 def breaking_loose(mu: float) -> float:
     """Return the strain at which a simulated strip breaks loose, over the elastica's.
 
@@ -130,7 +137,7 @@ class Pressed:
     def _elastica(self, strain: float, tip: float) -> np.ndarray:
         """Return positions (V, 3) [m] on the elastica of that strain, its tip at height `tip` [m]."""
         s, (_, _, aside, depth) = exact(strain)[:2]
-        x = self.strip.hanging_along(s, aside, depth)
+        x = hanging_along(self.strip, s, aside, depth)
         x[:, 1] += tip + self.strip.length * (1 - strain)
         return x
 

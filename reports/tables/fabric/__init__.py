@@ -1,1 +1,0 @@
-"""Tables of textile tests: drape on meshes and steps, published bands, order of fabrics by solvers."""
