@@ -15,10 +15,10 @@ from benchmarks.results.row import ResultsError
 NUMBER = "1.0"
 # Part of the protocol -> digest of its definitions. tests/benchmarks/test_protocol.py holds the code to them.
 DIGESTS = {
-    "scenes": "2949e3d57aec722f",
-    "materials": "832890dcb5d69952",
+    "scenes": "8cd13eb7226f2e79",
+    "materials": "37f8eb4aecad748b",
     "motions": "dc71f7b3a0e629a9",
-    "metrics": "350e362f70ba6a8b",
+    "metrics": "1fc35911dc2ce5cc",
     "reference": "7c745c22c1ea3e12",
     "sampling": "dabcaccd0f5a90df",
     "statistics": "bbdacc941ceaa26a",

@@ -2,10 +2,10 @@
 
 Bend-twist. The test of Miller, Lazarus, Audoly and Reis (2014, doi 10.1103/PhysRevLett.112.068103) by which
 Romero et al. 2021 validate rods: one of natural curvature kappa hangs from a clamp, its tangent downwards
-there, and is planar or not, by kappa L and Gamma = w L^3 / B, w its weight per length. Here it is a strip cut from a flat
-sheet along an arc. On edge it is as good as rigid, so that its shape in the plane is the arc itself:
-theta = kappa s from the vertical, s from the clamp. A rotation phi about the tangent and psi about the normal
-twists and bends it by
+there, and is planar or not, by kappa L and Gamma = w L^3 / B, w its weight per length. Here it is a strip cut
+from a flat sheet along an arc. On edge it is as good as rigid, so that its shape in the plane is the arc
+itself: theta = kappa s from the vertical, s from the clamp. A rotation phi about the tangent and psi about
+the normal twists and bends it by
 
     tau = phi' - kappa psi,   beta = psi' + kappa phi,   phi = psi = 0 at the clamp
 

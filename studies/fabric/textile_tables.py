@@ -120,7 +120,7 @@ def draw(table: pd.DataFrame, rows: pd.DataFrame, path: Path) -> None:
             axes.plot(line["time [ms]"], line[f"{test}_error [{UNITS[test]}]"], "o-", label=name)
         axes.set(xscale="log", yscale="log", xlabel="run time of the drape [ms per frame]")
         axes.set_title(f"{TESTS[test].split('/')[1].replace('_', ' ')}: error [{UNITS[test]}]")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right", fontsize=8)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center", fontsize=8)
     figure.savefig(path, dpi=120)
     plt.close(figure)
 
