@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 
 from benchmarks.assets import Assets
-from benchmarks.contract import PrepareCell, watched_method, watched_scene
-from benchmarks.declarations import DeclarationError, by_name
+from benchmarks.contract import ContractError, check_method, check_scene, demand
+from benchmarks.declarations import DeclarationError, by_name, raised_at
 from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
-from benchmarks.metric import Metric
+from benchmarks.metric import Estimate, Metric
 from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files
 from benchmarks.plan.make_plan import plan_scene
@@ -24,10 +26,13 @@ from benchmarks.plan.plan import STATES, Cell, Plan, TaskId
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
+from benchmarks.runner.cells import CellTask, RunCell
 from benchmarks.runner.executor import Executor
+from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.measurements import MeasureCell
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import Outcome, Task
+from benchmarks.runner.task import Context, Outcome, RunStopped, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import SCENES, all_scenes, find_scene, of_garment
 from benchmarks.timing import one_thread
@@ -49,19 +54,19 @@ SCENES_OF_METHODS = ("flag", "sheet_on_sphere")  # pins that move, an obstacle; 
 SCENE_OF_METRICS = "hanging_sheet"
 KINDS = ("start", "data", "clips", "network", "cell", "batch")  # of tasks that tell of methods and scenes
 GARMENT, TRAIN, TEST = "tshirt", "arm_raise", "kick"
-SIZES = dataclasses.replace(
+SIZES = replace(
     find_preset("smoke"), garment_vertices=300, frames=8, clip_frames=8, warm_up_frames=2, settle_frames=4,
     sheet_cells=4, sheet_frames=6, cell_seconds=120.0, least_seconds=0.02, repeats=1,
 )  # fmt: skip
 
 
-@dataclasses.dataclass
+@dataclass
 class Declarations:
     """Entries that a user's file declares."""
 
-    methods: list[MethodEntry] = dataclasses.field(default_factory=list)
-    scenes: list[Scene] = dataclasses.field(default_factory=list)
-    metrics: list[Metric] = dataclasses.field(default_factory=list)
+    methods: list[MethodEntry] = field(default_factory=list)
+    scenes: list[Scene] = field(default_factory=list)
+    metrics: list[Metric] = field(default_factory=list)
 
 
 @command(PROGRAM)
@@ -87,9 +92,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scene_plan = plan_scene(study_of(options), options.scene)
     for declared in files:
         with tempfile.TemporaryDirectory() as folder:
-            for line, fine in check_file(declared, Path(folder), scene_plan):
-                print(line, flush=True)
-                wrong += not fine
+            for name, fault in check_file(declared, Path(folder), scene_plan):
+                print(f"{name}: wrong\n  {fault}" if fault else f"{name}: fine", flush=True)
+                wrong += bool(fault)
     print("nothing is wrong" if not wrong else f"{wrong} to mend")
     return 1 if wrong else 0
 
@@ -115,8 +120,8 @@ def read_file(path: str) -> Declarations:
 
 def check_file(
     declared: Declarations, folder: Path, scene_plan: Plan | None = None
-) -> Iterator[tuple[str, bool]]:
-    """Run everything that a file declares, under watch.
+) -> Iterator[tuple[str, str]]:
+    """Run everything that a file declares by the ordinary runner, and check what it does.
 
     Args:
         declared: of `read_file`.
@@ -125,108 +130,153 @@ def check_file(
             metrics are not checked then.
 
     Yields:
-        Lines for people on each entry in each scene, and whether it is fine there.
+        Each entry in each scene, and what is wrong with it there, or empty.
     """
-    plan = _plan_of(declared, folder, scene_plan)
+    plan = plan_of(declared, folder, scene_plan)
     for entry in declared.methods:
         if not any(cell.method == entry.name for cell in plan.cells):
             scenes = scene_plan.scenes if scene_plan else SCENES
             why = next(filter(None, map(entry.skip, scenes)), "no scene is meant for it")
-            yield _verdict(entry.name, f"is skipped in every scene: {why}")
+            yield entry.name, f"is skipped in every scene: {why}"
     assets = plan.open_assets() if plan.garments else None
-    early = [cell for cell in plan.cells if cell.entry.declared_in and not cell.entry.trained]
-    prepared = _run([_preparation(cell) for cell in early], plan, assets)
-    unfit = {cell: outcome for cell in early if (outcome := prepared["prepare", cell.name]).failed}
-    plan = dataclasses.replace(plan, cells=tuple(cell for cell in plan.cells if cell not in unfit))
-    tasks = [task for task in tasks_of(plan) if task.kind in KINDS]
-    outcomes = _run(tasks, plan, assets) if tasks else {}
-    for cell in (*unfit, *(cell for cell in plan.cells if cell.scene.metrics is None)):
-        outcome = unfit.get(cell) or outcomes[cell.task_id]
-        batch = outcomes.get(cell.batch_id, Outcome())
-        wrong = outcome.reason if outcome.failed else ""
-        if not wrong and batch.status not in ("ok", "skipped"):
-            wrong = f"batch(): {batch.reason}"
+    users = [cell for cell in plan.cells if cell.entry.declared_in or cell.scene.declared_in]
+    early = outcomes_of([preparation(cell) for cell in users if not cell.entry.trained], plan, assets)
+    unfit = {cell for cell in users if early.get(("prepare", cell.name), Outcome()).failed}
+    plan = replace(plan, cells=tuple(cell for cell in plan.cells if cell not in unfit))
+    sheets = [cell for cell in plan.cells if cell not in users]
+    wanted = {cell.metrics_id for cell in sheets}
+    tasks = [checked(task) for task in tasks_of(plan) if task.kind in KINDS or task.id in wanted]
+    outcomes = early | (outcomes_of(tasks, plan, assets) if tasks else {})
+    for cell in users:
         name = f"{cell.method} in {cell.scene.name}" if cell.entry.declared_in else cell.scene.name
-        yield _verdict(name, wrong, "" if outcome.status == "ok" else f"ends as {outcome.status}")
-    if plan.metrics:
-        sheets = {cell.metrics_id for cell in plan.cells if cell.scene.metrics is not None}
-        measured = [task for task in tasks_of(plan) if task.id in sheets]
-        once, again = (_run(measured, plan, assets, known=outcomes) for _ in range(2))
-        yield _verdict(f"{plan.metrics[0]} in {SCENE_OF_METRICS}", _wrong_numbers(once, again))
+        yield name, first_fault(outcomes, ("prepare", cell.name), cell.task_id, cell.batch_id)
+    if sheets:
+        ids = [id for cell in sheets for id in (cell.task_id, cell.metrics_id)]
+        yield f"{plan.metrics[0]} in {SCENE_OF_METRICS}", first_fault(outcomes, *ids)
 
 
-def _plan_of(declared: Declarations, folder: Path, scene_plan: Plan | None) -> Plan:
+def plan_of(declared: Declarations, folder: Path, scene_plan: Plan | None) -> Plan:
     """Return the plan of each method in all scenes that fit it; scenes and metrics meet simulations."""
     if scene_plan is not None:
-        cells = _cells(declared, [scene_plan.cells[0].scene])
-        return dataclasses.replace(scene_plan, cells=cells, suites=("speed",), folder=folder)
-    scenes = [*map(find_scene, SCENES_OF_METHODS), of_garment(GARMENT).scene(TEST)]
-    cells = _cells(declared, [scene.at(SIZES) for scene in scenes])
-    simulation, stopped = find_method("simulation"), find_method("lbfgs-10")
-    cells += tuple(
-        Cell(watched_scene(scene.at(SIZES)), simulation, 0, ("speed",)) for scene in declared.scenes
-    )
-    if declared.metrics:
-        sheet = dataclasses.replace(find_scene(SCENE_OF_METRICS).at(SIZES), metrics=())
-        cells += tuple(Cell(sheet, entry, 0, ("speed",)) for entry in (simulation, stopped))
-    return Plan(
-        preset=SIZES, suites=("speed",), cells=cells, cases=(), seeds=(0,), device="cpu", folder=folder,
-        command="", metrics=tuple({metric.declared_in for metric in declared.metrics}),
-        motions=Motions((TRAIN,), (TEST,)),
-    )  # fmt: skip
-
-
-def _cells(declared: Declarations, scenes: Sequence[Scene]) -> tuple[Cell, ...]:
-    """Return the cells of all methods in those of the scenes that are for them, all of it measured."""
-    return tuple(
-        Cell(dataclasses.replace(scene, metrics=None), watched_method(entry), 0, ("speed",))
+        scenes = [scene_plan.cells[0].scene]
+    else:
+        known = (*map(find_scene, SCENES_OF_METHODS), of_garment(GARMENT).scene(TEST))
+        scenes = [scene.at(SIZES) for scene in known]
+    met = [
+        (replace(scene, metrics=()), entry)
         for entry in declared.methods
         for scene in scenes
         if entry.meant_for(scene) and entry.skip(scene) is None
-    )
+    ]
+    if scene_plan is not None:
+        cells = tuple(Cell(scene, entry, 0, ("speed",)) for scene, entry in met)
+        return replace(scene_plan, cells=cells, suites=("speed",), folder=folder)
+    simulation, stopped = find_method("simulation"), find_method("lbfgs-10")
+    met += [(replace(scene.at(SIZES), metrics=()), simulation) for scene in declared.scenes]
+    if declared.metrics:
+        sheet = replace(find_scene(SCENE_OF_METRICS).at(SIZES), metrics=())
+        met += [(sheet, simulation), (sheet, stopped)]
+    return Plan(
+        preset=SIZES, suites=("speed",), cells=tuple(Cell(*pair, 0, ("speed",)) for pair in met), cases=(),
+        metrics=tuple({metric.declared_in for metric in declared.metrics}),
+        motions=Motions((TRAIN,), (TEST,)), seeds=(0,), device="cpu", folder=folder, command="",
+    )  # fmt: skip
 
 
-def _preparation(cell: Cell) -> PrepareCell:
-    return PrepareCell(
-        name=cell.name,
-        label=cell.label,
-        cell=cell,
-        inputs={},
-        code=("benchmarks/check.py",),
-        deadline=SIZES.cell_seconds,
-    )
-
-
-def _run(
-    tasks: Sequence[Task], plan: Plan, assets: Assets | None, known: Mapping[TaskId, Outcome] = {}
-) -> dict[TaskId, Outcome]:
-    """Return the outcomes of tasks, all of them done now. known: outcomes of others."""
+def outcomes_of(tasks: Sequence[Task], plan: Plan, assets: Assets | None) -> Mapping[TaskId, Outcome]:
+    """Return the outcomes of tasks, all of them done now."""
     run = RunFolder(plan.folder)
     runner = Runner(tasks, Cache(run, only=STATES))
-    runner.outcomes |= known
     runner.run(Executor(run, assets, plan.workers))
     return runner.outcomes
 
 
-def _wrong_numbers(once: Mapping[TaskId, Outcome], again: Mapping[TaskId, Outcome]) -> str:
-    """Return what is wrong with the numbers of two measurements, or empty."""
-    for id, outcome in once.items():
-        if outcome.failed:
-            return outcome.reason
-        for name, value in outcome.result.items() if id[0] == "metrics" else ():
-            number = value[0] if isinstance(value, tuple) else value
-            if not math.isfinite(number):
-                return f"{name} is {number}: leave out what does not apply"
-            if again[id].result.get(name) != value:
-                return f"{name} is {value}, then {again[id].result.get(name)}: fix its seed"
-    return ""
+def first_fault(outcomes: Mapping[TaskId, Outcome], *ids: TaskId) -> str:
+    """Return why the first of these tasks has failed, empty where none has."""
+    known = (outcomes.get(id, Outcome()) for id in ids)
+    reasons = (outcome.reason for outcome in known if outcome.failed or outcome.status == "failed")
+    return next(reasons, "").removeprefix(f"{ContractError.__name__}: ")
 
 
-def _verdict(name: str, wrong: str, note: str = "") -> tuple[str, bool]:
-    lines = [f"{name}: {'wrong' if wrong else 'fine'}"]
-    lines += [f"  {wrong.removeprefix('ContractError: ')}"] if wrong else []
-    lines += [f"  note: {note}"] if note and not wrong else []
-    return "\n".join(lines), not wrong
+# --- tasks that check what they run ------------------------------------------------------------------------
+
+
+@contextmanager
+def located(cell: Cell) -> Iterator[None]:
+    """Raise ContractError with file and line for what a user's code raises within."""
+    try:
+        yield
+    except (ContractError, RunStopped):
+        raise
+    except Exception as error:
+        where = raised_at(error, cell.entry.declared_in or cell.scene.declared_in)
+        raise ContractError(f"{one_line(error)}{f' ({where})' if where else ''}") from None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PrepareCell(CellTask):
+    """A user's scene, built, or method, prepared, before anything is simulated: no garment has settled."""
+
+    kind = "prepare"
+    stage = "preparing"
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Check the scene; make and prepare the method."""
+        entry, scene = self.cell.entry, self.cell.scene
+        with located(self.cell):
+            if scene.declared_in:
+                check_scene(scene, context.assets)
+            if entry.declared_in:
+                built = scene.build(context.assets)
+                method = entry.make(models=context.folder.models, seed=self.cell.seed)
+                method.prepare(replace(built, settle=lambda: built.cloth.rest_positions))
+        return Outcome()
+
+
+def preparation(cell: Cell) -> PrepareCell:
+    """Return the task that prepares a cell."""
+    return PrepareCell(
+        name=cell.name, label=cell.label, cell=cell, inputs={}, code=("benchmarks/check.py",),
+        deadline=SIZES.cell_seconds,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CheckedCell(RunCell):
+    """The run of a cell, and a check of what its method does."""
+
+    def _run(self, context: Context) -> Outcome:
+        entry, models = self.cell.entry, context.folder.models_of(self.cell.scene.garment)
+        with located(self.cell):
+            outcome = super()._run(context)
+            if entry.declared_in and not outcome.failed:
+                check_method(entry, self.scene(context), partial(entry.make, models=models), self.cell.seed)
+        return outcome
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CheckedMetrics(MeasureCell):
+    """Metrics of a cell, measured twice."""
+
+    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
+        """Measure, and compare the numbers."""
+        outcome = super().run(context, needed)
+        context.memo.clear()
+        again = super().run(context, needed)
+        for name, value in outcome.result.items():
+            number = value.value if isinstance(value, Estimate) else value
+            demand(
+                (math.isfinite(number), f"{name} is {number}: leave out what does not apply"),
+                (again.result.get(name) == value,
+                    f"{name} is {value}, then {again.result.get(name)}: fix its seed"),
+            )  # fmt: skip
+        return outcome
+
+
+def checked(task: Task) -> Task:
+    """Return the task that checks what it runs in place of one that runs a cell or measures it."""
+    kind = {"cell": CheckedCell, "metrics": CheckedMetrics}.get(task.kind)
+    return kind(**{f.name: getattr(task, f.name) for f in fields(task)}) if kind else task
 
 
 if __name__ == "__main__":

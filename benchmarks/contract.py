@@ -1,30 +1,17 @@
-"""Contract of a user's methods and scenes: invariants that are checked while the ordinary runner runs them.
-
-`watched_method` and `watched_scene` put a watch around an entry. A run of it fails with a ContractError that
-names everything that is broken, each with its remedy.
-"""
+"""Contract of a user's methods and scenes: what is demanded of them, each demand with its remedy."""
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from benchmarks.assets import FEWEST_FRAMES
-from benchmarks.declarations import raised_at
 from benchmarks.method import Method, MethodEntry
-from benchmarks.plan.plan import TaskId
 from benchmarks.provenance import digest
-from benchmarks.runner.cells import CellTask
-from benchmarks.runner.isolated_process import one_line
-from benchmarks.runner.task import Context, Outcome
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim import Potential, Trajectory
 from reference_sim.energies import Energy, Step
@@ -39,6 +26,11 @@ DIFFERENCE_STEP = 1e-6  # [m] of central differences: their error is some 1e-7 o
 DERIVATIVE_TOLERANCE = 1e-4  # of the norm of the gradient, of the Hessian's largest entry
 SUM_ROUND_OFF = 1e-13  # of a sum of many terms, as a share of it
 DIRECTIONS = 3  # along which derivatives are compared
+UNALTERED = (  # arrays of a scene
+    "cloth.rest_positions", "cloth.faces", "cloth.masses", "start", "start_velocity", "obstacle.positions",
+    "origin_heights", "exact", "dressed.motion.poses", "dressed.motion.translations",
+    "dressed.garment.rest_positions",
+)  # fmt: skip
 
 
 class ContractError(RuntimeError):
@@ -51,138 +43,70 @@ def demand(*claims: tuple[object, str]) -> None:
         raise ContractError("; ".join(wrong))
 
 
-@contextmanager
-def naming(what: str, home: str) -> Iterator[None]:
-    """Raise ContractError where the user's code raises within, with its file and line."""
-    try:
-        yield
-    except ContractError:
-        raise
-    except Exception as error:
-        where = raised_at(error, home)
-        raise ContractError(f"{what} raises {one_line(error)}{f' ({where})' if where else ''}") from None
+def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Method], seed: int) -> None:
+    """Run a method twice, and with another seed, and check what it has done.
 
+    Args:
+        entry: of the method.
+        scene: which is to stay as it is.
+        make: called with `seed`, returns a new method.
+        seed: of the first two runs.
 
-# --- methods -----------------------------------------------------------------------------------------------
+    Raises:
+        ContractError: the demands that are not met.
+    """
+    before, hosts = fingerprints(scene), list[str]()
 
+    def notice(event: str, arguments: tuple[object, ...]) -> None:
+        if event == "socket.connect" and isinstance(address := arguments[1], tuple):
+            hosts.append(f"{address[0]}:{address[1]}")
 
-def watched_method(entry: MethodEntry) -> MethodEntry:
-    """Return an entry whose method is that of `entry`, under watch."""
-    return dataclasses.replace(entry, module=__name__, options={"entry": entry})
-
-
-def make(*, models: Path, seed: int, entry: MethodEntry) -> WatchedMethod:
-    """Make the method of `entry`, under watch."""
-    return WatchedMethod(entry, models, seed)
-
-
-class WatchedMethod(Method):
-    """A user's method. What it has done is checked when the runner asks for its quasi-static solution."""
-
-    def __init__(self, entry: MethodEntry, models: Path, seed: int) -> None:
-        self.entry, self.models, self.seed = entry, models, seed
-        self.home = entry.declared_in or entry.module
-
-    def _prepared(self, scene: BuiltScene, seed: int) -> Method:
-        with naming("make()", self.home):
-            method = self.entry.make(models=self.models, seed=seed)
-        with naming("prepare()", self.home):
-            method.prepare(scene)
-        return method
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Prepare the method. From now on the scene must stay as it is, and this process by itself."""
-        self.scene, self.before, self.hosts = scene, fingerprints(scene), list[str]()
-        sys.addaudithook(self._notice)
-        self.method = self._prepared(scene, self.seed)
-
-    def _notice(self, event: str, arguments: tuple[Any, ...]) -> None:
-        if event == "socket.connect" and isinstance(arguments[1], tuple):
-            self.hosts.append(f"{arguments[1][0]}:{arguments[1][1]}")
-
-    def run(self) -> Trajectory:
-        """Run the method."""
+    def run(seed: int) -> tuple[Trajectory, float]:
+        method = make(seed=seed)
+        method.prepare(scene)
         clock = time.perf_counter()
-        with naming("run()", self.home):
-            self.last = self.method.run()
-        self.seconds = time.perf_counter() - clock
-        given = type(self.last).__name__
-        demand((isinstance(self.last, Trajectory), f"run() gives a {given}: return a Trajectory"))
-        return self.last
+        return method.run(), time.perf_counter() - clock
 
-    def inputs(self, scene: BuiltScene) -> Callable[[int], object] | None:
-        """Return what the method does."""
-        with naming("inputs()", self.home):
-            return self.method.inputs(scene)
-
-    def batch(self, copies: int) -> Callable[[], np.ndarray]:
-        """Return what the method does."""
-        with naming("batch()", self.home):
-            return self.method.batch(copies)
-
-    def quasi_static(self) -> Trajectory | None:
-        """Return what the method does, once its run is known to keep the contract. Raises ContractError."""
-        with naming("quasi_static()", self.home):
-            held = self.method.quasi_static()
-        scene, last, entry = self.scene, self.last, self.entry
-        x = np.asarray(last.positions, dtype=np.float64)
-        bad, stated = np.flatnonzero(~np.isfinite(x).all(axis=(1, 2))), float(np.nansum(last.frame_seconds))
-        changed = [name for name, text in fingerprints(scene).items() if self.before.get(name) != text]
-        near = PLACE_TOLERANCE * max(1.0, np.abs(scene.start).max())
-        pin = "" if entry.other_mesh else self._loose_pin(x, near)
-        demand(
-            (entry.gives_first_frame or entry.other_mesh or distance(x[0], scene.start) <= near,
-                "frame 0 is off the scene's start: put scene.start there, or say gives_first_frame=True"),
-            (not pin, f"a pin is off its place in {pin}: "
-                "x[cloth.pins] = scene.pin_positions(frame), or the start where that is None"),
-            (entry.other_mesh or np.array_equal(last.faces, scene.cloth.faces),
-                "gives other faces than the scene's: give cloth.faces"),
-            (np.shape(last.times) == (len(x),) and np.allclose(last.times, np.arange(len(x)) * scene.dt),
-                "gives other times than np.arange(frames) * scene.dt"),
-            (not len(bad) or (last.status == "diverged" and last.reason), "has a position that is not finite "
-                f"in frame {bad.min(initial=len(x))}: say status='diverged', and why"),
-            (stated <= CLOCK_SLACK * self.seconds + PLACE_TOLERANCE, f"its frames say {stated:.3g} s in all, "
-                f"the clock {self.seconds:.3g} s: give frame_seconds in seconds, of run() alone"),
-            (not changed, f"alters the scene: {', '.join(changed)}: copy what you change, others read it"),
-            (not self.hosts, f"connects to {', '.join(self.hosts[:1])}: fetch what it needs beforehand, keep "
-                "it beside the file and name it in files="),
-        )  # fmt: skip
-        again = distance(x, self._run_again(self.seed))
-        demand((again == 0.0, f"a second run gives other positions, by {again:.3g} m: draw all that is "
-            "random from `seed`, keep nothing between objects"))  # fmt: skip
-        if not entry.seeded and entry.trained is None:
-            other = distance(x, self._run_again(self.seed + 1))
-            demand((other == 0.0, f"another seed gives other positions, by {other:.3g} m: say seeded=True"))
-        return held
-
-    def _run_again(self, seed: int) -> np.ndarray:
-        method = self._prepared(self.scene, seed)
-        with naming("run() of a second object", self.home):
-            return np.asarray(method.run().positions, dtype=np.float64)
-
-    def _loose_pin(self, x: np.ndarray, near: float) -> str:
-        """Return the first frame in which a pin is not near where the scene has it, empty without one."""
-        scene, pins = self.scene, self.scene.cloth.pins
-        for frame in range(1, len(x)) if scene.dressed is None and len(pins) else ():
-            place = scene.pin_positions(frame) if scene.pin_positions else scene.start[pins]
-            if distance(x[frame][pins], np.asarray(place)) > near:
-                return f"frame {frame}"
-        return ""
+    sys.addaudithook(notice)
+    made, seconds = run(seed)
+    x, stated = np.asarray(made.positions, dtype=np.float64), float(np.nansum(made.frame_seconds))
+    bad = np.flatnonzero(~np.isfinite(x).all(axis=(1, 2)))
+    changed = [name for name, text in fingerprints(scene).items() if before.get(name) != text]
+    near = PLACE_TOLERANCE * max(1.0, np.abs(scene.start).max())
+    pin = "" if entry.other_mesh else loose_pin(x, scene, near)
+    demand(
+        (entry.gives_first_frame or entry.other_mesh or distance(x[0], scene.start) <= near,
+            "frame 0 is off the scene's start: put scene.start there, or say gives_first_frame=True"),
+        (not pin, f"a pin is off its place in {pin}: "
+            "x[cloth.pins] = scene.pin_positions(frame), or the start where that is None"),
+        (entry.other_mesh or np.array_equal(made.faces, scene.cloth.faces),
+            "gives other faces than the scene's: give cloth.faces"),
+        (np.shape(made.times) == (len(x),) and np.allclose(made.times, np.arange(len(x)) * scene.dt),
+            "gives other times than np.arange(frames) * scene.dt"),
+        (not len(bad) or (made.status == "diverged" and made.reason), "has a position that is not finite in "
+            f"frame {bad.min(initial=len(x))}: say status='diverged', and why"),
+        (stated <= CLOCK_SLACK * seconds + PLACE_TOLERANCE, f"its frames say {stated:.3g} s in all, the "
+            f"clock {seconds:.3g} s: give frame_seconds in seconds, of run() alone"),
+        (not changed, f"alters the scene: {', '.join(changed)}: copy what you change, others read it"),
+        (not hosts, f"connects to {', '.join(hosts[:1])}: fetch what it needs beforehand, keep it beside the "
+            "file and name it in files="),
+    )  # fmt: skip
+    again = distance(x, run(seed)[0].positions)
+    demand((again == 0.0, f"a second run gives other positions, by {again:.3g} m: draw all that is random "
+        "from `seed`, keep nothing between objects"))  # fmt: skip
+    if not entry.seeded and entry.trained is None:
+        other = distance(x, run(seed + 1)[0].positions)
+        demand((other == 0.0, f"another seed gives other positions, by {other:.3g} m: say seeded=True"))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PrepareCell(CellTask):
-    """A method of a user, prepared before anything is simulated, for a garment that has not settled."""
-
-    kind = "prepare"
-    stage = "preparing"
-
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Make and prepare the method."""
-        scene, models = self.cell.scene.build(context.assets), context.folder.models
-        at_rest = dataclasses.replace(scene, settle=lambda: scene.cloth.rest_positions)
-        self.cell.entry.make(models=models, seed=self.cell.seed).prepare(at_rest)
-        return Outcome()
+def loose_pin(x: np.ndarray, scene: BuiltScene, near: float) -> str:
+    """Return the first frame of positions x (T,V,3) [m] in which a pin is farther than `near` off; or ""."""
+    pins = scene.cloth.pins
+    for frame in range(1, len(x)) if scene.dressed is None and len(pins) else ():
+        place = scene.pin_positions(frame) if scene.pin_positions else scene.start[pins]
+        if distance(x[frame][pins], np.asarray(place)) > near:
+            return f"frame {frame}"
+    return ""
 
 
 def distance(one: np.ndarray, other: np.ndarray) -> float:
@@ -192,40 +116,22 @@ def distance(one: np.ndarray, other: np.ndarray) -> float:
 
 def fingerprints(scene: BuiltScene) -> dict[str, str]:
     """Return name -> digest of the arrays of a scene, which nobody may alter."""
-    cloth, worn, obstacle = scene.cloth, scene.dressed, scene.obstacle
-    held: dict[str, Any] = {
-        "cloth.rest_positions": cloth.rest_positions,
-        "cloth.faces": cloth.faces,
-        "cloth.masses": cloth.masses,
-        "start": scene.start,
-        "start_velocity": scene.start_velocity,
-        "obstacle.positions": obstacle and obstacle.positions,
-        "origin_heights": scene.origin_heights,
-        "exact": scene.exact,
-        "dressed.motion.poses": worn and worn.motion.poses,
-        "dressed.motion.translations": worn and worn.motion.translations,
-        "dressed.garment.rest_positions": worn and worn.garment.rest_positions,
-    }
-    return {name: digest(np.asarray(value)) for name, value in held.items() if value is not None}
+    arrays = {}
+    for name in UNALTERED:
+        value: object = scene
+        for attribute in name.split("."):
+            value = getattr(value, attribute, None)
+        if value is not None:
+            arrays[name] = digest(np.asarray(value))
+    return arrays
 
 
-# --- scenes ------------------------------------------------------------------------------------------------
-
-
-def watched_scene(scene: Scene) -> Scene:
-    """Return the declaration of a scene that is checked whenever it is built."""
-    return dataclasses.replace(scene, module=__name__, options={"scene": scene})
-
-
-def build(watched: Scene, assets: Assets | None, *, scene: Scene) -> BuiltScene:
-    """Build the scene, and once more to look at it. Raises ContractError."""
-    home = scene.declared_in or scene.module
-    with naming("build()", home):
-        built, again = (scene.build(assets) for _ in range(2))
+def check_scene(scene: Scene, assets: Assets | None) -> None:
+    """Build a scene twice and check it. Raises ContractError, and whatever building it raises."""
+    built, again = (scene.build(assets) for _ in range(2))
     given = type(built).__name__
     demand((isinstance(built, BuiltScene), f"build() gives a {given}: return a BuiltScene"))
-    with naming("settle()", home):
-        before, after = fingerprints(built), fingerprints(again)
+    before, after = fingerprints(built), fingerprints(again)
     changed = [name for name in before if after.get(name) != before[name]]
     demand(
         (built.name == scene.name, f"is built as '{built.name}': give name=scene.name"),
@@ -242,9 +148,7 @@ def build(watched: Scene, assets: Assets | None, *, scene: Scene) -> BuiltScene:
     )  # fmt: skip
     for energy in again.energies:
         if not type(energy).__module__.startswith("reference_sim."):
-            with naming(f"energy {energy.name}", home):
-                check_derivatives(energy, again)
-    return built
+            check_derivatives(energy, again)
 
 
 def check_derivatives(energy: Energy, scene: BuiltScene) -> None:

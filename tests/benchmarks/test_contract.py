@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from benchmarks import check
-from benchmarks.contract import ContractError, check_derivatives, watched_method
+from benchmarks.contract import ContractError, check_derivatives
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.make_plan import check_garment_name
 from benchmarks.plan.plan import Cell
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cells import BatchCell, RunCell
+from benchmarks.runner.cells import BatchCell
 from benchmarks.runner.ground_truth import SettleStart
 from benchmarks.runner.task import Context
 from benchmarks.validation.equilibrium import DeadLoad
@@ -115,21 +115,19 @@ BREACHES = {
     "kept": "run() gave again what it had given before: each call of run() has to do all of the work",
     "alters": "alters the scene: cloth.masses: copy what you change",
     "connects": "connects to 127.0.0.1:9: fetch what it needs beforehand",
-    "raises": "run() raises RuntimeError: broken on purpose (",
+    "raises": "RuntimeError: broken on purpose (",
 }
 
 
 def look(make, tmp_path, monkeypatch, scene="hanging_sheet", **fields) -> str:
-    """Return why the run of a watched method of `make` has failed, empty where it has not."""
+    """Return why the checked run of a method of `make` has failed, empty where it has not."""
     module = type(sys)("breaches")
     module.make = make
     monkeypatch.setitem(sys.modules, "breaches", module)
-    entry = watched_method(
-        MethodEntry(name="m", description="", module="breaches", declared_in=__file__, **fields)
-    )
+    entry = MethodEntry(name="m", description="", module="breaches", declared_in=__file__, **fields)
     cell = Cell(SCENE[scene].at(TINY), entry, 0, ("speed",))
     context, tasks = Context(RunFolder(tmp_path)), {"name": "m", "label": "", "inputs": {}, "code": ()}
-    outcome = RunCell(cell=cell, least=0.02, **tasks).run(context, {})
+    outcome = check.CheckedCell(cell=cell, least=0.02, **tasks).run(context, {})
     if not outcome.failed and entry.batched:
         outcome = BatchCell(cell=cell, least=0.02, **tasks).run(context, {})
     return outcome.reason
@@ -156,17 +154,17 @@ def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatc
             return Trajectory(positions, np.array([[0, 1, 2], [0, 2, 3]]), times, status="ok")
 
     assert look(lambda *, models, seed: Finer(), tmp_path, monkeypatch, other_mesh=True) == ""
-    assert "make() raises TypeError" in look(lambda *, models: Still(), tmp_path, monkeypatch)
-    assert "prepare() raises AttributeError" in look(lambda *, models, seed: object(), tmp_path, monkeypatch)
+    assert "TypeError" in look(lambda *, models: Still(), tmp_path, monkeypatch)
+    assert "AttributeError" in look(lambda *, models, seed: object(), tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize(
     ("how", "message"),
     [
-        ("raise", "prepare() raises RuntimeError: broken on purpose"),
-        ("hungry", "run() raises MemoryError: no room"),
+        ("raise", "RuntimeError: broken on purpose"),
+        ("hungry", "MemoryError: no room"),
         ("early", "positions still changed after run() had come back: wait in run() for all threads"),
-        ("unheld", "quasi_static() raises OSError: no room left for the held poses"),
+        ("unheld", "OSError: no room left for the held poses"),
         ("crowded", "its time cannot be believed"),
     ],
 )
@@ -194,13 +192,13 @@ def test_the_check_survives_what_dies_and_what_hangs(how, message, tmp_path, mon
     monkeypatch.setattr(check, "SCENES_OF_METHODS", ("free_fall",))
     monkeypatch.setattr(check, "SIZES", dataclasses.replace(check.SIZES, cell_seconds=4.0))
     verdicts = list(check.check_file(check.Declarations([entry]), tmp_path))
-    assert [fine for _, fine in verdicts] == [False] and message in verdicts[0][0]
+    assert len(verdicts) == 1 and message in verdicts[0][1]
 
 
 def test_the_check_says_what_is_skipped_everywhere(tmp_path):
     entry = MethodEntry(name="m", description="", module=MISBEHAVING, package="nowhere")
-    ((line, fine),) = check.check_file(check.Declarations([entry]), tmp_path)
-    assert not fine and "is skipped in every scene: m needs the package nowhere" in line
+    ((name, fault),) = check.check_file(check.Declarations([entry]), tmp_path)
+    assert name == "m" and "is skipped in every scene: m needs the package nowhere" in fault
 
 
 @pytest.fixture
