@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import replacing
 
@@ -41,9 +40,7 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
             yield path, path.read_text(encoding="utf-8"), library_file(path.name)
     if (entries := root / ENTRIES).is_dir():
         path = entries / PAGE
-        page, _ = page_of(
-            entries, path, (RunFolder(PUBLISHED / DEFAULT), read_published(PUBLISHED / DEFAULT))
-        )
+        page = page_of(entries, DEFAULT, read_published(PUBLISHED / DEFAULT))
         yield path, path.read_text(encoding="utf-8") if path.is_file() else "", page
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
 
 from benchmarks.assets import FEWEST_FRAMES, LIBRARY
 from benchmarks.external.roll_out_files import RollOutOption, roll_out_of
@@ -160,10 +160,11 @@ def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> s
 FILE = "study.toml"  # of a study that is a folder
 PACKAGED = Path(__file__).parents[1] / "studies"
 FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
-HIDDEN = ("written", "origin", "name", "description")  # attributes that no file gives
+HIDDEN = {Study: ("written", "origin"), Preset: ("name", "description")}  # attributes that no file gives
 WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
 Field = tuple[str, ...]
+Record = TypeVar("Record")
 
 
 @dataclass(frozen=True)
@@ -214,6 +215,13 @@ def read_study(word: str = "default", options: Sequence[Layer] = ()) -> Study:
     reader = _Reader(layers)
     study: Study = reader.dataclass_of(Study, merged, ())
     return replace(study, written={"name": word, **merged}, origin=reader.place)
+
+
+def read_fields(kind: type[Record], path: Path) -> Record:
+    """Return an object of a dataclass from a TOML file. Raises StudyError with file, line and field."""
+    layer = replace(next(_layers(path)), folder=Path())
+    record: Record = _Reader([layer]).dataclass_of(kind, layer.table, ())
+    return record
 
 
 def find_study(name: str) -> Path:
@@ -352,7 +360,7 @@ class _Reader:
         if kind is RollOutOption:
             place = {"path": str(self.layer(field).folder / str(table.get("path", "")))}
             return self.checked(field, lambda: roll_out_of(field[-1], {**table, **place}))
-        declared = {f.name: f for f in fields(kind) if f.name not in HIDDEN}
+        declared = {f.name: f for f in fields(kind) if f.name not in HIDDEN.get(kind, ())}
         for name in table:
             if name not in declared and (kind, name) != (Preset, "base"):
                 names = ", ".join(declared)

@@ -1,0 +1,336 @@
+"""python -m benchmarks.submit: check an entry of another author, and score it from its vertices.
+
+An entry is a folder of the method's name: entry.toml, and roll-outs or a program that makes them. Its scores
+are a run's rows without clock and machine; they lie in `scores` with the digests of all that was scored.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import islice
+from pathlib import Path
+
+from benchmarks.external.roll_out_files import PLACE, FileConventions, RollOutOption
+from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.plan import Plan
+from benchmarks.plan.study import StudyError, read_fields, read_study
+from benchmarks.presets import find_preset
+from benchmarks.provenance import digest_of_file, processor_name
+from benchmarks.results.protocol import DIGEST, NUMBER
+from benchmarks.results.row import USABLE, Row
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.run import carry_out
+from benchmarks.timing import one_thread
+from reference_sim.command_line import Parser, command
+from snug.motion.library import TEST
+
+PROGRAM = "benchmarks.submit"
+PRESET = find_preset("quick")
+SCENES = tuple(f"tshirt/{motion}" for motion in TEST[: PRESET.test_motions])  # of a full entry
+MEASURED_BESIDE = ("simulation", "skinning")  # of which relative excess is made
+METADATA = "entry.toml"
+SAME = 1e-6  # relative difference of two scores that are one
+SAME_ELSEWHERE = 1e-3  # on another processor: a program's energies, where float32 rounds, and what is beside
+SCORED_ON = "scored_on"  # entry of run.json: the processor
+ABSOLUTE = 1e-9  # in the unit of a score, where it is nearly 0
+DECLARED = "cost/frame"  # the one cost that an entry has: as its authors say
+KEPT = ("preset", "metrics", "methods", "scenes", "cases")  # of run.json
+SHOWN = 5  # differences that are printed
+EXAMPLES = """examples:
+  python -m benchmarks.export tshirt/dance_turn -o dance            a scene, to be dressed elsewhere
+  python -m benchmarks.submit check submissions/mine                seconds: metadata, files, protocol
+  python -m benchmarks.submit score submissions/mine                minutes: writes submissions/mine/scores
+  python -m benchmarks.submit score submissions/mine --replace      after a change of the entry
+  python -m reports.docs                                            writes the page of all entries
+
+DIR has entry.toml and one roll-out for each scene, or a program (docs/entries.md). Both check and score load
+  the program, and score runs it: read the program of somebody else first. Scores that are there are compared
+  with those of now.
+exit status: 0 fine; 1 scores that are not the recorded ones: a line each; 2 a fault of DIR: one line."""
+
+
+class EntryError(ValueError):
+    """An entry with a fault; the message names file and remedy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metadata:
+    """Fields of entry.toml; those with a default may be left out.
+
+    Attributes:
+        title: name for people.
+        authors, description: who, and what in one sentence.
+        url: of code or report, or where in this repository.
+        training_data: what the method has learned from; "none".
+        hardware: of the declared time.
+        protocol: number of the protocol that the roll-outs were made by.
+        milliseconds: a frame, as the authors declare them.
+        seeds: of the trainings; one where roll-outs are files.
+        roll_outs: path of the files below the folder, with {scene}.
+        program: a Python file that declares one method, instead of files (docs/extend.md).
+        scenes: those that the entry covers; all by default.
+    """
+
+    title: str
+    authors: str
+    description: str
+    url: str
+    training_data: str
+    hardware: str
+    protocol: str
+    milliseconds: float
+    seeds: tuple[int, ...]
+    roll_outs: str = ""
+    program: str = ""
+    scenes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Raise StudyError for the first field that cannot be meant."""
+        texts = ("title", "authors", "description", "url", "training_data", "hardware")
+        given = "roll_outs" if self.roll_outs else "program"
+        path = Path(getattr(self, given))
+        demands = (
+            *((name, getattr(self, name).strip(), "give a text that is not empty") for name in texts),
+            ("protocol", self.protocol == NUMBER,
+                f"this is protocol {NUMBER}: make the roll-outs again with its scenes, and say '{NUMBER}'"),
+            ("milliseconds", 0.0 < self.milliseconds < math.inf, "give a number above 0"),
+            ("seeds", self.seeds and min(self.seeds) >= 0, "give whole numbers, 0 or more"),
+            ("roll_outs", bool(self.roll_outs) != bool(self.program),
+                "give either roll_outs = 'roll-outs/{scene}.npz' or program = 'method.py'"),
+            ("roll_outs", self.program or PLACE in self.roll_outs, f"has no {PLACE}: name one file a scene"),
+            (given, not path.is_absolute() and ".." not in path.parts,
+                "lies outside of the entry's folder: put it there"),
+            ("seeds", self.program or len(self.seeds) == 1,
+                "files are roll-outs of one seed: give one; another seed is another entry"),
+            ("scenes", set(self.scenes) <= set(SCENES), f"choose from {', '.join(SCENES)}"),
+        )  # fmt: skip
+        for name, fine, otherwise in demands:
+            if not fine:
+                raise StudyError(f"{getattr(self, name)!r}: {otherwise}", (name,))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Folder of an entry, named as its method, and what its metadata says."""
+
+    path: Path
+    metadata: Metadata
+
+    @property
+    def name(self) -> str:
+        """Name of the folder, and of the method in rows."""
+        return self.path.resolve().name
+
+    @property
+    def scenes(self) -> tuple[str, ...]:
+        """Scenes that the entry covers."""
+        return self.metadata.scenes or SCENES
+
+    @property
+    def scores(self) -> RunFolder:
+        """Folder of the scores: results.csv and run.json, as of a run."""
+        return RunFolder(self.path / "scores")
+
+    def digests(self) -> dict[str, str]:
+        """Return file -> digest of all that is scored and of the scores, but for run.json, which has them."""
+        return {
+            path.relative_to(self.path).as_posix(): digest_of_file(path)
+            for path in sorted(self.path.rglob("*"))
+            if path.is_file() and path != self.scores.config_path and "__pycache__" not in path.parts
+        }
+
+    def plan(self, folder: Path) -> Plan:
+        """Return the plan that scores the entry: beside the simulation and skinning, without a clock.
+
+        Raises:
+            ValueError: one line for what cannot be met.
+        """
+        metadata = self.metadata
+        option = RollOutOption(
+            self.name, str(self.path / metadata.roll_outs), FileConventions(), metadata.milliseconds
+        )
+        programs = (str(self.path / metadata.program),) if metadata.program else ()
+        study = replace(
+            read_study("full"),
+            scenes=self.scenes,
+            methods=(*MEASURED_BESIDE, *programs),
+            seeds=metadata.seeds,
+            rollouts={} if programs else {option.name: option},
+            sizes=PRESET,
+        )
+        plan, cells = make_plan(study, folder=folder), []
+        for cell in plan.cells:
+            mine = cell.method not in MEASURED_BESIDE
+            if mine and cell.method != self.name:
+                raise EntryError(
+                    f"{self.path / metadata.program}: declares method '{cell.method}': one of the folder's "
+                    f"name, '{self.name}', is expected"
+                )
+            declared = metadata.milliseconds if mine else None
+            cells.append(replace(cell, entry=replace(cell.entry, timed=False, declared_ms=declared)))
+        return replace(plan, cells=tuple(cells))
+
+
+@command(PROGRAM)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    parser = Parser(
+        prog=f"python -m {PROGRAM}", description="Check and score an entry of the benchmark.", epilog=EXAMPLES
+    )
+    parser.add_argument("action", choices=("check", "score"), help="check alone, or check and score")
+    parser.add_argument("entry", metavar="DIR", help="folder of the entry")
+    parser.add_argument("--replace", action="store_true", help="write the scores whatever was recorded")
+    options = parser.parse_args(arguments)
+    one_thread()
+    entry = read_entry(Path(options.entry))
+    recorded = entry.scores.config_path.is_file() and not options.replace
+    if recorded:
+        check_scores(entry)
+    with tempfile.TemporaryDirectory(prefix="entry-") as folder:
+        plan = entry.plan(Path(folder) / "run")
+        if options.action == "check":
+            from benchmarks.runner.execute_plan import check_roll_outs
+
+            check_roll_outs(plan)
+            print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
+            return 0
+        with contextlib.redirect_stdout(sys.stderr):
+            if carry_out(plan, program=PROGRAM, report=False) not in (0, 1):
+                raise EntryError(f"{entry.path}: was not scored: a line above says why")
+        rows, run = scores_of(entry, RunFolder(plan.folder)), RunFolder(plan.folder).read_config()
+    if not recorded:
+        write(entry, rows, {name: run.get(name) for name in KEPT})
+        print(f"{entry.path}: {len(rows)} rows in {entry.scores.rows_path}")
+        return 0
+    elsewhere = entry.scores.read_config().get(SCORED_ON) != processor_name()
+    tolerance = tolerance_of(entry, elsewhere=elsewhere)
+    lines = list(islice(differences(entry.scores.read_rows(), rows, tolerance), SHOWN))
+    how = "energies as recorded, on another processor" if elsewhere else "as recorded"
+    lines += [f"{entry.path}: " + ("refused: its scores are not the recorded ones" if lines else
+              f"scored again, {len(rows)} rows, {how}")]  # fmt: skip
+    print("\n".join(lines))
+    return int(len(lines) > 1)
+
+
+def read_entry(path: Path) -> Entry:
+    """Read the metadata of an entry. Raises StudyError with file, line and field."""
+    return Entry(path, read_fields(Metadata, path / METADATA))
+
+
+def check_scores(entry: Entry) -> None:
+    """Raise ValueError for scores of another protocol or name, or of files that have changed since."""
+    config, again = entry.scores.read_config(), "score with --replace"
+    if (number := (config.get("protocol") or {}).get("number")) != NUMBER:
+        raise EntryError(f"{entry.scores.path}: scores of protocol {number}, this is {NUMBER}: {again}")
+    then, now = config.get("entry") or {}, entry.digests()
+    if changed := sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name)):
+        raise EntryError(
+            f"{entry.path}: not as it was scored: {', '.join(changed)}: put it right, or {again}"
+        )
+    if entry.name not in {row.method for row in entry.scores.read_rows()}:
+        raise EntryError(
+            f"{entry.scores.path}: no scores of '{entry.name}': give the folder its old name, or {again}"
+        )
+
+
+def scores_of(entry: Entry, run: RunFolder) -> list[Row]:
+    """Return the rows of an entry, of simulation and skinning, without what the machine adds to them.
+
+    Raises:
+        EntryError: a roll-out did not come to its last frame: the mean over the other scenes would be of
+            easier ones.
+    """
+    from benchmarks.metrics import find_metric  # loads numpy
+
+    kept = [
+        replace(row, commit="", hardware="")
+        for row in run.read_rows()
+        if row.value is None
+        or find_metric(row.metric).of == "answer"
+        or (row.metric, row.method) == (DECLARED, entry.name)
+    ]
+    for scene in entry.scenes:
+        mine = [row for row in kept if (row.scene, row.method) == (scene, entry.name)]
+        for row in mine:
+            if row.status not in USABLE:
+                raise EntryError(f"{entry.path}: {scene}, seed {row.seed}: {row.status}: {row.reason}")
+        if not any(row.value is not None for row in mine):
+            raise EntryError(f"{entry.path}: no number in {scene}: it did not run")
+    return kept
+
+
+def tolerance_of(entry: Entry, *, elsewhere: bool) -> Callable[[Row], float]:
+    """Return the tolerances of `differences`. elsewhere: whether another processor gave the recorded scores.
+
+    On another kind of processor the simulation parts from the recorded one, and with it all that hangs on it.
+    Compared are then the energies of the entry, and the total energies of simulation and skinning, which give
+    its relative excess.
+    """
+
+    def tolerance(row: Row) -> float:
+        if not elsewhere:
+            return SAME
+        if row.method == entry.name and row.metric.startswith("energy/"):
+            return SAME_ELSEWHERE if entry.metadata.program else SAME
+        return SAME_ELSEWHERE if row.metric == "energy/total" else math.inf
+
+    return tolerance
+
+
+def differences(
+    recorded: Sequence[Row], now: Sequence[Row], tolerance: Callable[[Row], float] = lambda row: SAME
+) -> Iterator[str]:
+    """Yield a line for each score that is not the recorded one.
+
+    Args:
+        recorded: rows of the scores.
+        now: rows of another scoring.
+        tolerance: row -> relative difference up to which two values are one; inf: any two values are.
+
+    >>> row = Row("garments", "tshirt/kick", "mine", 0, "energy/strain", "J", value=0.5)
+    >>> list(differences([row], [replace(row, value=0.6)]))
+    ['mine in tshirt/kick, energy/strain: 0.6, recorded is 0.5']
+    """
+    before, after = (
+        {(row.suite, row.scene, row.method, row.seed, row.metric): row for row in rows}
+        for rows in (recorded, now)
+    )
+    for key in dict.fromkeys((*before, *after)):
+        one, other = before.get(key), after.get(key)
+        if one is None or other is None or not _same(one, other, tolerance(one)):
+            values = [_shown(row) for row in (other, one)]
+            yield f"{key[2]} in {key[1]}, {key[4]}: {values[0]}, recorded is {values[1]}"
+
+
+def _same(one: Row, other: Row, tolerance: float) -> bool:
+    if (one.status, one.unit, one.protocol) != (other.status, other.unit, other.protocol):
+        return False
+    if one.value is None or other.value is None:
+        return one.value == other.value
+    return tolerance == math.inf or math.isclose(one.value, other.value, rel_tol=tolerance, abs_tol=ABSOLUTE)
+
+
+def _shown(row: Row | None) -> str:
+    if row is None or row.value is None:
+        return "none" if row is None else row.status
+    return f"{row.value:.9g}"
+
+
+def write(entry: Entry, rows: Sequence[Row], config: dict[str, object]) -> None:
+    """Write the scores and the digests of what was scored: the same bytes for the same entry."""
+    folder = entry.scores
+    folder.path.mkdir(exist_ok=True)
+    folder.write_rows(rows)
+    folder.write_config({
+        "protocol": {"number": NUMBER, "digest": DIGEST}, SCORED_ON: processor_name(), **config,
+        "metadata": asdict(entry.metadata), "entry": entry.digests(),
+    })  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.exit(main())
