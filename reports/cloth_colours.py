@@ -96,26 +96,17 @@ def colour_map() -> Colormap:
     return colormaps["YlOrRd"]
 
 
-def scales(roll_outs: SceneRollOuts, methods: Sequence[str], frame: int, reference: str) -> dict[str, Scale]:
-    """Return the scales, by name, that are known of all of these methods at that frame."""
+def error_scale(roll_outs: SceneRollOuts, methods: Sequence[str], frame: int, reference: str) -> Scale | None:
+    """Return the scale of one-step errors at that frame where all methods have them, else of distances."""
     cloths = {method: roll_outs.series[method] for method in methods}
-    at = {m: cloth.positions[frame] for m, cloth in cloths.items()}
-    known = {}
+    values: dict[str, np.ndarray] = {}
+    title = "one-step error [mm]"
     if roll_outs.has_steps(methods):
-        known["step"] = Scale(
-            "one-step error [mm]", {m: c.frame_fields[STEP][frame] for m, c in cloths.items()}
-        )
-    if reference in at and all(np.array_equal(c.faces, cloths[reference].faces) for c in cloths.values()):
-        away = {m: distance(x[None], at[reference][None])[0] for m, x in at.items()}
-        known["distance"] = Scale("from the simulation [mm]", away)
-    if roll_outs.rest is not None and all(len(c.faces) == len(roll_outs.rest) for c in cloths.values()):
-        strain = {m: np.abs(area_change(x[None], cloths[m].faces, roll_outs.rest)[0]) for m, x in at.items()}
-        known["strain"] = Scale("change of area [%]", strain)
-    bent = {m: mean_curvature(x[None], cloths[m].faces)[0] for m, x in at.items()}
-    known["curvature"] = Scale("mean curvature [1/m]", bent)
-    body = roll_outs.body
-    skin = skin_of(body.positions[frame], body.faces) if body and frame < body.frames else None
-    if skin:
-        deep = {m: depth(x, skin, 0) for m, x in at.items()}
-        known["depth"] = Scale("penetration [mm]", deep)
-    return {name: scale for name, scale in known.items() if scale.top > NOTHING}
+        values = {m: cloth.frame_fields[STEP][frame] for m, cloth in cloths.items()}
+    elif reference in cloths:
+        title, first = "from the simulation [mm]", cloths[reference]
+        if all(np.array_equal(cloth.faces, first.faces) for cloth in cloths.values()):
+            at = first.positions[frame]
+            values = {m: distance(c.positions[frame][None], at[None])[0] for m, c in cloths.items()}
+    scale = Scale(title, values)
+    return scale if values and scale.top > NOTHING else None

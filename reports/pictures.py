@@ -1,4 +1,4 @@
-"""Pictures of garments in a report: page one's methods, all methods, strips of frames, the worst failures."""
+"""Pictures of garments in a report: page one's methods, all methods, the worst failures."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from reports.cloth_colours import scales
-from reports.figures.chosen_roll_outs import FEW, SceneRollOuts, long_motion, page_one_roll_outs, read_scene
+from reports.cloth_colours import error_scale
+from reports.figures.chosen_roll_outs import SceneRollOuts, long_motion, page_one_roll_outs, read_scene
 from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH, file_name, wrapped
-from reports.rendering import BACK, BAR, FRONT, SIDE, count_lines, heads_of, sheet, shots
+from reports.rendering import BACK, BAR, FRONT, SIDE, heads_of, sheet, shots
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import overstretched
@@ -34,7 +34,7 @@ def lead_row(run: Run) -> Iterator[Drawing]:
         return
     roll_outs, methods = page_one
     frame, _ = roll_outs.chosen_frame(methods, run.reference)
-    name, scale = next(iter(scales(roll_outs, methods, frame, run.reference).items()), ("", None))
+    scale = error_scale(roll_outs, methods, frame, run.reference)
     columns = len(in_rows(methods)[0])
     tile = (wide := (PAGE_WIDTH - BAR) / max(columns, 3), 1.55 if columns == len(methods) else 1.2)
     cells, _ = compared_cells(run)
@@ -44,12 +44,12 @@ def lead_row(run: Run) -> Iterator[Drawing]:
         heads, below = [], ["\n".join(filter(None, texts)) for texts in zip(heads, below)]
     pictures = shots(roll_outs, methods, frame, FRONT, tile, scale)
     figure = sheet(in_rows(pictures), tile, heads, below=in_rows(below), bar=scale)
-    colour = {
-        "step": "distance from the minimum of the frame's own time step; below: mean over frames",
-        "distance": "distance from the simulation's vertex; below: mean over frames",
-    }.get(name, scale.title if scale else "none")
     time = float(roll_outs.series[methods[0]].times[frame])
-    caption = f"{roll_outs.scene} at {number(time)} s. Colour: {colour}."
+    caption = f"{roll_outs.scene} at {number(time)} s."
+    if scale:
+        of_step = "the minimum of the frame's own time step"
+        origin = of_step if roll_outs.has_steps(methods) else "the simulation's vertex"
+        caption += f" Colour: distance from {origin}; below: mean over frames."
     yield Drawing(figure, "lead", caption, vector=False)
 
 
@@ -73,32 +73,13 @@ def error_below(run: Run, rows: pd.DataFrame, method: str) -> str:
     return ""
 
 
-def colour_maps(run: Run) -> Iterator[Drawing]:
-    """Draw a row of pictures for each scale of colours but that of page one, front and back in turn."""
-    page_one = page_one_roll_outs(run)
-    if not page_one:
-        return
-    roll_outs, methods = page_one
-    frame, _ = roll_outs.chosen_frame(methods, run.reference)
-    further = list(scales(roll_outs, methods, frame, run.reference).items())[1:]
-    wide = min((PAGE_WIDTH - BAR) / len(methods), 1.52)
-    tile = (wide, 0.86 * wide)
-    heads = heads_of(run, methods, wide)
-    for turn, (name, scale) in zip((FRONT, BACK, FRONT, BACK), further):
-        figure = sheet([shots(roll_outs, methods, frame, turn, tile, scale)], tile, heads, bar=scale)
-        heads = []  # the next row stands below
-        side = "front" if turn == FRONT else "back"
-        caption = f"{roll_outs.scene}, the frame of page one, {side}: {scale.title}."
-        yield Drawing(figure, f"map_{name}", caption, vector=False)
-
-
 MOST_SIDE_BY_SIDE = 6  # methods side by side
 
 
 def side_by_side(run: Run) -> Iterator[Drawing]:
     """Draw methods that came to the end of the motion shown at length, at one frame, front and back."""
     if motion := long_motion(run):
-        yield draw_side_by_side(run, motion.roll_outs, run.ordered(motion.whole)[:MOST_SIDE_BY_SIDE])
+        yield draw_side_by_side(run, motion, run.ordered(motion.whole)[:MOST_SIDE_BY_SIDE])
 
 
 def draw_side_by_side(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]) -> Drawing:
@@ -110,46 +91,10 @@ def draw_side_by_side(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]
     figure = sheet(rows, tile, heads_of(run, methods, wide), beside=("front", "back"))
     time = float(roll_outs.series[methods[0]].times[frame])
     caption = f"{roll_outs.scene}: frame {frame} (t = {number(time)} s), {why}."
-    for reason, others in _not_shown(roll_outs, methods).items():
+    if others := set(roll_outs.series) - set(methods):
         names = ", ".join(map(run.label, run.ordered(others)))
-        caption += f" Not shown, {reason}: {names}." if others else ""
+        caption += f" Not shown, for they ended before it or for want of room: {names}."
     return Drawing(figure, f"frames_{file_name(roll_outs.scene)}", caption, vector=False)
-
-
-def _not_shown(roll_outs: SceneRollOuts, methods: Sequence[str]) -> dict[str, list[str]]:
-    """Return reason -> the roll-outs that are not among these methods."""
-    frames = {method: cloth.frames for method, cloth in roll_outs.series.items() if method not in methods}
-    last = max(roll_outs.series[method].frames for method in methods)
-    return {
-        "for they ended before it": [method for method, count in frames.items() if count < last],
-        "for want of room": [method for method, count in frames.items() if count >= last],
-    }
-
-
-FRAMES = 6  # side by side
-
-
-def strip(run: Run) -> Iterator[Drawing]:
-    """Draw the motion shown at length, of its few methods those that came to its end."""
-    motion = long_motion(run)
-    few = [method for method in motion.few if method in motion.whole][:FEW] if motion else []
-    if motion and few:
-        yield draw_strip(run, motion.roll_outs, few)
-
-
-def draw_strip(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]) -> Drawing:
-    """Draw frames from the second fifth on."""
-    frames = min(roll_outs.series[method].frames for method in methods)
-    chosen = np.unique(np.linspace(frames // 5, frames - 1, FRAMES).astype(int))
-    beside = [wrapped(run.label(method), 14) for method in methods]
-    wide = (PAGE_WIDTH - SIDE * count_lines(beside)) / FRAMES
-    tile = (wide, 1.05 * wide)
-    columns = [shots(roll_outs, methods, int(frame), FRONT, tile) for frame in chosen]
-    times = roll_outs.series[methods[0]].times
-    heads = [f"{number(float(times[frame]))} s" for frame in chosen]
-    figure = sheet(list(zip(*columns)), tile, heads, beside=beside)
-    caption = f"{roll_outs.scene}: the same frames of each method."
-    return Drawing(figure, f"strip_{file_name(roll_outs.scene)}", caption, vector=False)
 
 
 MOST_FAILURES, OF_ONE = 4, 2  # failures that are shown, and how many of them by one method

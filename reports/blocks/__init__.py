@@ -8,11 +8,11 @@ A new figure is a function in a file of its own and a line here.
 from reports.blocks.block import Block, Heading, SentenceBlock, TableBlock
 from reports.blocks.printed_tables import failed_checks, not_converged, with_labels
 from reports.blocks.sentences import headline, unread_files, worst
-from reports.figures.costs import break_even, error_of_page_one, errors_of_scene, errors_of_scenes
+from reports.figures.costs import break_even, error_of_page_one
 from reports.figures.figure import Figure
-from reports.figures.over_time import energy_series, hem, training_curves
+from reports.figures.over_time import energy_series, training_curves
 from reports.figures.values import dots, known_answers
-from reports.pictures import colour_maps, failures, lead_row, side_by_side, strip
+from reports.pictures import failures, lead_row, side_by_side
 
 BLOCKS: tuple[Block, ...] = (
     SentenceBlock(headline),
@@ -32,21 +32,15 @@ BLOCKS: tuple[Block, ...] = (
     TableBlock("findings", most=40),
     TableBlock("ablation_effects"),
     Heading("Error against run time"),
-    Figure("error_against_time_of_scene", errors_of_scene, ("error_against_time_*",)),
-    Figure("error_against_time_scenes", errors_of_scenes),
     TableBlock("error_rivals"),
     Figure("break_even", break_even),
-    TableBlock("crossings"),
     Heading("Garments in motion"),
     Figure("frames", side_by_side, ("frames_*",)),
-    Figure("strip", strip, ("strip_*",)),
-    Figure("map", colour_maps, ("map_*",)),
     Figure("failures", failures),
     Heading("Behind the means"),
     Figure("dots", dots),
     Heading("Dynamics"),
     TableBlock("dynamics"),
-    Figure("hem", hem, ("hem_*",)),
     Figure("energy_series", energy_series, ("energy_series_*",)),
     Heading("Body shapes"),
     TableBlock("shapes"),
@@ -56,7 +50,6 @@ BLOCKS: tuple[Block, ...] = (
     Heading("Stress"),
     TableBlock("extremes", printed=not_converged),
     Heading("Training"),
-    TableBlock("trainings"),
     Figure("training", training_curves, ("training.*", "training_*")),
     Heading("How cells, checks and stress tests ended"),
     TableBlock("endings"),

@@ -17,7 +17,6 @@ from reports.statistics.outcomes import leads
 from reports.statistics.pareto import compared_cells
 
 INERTIA = "energy/inertia"
-FEW = 3  # methods side by side at many frames
 
 
 @dataclass(frozen=True)
@@ -46,23 +45,15 @@ class SceneRollOuts:
         first = frames // 5
         return first + int(np.argmax(lively[first:])), "where the simulation's inertia term is largest"
 
-    def has_steps(self, methods: Sequence[str]) -> bool:
-        """Return whether the one-step error of every vertex is known of all of these methods."""
-        return all(STEP in self.series[method].frame_fields for method in methods)
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Roll-outs of a whole motion, and the few methods that are shown at many frames."""
-
-    roll_outs: SceneRollOuts
-    few: tuple[str, ...]
-
     @property
     def whole(self) -> list[str]:
         """Methods that came to the last frame that any has."""
-        frames = {method: cloth.frames for method, cloth in self.roll_outs.series.items()}
-        return [method for method, count in frames.items() if count == max(frames.values())]
+        most = max(cloth.frames for cloth in self.series.values())
+        return [method for method, cloth in self.series.items() if cloth.frames == most]
+
+    def has_steps(self, methods: Sequence[str]) -> bool:
+        """Return whether the one-step error of every vertex is known of all of these methods."""
+        return all(STEP in self.series[method].frame_fields for method in methods)
 
 
 @lru_cache(maxsize=1)
@@ -78,16 +69,14 @@ def page_one_roll_outs(run: Run) -> tuple[SceneRollOuts, tuple[str, ...]] | None
 
 
 @lru_cache(maxsize=1)
-def long_motion(run: Run) -> Motion | None:
+def long_motion(run: Run) -> SceneRollOuts | None:
     """Return the first whole motion that kept roll-outs, shown at length; None where the run kept none."""
-    page_one = page_one_roll_outs(run)
     rows = run.garment_rows[run.garment_rows["metric"] == "energy/total"]
     for scene in [scene for scenes in run.garments(rows).values() for scene in scenes]:
         of_scene = rows[rows["scene"] == scene]
         roll_outs = read_scene(run, of_scene, leading(run, of_scene["method"]))
         if roll_outs.series:
-            few = [m for m in (page_one[1] if page_one else ()) if m in roll_outs.series]
-            return Motion(roll_outs, tuple(few or leads(run, of_scene, roll_outs.series)))
+            return roll_outs
     return None
 
 

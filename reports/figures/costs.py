@@ -5,15 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
 from reports.figures.figure import Drawing
-from reports.figures.plane import SOLVERS, draw_points, families, of_page_one, write_labels
-from reports.figures.plotting import LABELLED, few, file_name, fit, log_axis, new_panels, style, wrapped
+from reports.figures.plane import SOLVERS, draw_points, of_page_one, write_labels
+from reports.figures.plotting import few, fit, log_axis, new_panels, style
 from reports.run.finished_run import Run
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.pareto import (
@@ -29,44 +28,18 @@ from reports.statistics.pareto import (
     run_time,
     time_label,
 )
-from reports.tables.table import number
-
-MOST_PANELS, MOST_SCENES = 4, 7  # in the PDF; the page has all
-BAND_REMARK = " Grey: within the reference's uncertainty."  # remark of a caption
-Scenes = list[tuple[pd.DataFrame, list[tuple[Metric, list[Point]]]]]  # rows and panels of each
 
 
 def error_of_page_one(run: Run) -> Iterator[Drawing]:
-    """Draw the first error of the leading scene in one wide panel."""
-    for rows, panels in _scenes(run)[:1]:
-        yield _draw_page_one(run, rows, *panels[0])
-
-
-def errors_of_scene(run: Run) -> Iterator[Drawing]:
-    """Draw the errors of the leading scene, where it has more than one."""
-    for rows, panels in _scenes(run)[:1]:
-        if len(panels) > 1:
-            yield _draw_scene(run, rows, panels[:MOST_PANELS])
-
-
-def errors_of_scenes(run: Run) -> Iterator[Drawing]:
-    """Draw the first error of every other scene."""
-    if others := _scenes(run)[1:MOST_SCENES]:
-        yield _draw_scenes(run, [(rows, panels[0]) for rows, panels in others])
-
-
-@lru_cache(maxsize=1)
-def _scenes(run: Run) -> Scenes:
-    """Return rows and panels of each scene, the leading one first."""
+    """Draw an error of the leading scene in one wide panel: the first that two methods or more have."""
     frame, scenes = compared_cells(run)
-    shown = []
     for scene in scenes:
         rows = frame[frame["scene"] == scene]
-        points = {name: error_points(run, rows, name) for name in ERRORS}
-        panels = [(run.metrics[name], of_error) for name, of_error in points.items() if len(of_error) > 1]
-        if panels:
-            shown.append((rows, panels))
-    return shown
+        for name in ERRORS:
+            points = error_points(run, rows, name)
+            if len(points) > 1:
+                yield _draw_page_one(run, rows, run.metrics[name], points)
+                return
 
 
 def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequence[Point]) -> Drawing:
@@ -82,62 +55,11 @@ def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequenc
     caption = f"{rows['scene'].iloc[0]}: lower left is better. Pale line: the best at each time."
     if any(curve.aside for curve in curves):
         caption += f" {SOLVERS.label} are joined where none is faster and as accurate; the others are faint."
-    caption += (BAND_REMARK if drawn.band else "") + hollow_remark(run, drawn.below)
+    caption += " Grey: within the reference's uncertainty." if drawn.band else ""
+    if drawn.below:
+        names = ", ".join(run.label(method) for method in run.ordered(drawn.below))
+        caption += f" Hollow, on the lower edge: zero or below the panel ({names})."
     return Drawing(figure, "error_against_time", caption)
-
-
-def _draw_scene(run: Run, rows: pd.DataFrame, panels: Sequence[tuple[Metric, list[Point]]]) -> Drawing:
-    """Draw a panel for each error of one scene, every family a line of its own."""
-    scene, time = rows["scene"].iloc[0], run_time(rows)
-    reference = value_of(rows, run.reference, time)
-    figure, every = new_panels(len(panels), 2)
-    drawn = []
-    for axes, (metric, points) in zip(every, panels):
-        band = indistinct(run, rows, metric.name)
-        drawn.append(draw_points(axes, run, families(run, points), reference, band))
-        axes.set(xlabel=time_label(time), title=metric.heading)
-    fit(figure, height=LABELLED)
-    known: set[str] = set()
-    for axes, panel in zip(every, drawn):
-        write_labels(axes, panel, size=6.5, known=known)
-        known |= {label.text for label in panel.labels}
-    caption = f"{scene}: lower left is better. Pale line: the best at each time."
-    caption += BAND_REMARK if any(panel.band for panel in drawn) else ""
-    caption += f" Dotted: the converged simulation, {number(reference)} ms." if reference else ""
-    caption += " Joined: one family, its first and last number beside. Bars: repeats and seeds or, where "
-    caption += "larger, the change by a perturbed reference."
-    below = {method for panel in drawn for method in panel.below}
-    caption += hollow_remark(run, below) + missing_remark(run, [p for _, points in panels for p in points])
-    return Drawing(figure, f"error_against_time_{file_name(scene)}", caption)
-
-
-def _draw_scenes(run: Run, scenes: Sequence[tuple[pd.DataFrame, tuple[Metric, list[Point]]]]) -> Drawing:
-    """Draw a small panel for each scene."""
-    figure, every = new_panels(len(scenes), 3)
-    titles = list(dict.fromkeys(metric.heading for _, (metric, _) in scenes))
-    for axes, (rows, (metric, points)) in zip(every, scenes):
-        reference = value_of(rows, run.reference, run_time(rows))
-        band = indistinct(run, rows, metric.name)
-        draw_points(axes, run, families(run, points), reference, band, small=True)
-        scene = wrapped(str(rows["scene"].iloc[0]), 24)
-        axes.set_title("\n".join([scene, *([metric.heading] if len(titles) > 1 else [])]), fontsize=8)
-        axes.tick_params(labelsize=7)
-    figure.supxlabel("run time [ms per frame]", fontsize=8.5)
-    fit(figure)
-    caption = f"The same of other scenes, in the colours above: {' or '.join(titles)} against run time."
-    return Drawing(figure, "error_against_time_scenes", caption)
-
-
-def hollow_remark(run: Run, below: set[str]) -> str:
-    """Return the remark of a caption on methods whose marker is hollow."""
-    names = ", ".join(run.label(method) for method in run.ordered(below))
-    return f" Hollow, on the lower edge: zero or below the panel ({names})." if below else ""
-
-
-def missing_remark(run: Run, points: Sequence[Point]) -> str:
-    """Return the remark of a caption on methods of which some seeds did not finish."""
-    methods = dict.fromkeys(f"{run.label(point.method)}{point.fewer}" for point in points if point.fewer)
-    return f" Seeds that did not finish are left out: {', '.join(methods)}." if methods else ""
 
 
 MOST_FRAMES = 1e7

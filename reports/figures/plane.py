@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -25,7 +25,7 @@ DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -
 # Cost of an area [square pixel] shared with another label, a marker or line, and the outside of the axes.
 ON_LABEL, ON_MARK, OUTSIDE = 12.0, 6.0, 12.0
 PER_POINT, PER_RANK = 0.7, 0.4  # of a point of distance and of a less preferred direction [pixel of height]
-MOST_COST = 1.5  # of a place that counts as free, in squares of the label's height
+LETTERS = 7.5  # size of labels [points]
 SKIPPED = 0.3  # share of a leading line at its spot, which lies in a marker
 
 
@@ -38,9 +38,7 @@ class Label:
     colour: str
 
 
-def place_labels(
-    axes: Axes, labels: Sequence[Label], marks: np.ndarray, size: float, known: Collection[str] = ()
-) -> None:
+def place_labels(axes: Axes, labels: Sequence[Label], marks: np.ndarray) -> None:
     """Write labels beside their spots, the first ones first.
 
     Call it when limits, scales and all other content of the figure are set and `fit` has placed it.
@@ -49,8 +47,6 @@ def place_labels(
         axes: of the spots.
         labels: what to write.
         marks: (N,4) boxes of markers and lines that labels should not cover, see `boxes_of`.
-        size: of the letters [points].
-        known: texts that are left out where they have no free place close to their spot.
     """
     from matplotlib.patheffects import withStroke
 
@@ -61,7 +57,7 @@ def place_labels(
     for label in labels:
         spot = axes.transData.transform(label.spot)
         text = axes.annotate(
-            label.text, label.spot, textcoords="offset points", xytext=(0, 0), fontsize=size,
+            label.text, label.spot, textcoords="offset points", xytext=(0, 0), fontsize=LETTERS,
             color=label.colour, zorder=5, annotation_clip=False, va="bottom",
             path_effects=[withStroke(linewidth=1.5, foreground="white")],
         )  # fmt: skip
@@ -71,10 +67,6 @@ def place_labels(
         costs = [cost * letters.height + _cost(box, lead, frame, taken, marks) for box, lead, cost in places]
         place = int(np.argmin(costs))
         box, lead, _ = places[place]
-        free = costs[place] < MOST_COST * letters.height**2 and not len(lead)
-        if label.text in known and not free:
-            text.remove()
-            continue
         text.set_position(tuple((box[:2] - spot) / pixels))
         taken = np.vstack([taken, box[None], lead])
         if len(lead):
@@ -246,9 +238,7 @@ class Drawn:
     band: bool
 
 
-def draw_points(
-    axes: Axes, run: Run, curves: Sequence[Curve], reference: float | None, band: float, small: bool = False
-) -> Drawn:
+def draw_points(axes: Axes, run: Run, curves: Sequence[Curve], reference: float | None, band: float) -> Drawn:
     """Draw the curves of one panel.
 
     Args:
@@ -257,7 +247,6 @@ def draw_points(
         curves: what is drawn.
         reference: run time of the reference [ms per frame], None where unknown.
         band: error below which differences are inconclusive.
-        small: whether the panel is one of many.
     """
     points = [point for curve in curves for point in (*curve.points, *curve.aside)]
     # An error that cannot be told from the reference needs no decades of its own.
@@ -273,7 +262,7 @@ def draw_points(
             pale = point in curve.aside
             colour = GREY if point.error < band else curve.look.colour
             _draw_marker(axes, point, look.marker, colour, edge if point.error <= least else None,
-                         SMALL if small or pale else MARKER, pale)  # fmt: skip
+                         SMALL if pale else MARKER, pale)  # fmt: skip
         heights = [point.error if point.error > least else edge for point in curve.points]
         lines.append(np.column_stack([[point.time for point in curve.points], heights]))
         axes.plot(*lines[-1].T, color=curve.look.colour, linestyle=curve.look.line, linewidth=1.1, zorder=2)
@@ -292,11 +281,11 @@ def draw_points(
     return Drawn({p.method for p in points if p.error <= least}, labels, lines, in_sight)
 
 
-def write_labels(axes: Axes, drawn: Drawn, size: float = 7.5, known: Collection[str] = ()) -> None:
+def write_labels(axes: Axes, drawn: Drawn) -> None:
     """Write the labels of a panel once the figure is laid out, see `place_labels`."""
     marks = [boxes_of(axes, line, MARKER + 1.0) for line in drawn.lines]
     marks += [boxes_along(axes, line, 1.5) for line in drawn.lines if len(line) > 1]
-    place_labels(axes, drawn.labels, np.vstack(marks), size, known)
+    place_labels(axes, drawn.labels, np.vstack(marks))
 
 
 def _draw_marker(

@@ -68,7 +68,7 @@ def _read_histories(folder: RunFolder, run: Run) -> list[History]:
             except ValueError as error:
                 run.problems.append(without_folder(folder, error))
             else:
-                histories += [replace(history, garment=str(garment), seed=int(seed))] if history else []
+                histories += [replace(history, garment=str(garment))] if history else []
     return histories
 
 

@@ -65,7 +65,6 @@ def without_folder(folder: RunFolder | None, problem: object) -> str:
     return str(problem).replace(f"{folder.path}/", "") if folder else str(problem)
 
 
-LAST, FROM = 10, 0.8  # losses in a mean at the end of a training; the share of its steps it is compared with
 # By the unit of the loss, of the energies and of simulated vertices: their squares, or two bands of them.
 PANELS = {
     "J": "physics loss [J per frame]",
@@ -79,17 +78,13 @@ class History:
     """Loss of one model over its training.
 
     unit: of the loss. rows: for every few steps, step, seconds, loss and terms, at some the value on held-out
-    motions. frames: number that it learned from. best_step: that of the least value on held-out motions, nan
-    where there are none.
+    motions.
     """
 
     method: str
     unit: str
     rows: list[dict[str, float]]
     garment: str = ""
-    seed: int = 0
-    frames: int | None = None
-    best_step: float = np.nan
 
     @property
     def panel(self) -> str:
@@ -99,19 +94,6 @@ class History:
     def column(self, name: str) -> np.ndarray:
         """Return one number of every logged step (N,), nan where it was not logged."""
         return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
-
-    @property
-    def last_loss(self) -> float:
-        """Mean of the last LAST losses."""
-        return float(self.column("loss")[-LAST:].mean())
-
-    @property
-    def decrease(self) -> float:
-        """Fall of the loss in the last fifth of the steps [%]; nan where few were logged."""
-        steps, losses = self.column("step"), self.column("loss")
-        before = losses[steps <= FROM * steps[-1]][-LAST:]
-        enough = len(before) == LAST and (steps > FROM * steps[-1]).sum() >= LAST
-        return float(100.0 * (1.0 - self.last_loss / before.mean())) if enough else np.nan
 
 
 def read_history(path: Path, method: str) -> History | None:
@@ -125,8 +107,5 @@ def read_history(path: Path, method: str) -> History | None:
         raise ValueError(f"{path}: no safetensors header ({error})") from None
     if not isinstance(header, dict):
         raise ValueError(f"{path}: its entry 'snug' is a {type(header).__name__}, no table")
-    rows, unit = header.get("history") or [], header.get("unit", "")
-    summary = header.get("summary") or {}
-    best = (summary.get("validation") or {}).get("best_step", np.nan)
-    frames = summary.get("training_frames")
-    return History(method, unit, rows, frames=frames, best_step=best) if len(rows) > 1 else None
+    rows = header.get("history") or []
+    return History(method, header.get("unit", ""), rows) if len(rows) > 1 else None

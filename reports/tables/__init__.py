@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from reports.run.finished_run import Run
-from reports.tables.costs import crossings, error_rivals, reference_uncertainty, trainings
+from reports.tables.costs import error_rivals, reference_uncertainty
 from reports.tables.findings import (
     endings,
     errors_in_spreads,
@@ -33,7 +33,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     findings,
     ablations,
     ablation_effects,
-    crossings,
     error_rivals,
     reference_uncertainty,
     shapes,
@@ -41,7 +40,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     extremes,
     endings,
     unfinished,
-    trainings,
 )
 
 

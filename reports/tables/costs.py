@@ -1,65 +1,26 @@
-"""Tables on run time and training: break-even, rivals, the reference's uncertainty, how trainings ended."""
+"""Tables beside the plot of error against run time: rivals of SNUG, and how certain the reference is."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
-
-import numpy as np
-
 from reports.run.finished_run import Run
-from reports.run.stored_files import LAST, History
-from reports.statistics.means_and_spreads import Mean, value_of
+from reports.statistics.means_and_spreads import value_of
 from reports.statistics.pareto import (
     NETWORK,
     SMALLER_STEPS,
     beaten_by,
-    compared_costs,
     compared_scenes,
-    crossing,
     fastest,
     indistinct,
     points_of,
     reference_scenes,
-    rivals,
     truncated,
 )
 from reports.statistics.relative_excess import excess_of
-from reports.tables.table import GARMENT, METHOD, Cell, Column, Table, metric_column, table
+from reports.tables.table import Cell, Column, Table, metric_column, table
 
 RIVAL_ERRORS = ("gap/energy", "curvature/error")
 UNCERTAIN = ("curvature/error", "distance/rms")
 OF_STEPS = ("energy/strain", "dynamics/amplitude")  # what the time step changes
-
-
-def crossings(run: Run) -> list[Table]:
-    """Tabulate from how many frames on each trained network is cheaper than its rival solvers."""
-    frame = run.cells("speed", "garments")
-    lines: list[tuple[Cell, ...]] = []
-    for garment, scenes in compared_scenes(run, frame).items():
-        reasons = rivals(run, frame, scenes)
-        for network, rival in itertools.product(*compared_costs(run, frame, scenes, reasons)):
-            frames = crossing(network, rival)
-            total = None if frames is None else network.total(frames)
-            rounded = None if frames is None else float(f"{frames:.1e}")
-            times = rival.frame / network.frame if network.frame else None
-            names = (garment, network.method, rival.method, reasons[rival.method])
-            lines.append((*names, rounded, total, network.before, times))
-    columns = (
-        GARMENT,
-        Column("method", "Network", text=True, method=True),
-        Column("solver", "Overtakes", text=True, method=True),
-        Column("as_good", "As good by", text=True),
-        Column("crossing", "From frames on", digits=2, trim=True),
-        Column("total_time", "Total time by then", "s"),
-        Column("before", "Network's before its first frame", "s"),
-        Column("frame_ratio", "Its run time over the network's", digits=2),
-    )
-    caption = (
-        "From how many frames on training pays, against the converged simulation and the fastest solvers "
-    )
-    caption += "as good as SNUG; a dash: never."
-    return table("crossings", columns, lines, caption, grouped_by=("garment",))
 
 
 def error_rivals(run: Run) -> list[Table]:
@@ -129,45 +90,3 @@ def reference_uncertainty(run: Run) -> list[Table]:
         "the ensemble's are as small as those of another valid simulation."
     )
     return table("reference_uncertainty", columns, lines, caption)
-
-
-def trainings(run: Run) -> list[Table]:
-    """Tabulate how long each network trained and how its loss ended; means over seeds."""
-    groups: dict[tuple[str, str], list[History]] = {}
-    for history in run.histories:
-        groups.setdefault((history.garment, history.method), []).append(history)
-    place = {method: k for k, method in enumerate(run.ordered({method for _, method in groups}))}
-    lines: list[tuple[Cell, ...]] = []
-    for (garment, method), histories in sorted(groups.items(), key=lambda item: place[item[0][1]]):
-        ends = [
-            (h.frames, h.rows[-1]["step"], h.best_step, h.rows[-1]["seconds"], h.last_loss, h.decrease)
-            for h in histories
-        ]
-        lines.append((garment, method, len(histories), *map(_over_seeds, zip(*ends)), histories[0].unit))
-    order = list(dict.fromkeys(history.garment for history in run.histories))
-    lines.sort(key=lambda line: order.index(str(line[0])))
-    columns = (
-        GARMENT, METHOD,
-        Column("seeds", "Seeds"), Column("frames", "Frames", digits=6, trim=True),
-        Column("steps", "Steps", digits=6, trim=True),
-        Column("best", "Best on held-out", digits=6, trim=True), Column("seconds", "Training", "s"),
-        Column("loss", "Loss at its end", mixed=True), Column("decrease", "Fell in last fifth", "%"),
-        Column("unit", "Unit of loss", text=True),
-    )  # fmt: skip
-    filled = [k for k in range(len(columns)) if any(line[k] is not None for line in lines)]
-    lines = [tuple(line[k] for k in filled) for line in lines]
-    caption = (
-        f"How trainings ended. Losses are means of {LAST} logged ones. The fall is from the {LAST} before "
-        "four fifths of the steps. Where the rate falls to zero, a loss levels off by itself."
-    )
-    return table("trainings", [columns[k] for k in filled], lines, caption, grouped_by=("garment",))
-
-
-def _over_seeds(values: Sequence[float | None]) -> Mean | float | None:
-    """Return mean and spread of the values; a number that no seed changes as it is."""
-    known = {("", seed): x for seed, x in enumerate(values) if x is not None and np.isfinite(x)}
-    numbers = np.array(list(known.values()), dtype=float)
-    if len(numbers) == len(values) and len(set(known.values())) == 1:
-        return float(numbers[0])
-    spread = float(numbers.std(ddof=1)) if len(numbers) > 1 else None
-    return Mean(float(numbers.mean()), spread, len(numbers), len(values), cells=known) if known else None

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.figures import over_time, plotting, values
-from reports.figures.chosen_roll_outs import SceneRollOuts
+from reports.figures import plotting, values
 from reports.figures.over_time import training_curves
 from reports.figures.plotting import file_name, printable
 from reports.figures.values import dots
 from reports.run import reading
 from reports.run.finished_run import shown_seeds
 from reports.run.reading import read_run_with_trainings
-from tests.reports.report_folder import FRAMES, mesh, row, run_folder, run_of, sheet, write_model
+from tests.reports.report_folder import row, run_folder, run_of, write_model
 
 
 def test_methods_keep_their_order_and_their_look():
@@ -52,65 +51,6 @@ def test_a_panel_of_curves_shows_five_methods_the_reference_and_the_users_among_
     run = run_of([*(row(method=name) for name in names), row(method="mine", role="external")])
     five = ["simulation", "skinning", "snug", "pbns", "mine"]
     assert sorted(plotting.few(run, run.methods)) == sorted(five)
-
-
-def test_the_hem_is_drawn_where_it_swings():
-    turn = {
-        "hem/yaw": np.radians(np.linspace(0.0, 40.0, FRAMES)),
-        "hem/from_end": np.linspace(0.1, 0.0, FRAMES),
-    }
-    run = run_of([row(method=method) for method in ("simulation", "snug")])
-    cloth, faces = sheet(0.1)
-    series = {method: mesh(cloth, faces, turn) for method in run.methods}
-    twist = SceneRollOuts("tunic/twist", series)
-    assert over_time.hem_turns(run, twist) and over_time.draw_hem(run, twist).name == "hem_tunic-twist"
-    still = mesh(cloth, faces, {name: 0.01 * curve for name, curve in turn.items()})
-    assert not over_time.hem_turns(run, SceneRollOuts("tunic/still", {"snug": still}))
-
-
-def stopping() -> tuple[np.ndarray, np.ndarray]:
-    """A sheet that stands still from frame 12 of 40, (T,V,3) and (F,3)."""
-    cloth, faces = sheet(0.1)
-    moving = np.repeat(cloth[:1], 40, axis=0)
-    moving[:12] += 0.01 * np.arange(12, 0, -1)[:, None, None]
-    return moving, faces
-
-
-def test_a_hem_whose_roll_outs_all_ended_before_the_body_stopped_is_drawn_without_the_stop():
-    moving, faces = stopping()
-    turn = {"hem/yaw": np.radians(np.linspace(0.0, 40.0, 12)), "hem/from_end": np.linspace(0.1, 0.0, 12)}
-    run = run_of([row(method="snug")])
-    for frames, stopped in ((12, False), (13, True)):
-        fields = {name: np.append(curve, curve[-1])[:frames] for name, curve in turn.items()}
-        series = {"snug": mesh(moving[:frames], faces, fields)}
-        drawing = over_time.draw_hem(run, SceneRollOuts("tunic/stop", series, mesh(moving, faces, {})))
-        assert ("the body has stopped" in drawing.caption) == stopped
-
-
-def test_a_stop_is_where_the_body_no_longer_moves():
-    moving, faces = stopping()
-    frames = len(moving)
-    body = mesh(moving, faces, {})
-    assert over_time.stop_frame(body) == 12
-    assert over_time.stop_frame(mesh(moving[: 12 + over_time.HELD], faces, {})) is None
-    assert over_time.stop_frame(mesh(moving[12:], faces, {})) is None  # it never moved
-    after = np.arange(frames) - 12.0
-    curves = {
-        "swings": np.radians(30.0 * np.exp(-0.1 * np.maximum(after, 0)) * np.cos(0.4 * after)),
-        "creeps": np.radians(30.0 * np.exp(-0.3 * np.maximum(after, 0))),
-    }
-    series = {
-        method: mesh(moving, faces, {"hem/yaw": yaw, "hem/from_end": np.abs(yaw - yaw[-1])})
-        for method, yaw in curves.items()
-    }
-    torn = {"hem/yaw": curves["swings"][:8], "hem/from_end": np.abs(curves["swings"][:8])}
-    series["torn"] = mesh(moving[:8], faces, torn)  # it has no end to be measured from
-    run = run_of([row(method=method) for method in series])
-    drawing = over_time.draw_hem(run, SceneRollOuts("tunic/stop", series, body))
-    assert "torn" not in drawing.caption.lower()
-    assert "the body has stopped, at 0.400 s" in drawing.caption
-    assert over_time.overshoot(curves["swings"], 12) > np.radians(10.0)
-    assert over_time.overshoot(curves["creeps"], 12) == 0.0
 
 
 def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):

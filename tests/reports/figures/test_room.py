@@ -38,7 +38,6 @@ LABELS = {
 }  # fmt: skip
 SCENES = ("tshirt/01_01_a", "tshirt/push_recovery", "tshirt/sit_and_stand", "tshirt/cartwheel_lean")
 FRAMES = 40
-PHOTOGRAPHS = 5  # figures of cloth: lead, frames, strip, map, failures
 
 
 class Kept(RollOuts):
@@ -51,7 +50,6 @@ class Kept(RollOuts):
         points = np.repeat(points[:1], FRAMES, axis=0)
         points[..., 2] += 0.01 * (1 + place) * np.sin(points[..., 0] * swing[:, None])
         fields = {f"energy/{term}": 0.1 * (1.1 + np.sin(swing)) for term in ("strain", "bending", "inertia")}
-        fields |= {"hem/yaw": np.sin(swing), "hem/from_end": 0.1 * (1.0 + np.cos(swing))}
         fields["step/vertices"] = np.full((FRAMES, points.shape[1]), 1.0 + place)
         return mesh(points, faces, fields)
 

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from reports.figures.costs import break_even, error_of_page_one, errors_of_scene, errors_of_scenes
+from reports.figures.costs import break_even, error_of_page_one
 from reports.figures.figure import Drawing, save_drawing
 from reports.statistics.pareto import (
     indistinct,
@@ -18,7 +18,7 @@ from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, row
 
 # method: ms a frame, relative energy gap, curvature error
-FIGURES = (error_of_page_one, errors_of_scene, errors_of_scenes, break_even)
+FIGURES = (error_of_page_one, break_even)
 
 
 def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_path):
@@ -58,13 +58,7 @@ def drawings() -> list[Drawing]:
 
 def test_every_figure_of_the_suite_is_drawn(drawings, tmp_path):
     run = run_of(all_rows())
-    names = [
-        "error_against_time",
-        "error_against_time_tshirt-walk",
-        "error_against_time_scenes",
-        "break_even",
-    ]
-    assert [drawing.name for drawing in drawings] == names
+    assert [drawing.name for drawing in drawings] == ["error_against_time", "break_even"]
     assert all(save_drawing(tmp_path, drawing).path.is_file() for drawing in drawings)
     walk = run.frame[run.frame["scene"] == "tshirt/walk"]
     assert indistinct(run, walk, "distance/rms") == 21.0  # no rival of whom it may be said who is nearer
@@ -75,14 +69,13 @@ def test_a_caption_speaks_of_a_grey_band_only_where_one_is_seen():
     unknown = [r for r in all_rows() if not r.method.startswith("simulation-") and r.metric != "gap/refrozen"]
     tiny = [*unknown, row(SCENES[0], "simulation", "gap/refrozen", 1e-9, "J")]  # below the panel
     for rows, grey in ((all_rows(), True), (unknown, False), (tiny, False)):
-        for figure in (error_of_page_one, errors_of_scene):
-            (drawing,) = figure(run_of(rows))
-            assert ("Grey: within the reference's uncertainty." in drawing.caption) == grey
+        (drawing,) = error_of_page_one(run_of(rows))
+        assert ("Grey: within the reference's uncertainty." in drawing.caption) == grey
 
 
 def test_no_axis_is_labelled_in_markup(drawings):
     """Names may hold dollars, so that no text is taken for a formula: neither are an axis's numbers."""
-    assert len(drawings) == 4
+    assert len(drawings) == 2
     for canvas in (drawing.canvas for drawing in drawings):
         FigureCanvasAgg(canvas).draw()
         labels = [

@@ -1,55 +1,13 @@
-"""Tables of suite speed: crossings, rivals, uncertainty of the reference."""
+"""Tables of suite speed: rivals, uncertainty of the reference."""
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 
-from reports.statistics.pareto import compared_scenes
 from reports.tables import make_tables
-from reports.tables.costs import crossings, error_rivals, reference_uncertainty
+from reports.tables.costs import error_rivals, reference_uncertainty
 from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, cost_sentence, row
-
-
-def test_the_table_of_crossings_leaves_no_ablation_out_for_want_of_room():
-    more = [f"snug-{k}" for k in range(9)]
-    costs = (("cost/frame", 0.25), ("cost/train", 9.0), ("cost/data", 0.0))
-    rows = [
-        row(scene, method, *cost, role="ablation") for scene in SCENES for method in more for cost in costs
-    ]
-    (table,) = crossings(run_of(all_rows() + rows))
-    assert {line[1] for line in table.rows} == {"snug", *more}
-
-
-def test_every_network_has_its_crossings_in_a_table():
-    (table,) = crossings(run_of(all_rows()))
-    crossing_costs = {line[2]: line[4:6] for line in table.rows}
-    assert {line[2]: line[3] for line in table.rows}["lbfgs-20"] == "energy gap"
-    assert {line[1] for line in table.rows} == {"snug"}
-    assert crossing_costs["simulation"] == (2000.0, pytest.approx(200.5, rel=1e-3))
-    assert {line[2]: line[6:] for line in table.rows}["simulation"] == (pytest.approx(200.0), 400.0)
-    frames = {method: frame for method, (frame, _) in crossing_costs.items()}
-    assert frames == {"simulation": 2000.0, "lbfgs-20": 13000.0, "lbfgs-5": 53000.0}
-    others = run_of([r for r in all_rows() if "snug" not in r.method])
-    assert crossings(others) == error_rivals(others) == []
-
-
-def test_garments_have_crossings_by_themselves():
-    rows = all_rows()
-    # Where no truncated solver was timed, nothing says how fast a solver as good would be.
-    rows += [dataclasses.replace(r, scene="skirt/stop", garment="skirt") for r in rows if r.method == "snug"]
-    rows += [
-        dataclasses.replace(r, scene="tunic/stop", garment="tunic", value=4.0 * r.value)
-        for r in rows
-        if r.scene == SCENES[0]
-    ]
-    run = run_of(rows)
-    assert list(compared_scenes(run, run.cells("speed"))) == ["tshirt", "tunic"]
-    (table,) = crossings(run)
-    frames = {line[0]: line[4] for line in table.rows if line[2] == "simulation"}
-    assert frames == {"tshirt": 2000.0, "tunic": 2000.0}
 
 
 def test_page_one_and_a_table_say_what_beats_the_network_and_when_training_pays():

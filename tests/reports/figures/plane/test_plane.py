@@ -89,16 +89,12 @@ def test_every_curve_has_its_label_and_no_two_labels_cover_each_other():
     assert all((frame[:2] <= box[:2]).all() and (box[2:] <= frame[2:]).all() for box in boxes.values())
 
 
-def test_a_label_avoids_a_line_and_a_known_one_without_room_is_left_out():
+def test_a_label_avoids_a_line():
     figure = new_figure(3, 2)
     axes = figure.subplots()
     axes.set(xlim=(0, 10), ylim=(0, 10))
     fit(figure)
     beside = boxes_along(axes, np.array([[5.3, 0.0], [5.3, 10.0]]), 3.0)
-    place_labels(axes, [Label("here", (5.0, 5.0), "black")], beside, 7.5)
+    place_labels(axes, [Label("here", (5.0, 5.0), "black")], beside)
     (box,) = boxes_of_texts(axes).values()
     assert box[2] < beside[:, 0].min()
-    everywhere = np.array([[0.0, 0.0, 1e4, 1e4]])
-    names = [Label(text, (2.0, 2.0), "black") for text in ("known", "new")]
-    place_labels(axes, names, everywhere, 7.5, known={"known"})
-    assert set(boxes_of_texts(axes)) == {"here", "new"}
