@@ -19,10 +19,11 @@ from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import Estimate, Metric
 from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files
+from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
-from benchmarks.plan.plan import STATES, Cell, Plan, TaskId
+from benchmarks.plan.plan import STATES, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache

@@ -23,9 +23,10 @@ from benchmarks.external.roll_out_files import (
     parse_roll_out,
     roll_out_of,
 )
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
-from benchmarks.plan.plan import Cell, Plan
+from benchmarks.plan.plan import Plan
 from benchmarks.plan.study import Study, StudyError, read_study
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out

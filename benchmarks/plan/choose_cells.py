@@ -9,8 +9,8 @@ from fnmatch import fnmatchcase
 
 from benchmarks.method import MethodEntry
 from benchmarks.metrics import MODULES
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Cell
 from benchmarks.plan.study import Part, Study, StudyError, nearest
 from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes

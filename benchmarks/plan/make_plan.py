@@ -12,9 +12,10 @@ from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import installed
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.plan import user_files
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.choose_cells import Declared, choose_cells
 from benchmarks.plan.motions import Motions, split_motions
-from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Cell, Plan
+from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Plan
 from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.provenance import usable_cores
 from benchmarks.results.row import ResultsError

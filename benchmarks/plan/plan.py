@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets import Inputs
 from benchmarks.external.roll_out_files import MODULE as STORED
-from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import StudyError
 from benchmarks.presets import Preset, find_preset
@@ -24,72 +24,6 @@ from benchmarks.training import Training
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
     from benchmarks.validation.case import Case
-
-TaskId = tuple[str, str]  # kind and name of a task
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One scene computed by one method with one seed; `suites` are those that report it."""
-
-    scene: Scene
-    entry: MethodEntry
-    seed: int
-    suites: tuple[str, ...]
-
-    @property
-    def method(self) -> str:
-        """Name of the method."""
-        return self.entry.name
-
-    @property
-    def label(self) -> str:
-        """Scene, method and seed for messages."""
-        return f"{self.scene.name} x {self.method}" + (f" (seed {self.seed})" if self.seed else "")
-
-    @property
-    def name(self) -> str:
-        """<scene>/<method>, and the seed where it is not 0: part of paths and of ids."""
-        return f"{flat(self.scene.name)}/{flat(self.method)}" + (f"-seed{self.seed}" if self.seed else "")
-
-    @property
-    def key(self) -> tuple[str, str, int]:
-        """Scene, method and seed, by which RunFolder names its files."""
-        return self.scene.name, self.method, self.seed
-
-    @property
-    def task_id(self) -> TaskId:
-        """Id of the task that runs the cell."""
-        return "cell", self.name
-
-    @property
-    def metrics_id(self) -> TaskId:
-        """Id of the task that measures the cell's trajectory."""
-        return "metrics", self.name
-
-    @property
-    def batch_id(self) -> TaskId:
-        """Id of the task that times many bodies at once."""
-        return "batch", self.name
-
-    def repeat_id(self, number: int) -> TaskId:
-        """Return the id of a repeat for its time alone; `number` counts from 1."""
-        return "repeat", f"{self.name}-{number}"
-
-    @property
-    def timed(self) -> bool:
-        """True if its costs are measured; other cells run side by side."""
-        return self.scene.timed and self.entry.timed
-
-
-def flat(name: str) -> str:
-    """Return a name as part of a path.
-
-    >>> flat("tshirt/walk")
-    'tshirt-walk'
-    """
-    return name.replace("/", "-")
-
 
 # Of a task in the folder of a run, and the states in which it is done again unless --only names others.
 STATES = ("finished", "failed", "stale", "missing")

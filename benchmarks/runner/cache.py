@@ -16,7 +16,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.plan.plan import DEFAULT_ONLY, TaskId
+from benchmarks.plan.cell import TaskId
+from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.provenance import damaged, digest, digest_of_file, software
 from benchmarks.results.row import ResultsError, read_json
 from benchmarks.results.run_folder import FORMAT, RunFolder

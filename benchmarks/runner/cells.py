@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from benchmarks.method import Method
-from benchmarks.plan.plan import Cell, TaskId
+from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task import Context, Outcome, Task, failure

@@ -18,7 +18,7 @@ from multiprocessing.queues import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
 
 from benchmarks.assets import Assets
-from benchmarks.plan.plan import TaskId
+from benchmarks.plan.cell import TaskId
 from benchmarks.provenance import damaged
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.isolated_process import IsolatedProcess, WorkerDied, new_processes

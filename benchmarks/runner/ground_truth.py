@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.method import MethodEntry
-from benchmarks.plan.plan import TaskId, flat
+from benchmarks.plan.cell import TaskId, flat
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import build_scene
 from benchmarks.runner.task import Context, Outcome, Task

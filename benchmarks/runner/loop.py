@@ -12,7 +12,7 @@ from contextlib import nullcontext
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from benchmarks.plan.plan import TaskId
+from benchmarks.plan.cell import TaskId
 from benchmarks.runner.cache import Cache, Cached
 from benchmarks.runner.executor import Batch, Executor
 from benchmarks.runner.task import Outcome, Task, failure

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.declarations import load
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
-from benchmarks.plan.plan import Cell, TaskId
+from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import SECONDS, RunFolder

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.declarations import load
-from benchmarks.plan.plan import TaskId
+from benchmarks.plan.cell import TaskId
 from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.task import Context, Outcome, Task

@@ -9,7 +9,8 @@ from statistics import median
 from typing import Any
 
 from benchmarks.metrics import find_metric
-from benchmarks.plan.plan import Cell, Plan, TaskId, protocol_of, protocol_of_case
+from benchmarks.plan.cell import Cell, TaskId
+from benchmarks.plan.plan import Plan, protocol_of, protocol_of_case
 from benchmarks.results.protocol import OWN, is_member, spread
 from benchmarks.results.row import DECLARED, PRETRAINED, Row
 from benchmarks.runner.networks import NAME, TrainNetwork

@@ -17,7 +17,8 @@ from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.metrics import names_of
-from benchmarks.plan.plan import Cell, Network, Plan, flat, network_of, runs
+from benchmarks.plan.cell import Cell, flat
+from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.provenance import digest, digest_of_file, find_module
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.cells import BatchCell, RepeatCell, RunCase, RunCell, RunUntimedCell

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from benchmarks.plan.plan import TaskId
+from benchmarks.plan.cell import TaskId
 from benchmarks.runner.isolated_process import WorkerDied, one_line
 
 if TYPE_CHECKING:

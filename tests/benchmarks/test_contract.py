@@ -15,8 +15,8 @@ import pytest
 from benchmarks import check
 from benchmarks.contract import ContractError, check_derivatives
 from benchmarks.method import Method, MethodEntry
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import check_garment_name
-from benchmarks.plan.plan import Cell
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import BatchCell
 from benchmarks.runner.ground_truth import SettleStart

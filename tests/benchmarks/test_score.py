@@ -14,7 +14,7 @@ from benchmarks import run, score
 from benchmarks.external.scene_files import write_obj
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.plan.plan import Cell
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.study import StudyError
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest

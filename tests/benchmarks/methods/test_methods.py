@@ -15,8 +15,8 @@ from benchmarks.method import Method
 from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion.dynamics import shares_quasi_static
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Cell
 from benchmarks.presets import find_preset
 from benchmarks.results import run_folder
 from benchmarks.results.protocol import LEAST_MEMBERS, is_member

@@ -12,7 +12,8 @@ from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import conservation
 from benchmarks.metrics.motion.conservation import law_series
-from benchmarks.plan.plan import Cell, Plan
+from benchmarks.plan.cell import Cell
+from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.task import Outcome

@@ -11,8 +11,9 @@ import pytest
 from benchmarks import provenance
 from benchmarks.methods.catalogue.all_methods import find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Cell, Network
+from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.measurements import _training_poses
 from benchmarks.runner.schedule import Schedule, tasks_of

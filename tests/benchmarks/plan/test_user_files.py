@@ -15,9 +15,10 @@ from benchmarks.method import MethodEntry
 from benchmarks.methods.catalogue.all_methods import METHODS
 from benchmarks.methods.outside.program import program
 from benchmarks.plan import user_files
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Cell, Plan
+from benchmarks.plan.plan import Plan
 from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.measurements import measured

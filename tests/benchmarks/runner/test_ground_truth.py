@@ -12,8 +12,9 @@ import pytest
 from benchmarks import export
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Cell, Network
+from benchmarks.plan.plan import Network
 from benchmarks.runner import ground_truth, training_motions
 from benchmarks.runner.ground_truth import SimulateClips, SimulateQuasiStatic
 from benchmarks.runner.networks import LONGEST, TrainNetwork

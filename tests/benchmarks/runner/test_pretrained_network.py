@@ -10,10 +10,11 @@ import pytest
 import torch
 
 from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import check_trained
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import make_parser, study_of
-from benchmarks.plan.plan import Cell, Network, Plan
+from benchmarks.plan.plan import Network, Plan
 from benchmarks.plan.study import Study, StudyError
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder

@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks import provenance
 from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Cell
 from benchmarks.results.row import Row
 from benchmarks.runner.cells import judge
 from benchmarks.runner.execute_plan import accepted, remarks, summary

@@ -12,8 +12,9 @@ import pytest
 
 from benchmarks import run
 from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Cell, Network
+from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache

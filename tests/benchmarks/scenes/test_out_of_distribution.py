@@ -14,7 +14,8 @@ from benchmarks.methods.catalogue.all_methods import METHODS, find_method
 from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.motion import extrapolation
-from benchmarks.plan.plan import Cell, Plan
+from benchmarks.plan.cell import Cell
+from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.measurements import measured
