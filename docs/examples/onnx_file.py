@@ -14,9 +14,7 @@ import torch
 from torch import Tensor, nn
 
 import snug
-from snug.body.skinning import skin
-from snug.garments.templates import find_template
-from snug.motion.library import make_motion
+from snug import find_template, make_motion, skin
 
 
 class Frame(nn.Module):

@@ -36,7 +36,7 @@ class PoseNetwork(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Load the weights for a dressed body."""
-        from snug.networks.dressed_body import DressedBody
+        from snug import DressedBody
 
         self.worn, self.faces = scene.dressed, scene.cloth.faces
         self.dressed = DressedBody(self.worn.body, self.worn.garment)

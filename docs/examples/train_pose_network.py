@@ -6,11 +6,7 @@ from pose_network import network
 
 from reference_sim import Obstacle, Potential
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Step, StretchStVK
-from snug import Body, DressedBody
-from snug.body.skinning import skin
-from snug.garments.templates import find_template
-from snug.motion.library import make_motion
-from snug.motion.motion import Motion
+from snug import Body, DressedBody, Motion, find_template, make_motion, skin
 
 FRAMES = 8  # of an update
 

@@ -1,6 +1,6 @@
 """The list of report blocks: headings, sentences, figures and tables in the order in which they are read.
 
-The PDF (reports.document) and the page (reports.page) walk the same BLOCKS. A block without content is left
+The PDF (reports.pdf) and the page (reports.page) walk the same BLOCKS. A block without content is left
 out, and so is a heading with nothing below it. Blocks before the first heading make page one.
 A new figure is a function in a file of its own and a line here.
 """
