@@ -15,7 +15,7 @@ from benchmarks.assets import Assets
 from benchmarks.contract import ContractError, check_method, check_scene, demand
 from benchmarks.declarations import DeclarationError, by_name, raised_at
 from benchmarks.method import MethodEntry
-from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import Estimate, Metric
 from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files

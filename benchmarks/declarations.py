@@ -8,10 +8,10 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 
 class Named(Protocol):
@@ -72,6 +72,12 @@ def load(module: str) -> ModuleType:
     importlib.invalidate_caches()  # it may have been written a moment ago
     demand_that_it_is(path.stem, path)
     return importlib.import_module(path.stem)
+
+
+def load_function(place: str, usual: str) -> Callable[..., Any]:
+    """Return the function that "module:function" names; without a colon the one called `usual`."""
+    module, _, name = (place, "", "") if place.endswith(".py") else place.partition(":")
+    return getattr(load(module), name or usual)
 
 
 def raised_at(error: BaseException, home: str) -> str:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.options import OF_SCENES, REPLACED, add_study_options, study_of
 from benchmarks.plan.study import StudyError

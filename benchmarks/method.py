@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.declarations import DeclarationError, load
+from benchmarks.declarations import DeclarationError, load, load_function
 from benchmarks.results.row import ROLES
 
 if TYPE_CHECKING:
@@ -105,8 +105,8 @@ class MethodEntry:
         name: its name in commands, rows and files.
         description: one line, for --list and run.json.
         label: its name for people.
-        module: has `make(*, models, seed, **options)`, which returns a Method; by default the file that
-            declares the entry.
+        module: has `make(*, models, seed, **options)`, which returns a Method, or says another function
+            behind a colon; by default the file that declares the entry.
         declared_in: that file, or module of an installed package; empty for the project's own. Filled in
             where it is read.
         files: what it reads, such as weights, as paths relative to that file; a change makes its results
@@ -114,7 +114,7 @@ class MethodEntry:
         options: what make() gets besides models and seed.
         needs_body: whether it works on dressed bodies alone: `scene.dressed` has body, garment and motion.
         trained: name of the network that it needs, if any.
-        training: how that is trained, where catalogue/trainings.py does not have it.
+        training: how that is trained, where benchmarks.methods.declared_networks does not have it.
         seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
         dtype: of its computation; trajectories and metrics are float64 in any case.
         truncated: whether it stops before the minimum on purpose, after a number of iterations.
@@ -192,7 +192,7 @@ class MethodEntry:
         """Make a fresh method for one cell; `models` is the folder of trained networks."""
         if self.declared_in:
             load(self.declared_in)  # an energy of its own is then known by name
-        return load(self.module).make(models=models, seed=seed, **self.options)
+        return load_function(self.module, "make")(models=models, seed=seed, **self.options)
 
 
 def installed(package: str) -> bool:

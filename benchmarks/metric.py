@@ -1,36 +1,20 @@
 """Metric: a number of a roll-out by name, unit, title and definition; and the roll-outs that it reads.
 
-A module of benchmarks/metrics holds METRICS, a tuple of Metric, and
-
-    measure(roll_out: RollOut) -> dict[str, float | Estimate]     name -> value; what does not apply is left
-                                                                   out
-
-and where numbers compare a roll-out with the reference simulation
-
-    compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]     name -> value
-
-which is called with the reference, and with each member of its ensemble (benchmarks.results.protocol): the
-standard deviation of a number over them is its uncertainty. And where it wants curves beside the trajectory
-
-    series(roll_out: RollOut) -> dict[str, np.ndarray]  name -> (T,), or (T,V) of every vertex
-
-and where a roll-out that ended well by itself may still have failed
-
-    judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None     status and reason
-
-Its name in the tuple of benchmarks/metrics/__init__.py, or that of its file behind --metrics, is all that it
-takes to have it measured, written, tabulated and defined in the report.
+A file of benchmarks/metrics declares Measurements: metrics, and the functions that measure them. A user's
+file behind --set metrics= holds METRICS, a tuple of Metric, and functions called measure, compare, series
+and judge. That is all it takes to have a metric measured, written, tabulated and defined in the report.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from benchmarks.declarations import load
 from benchmarks.results.protocol import is_member
 from benchmarks.results.row import USABLE
 
@@ -109,6 +93,44 @@ class Metric:
     def heading(self) -> str:
         """Title, and unit where it has one, for a column or an axis."""
         return f"{self.title} [{self.unit}]" if self.unit != "1" else self.title
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Metrics that are measured together.
+
+    Attributes:
+        name: in the `metrics` of a scene; the path of a user's file.
+        metrics: all that the functions give a number of.
+        measure: of a roll-out, name -> value; what does not apply is left out.
+        compare: of a roll-out and the reference, name -> value. It is called with each member of the
+            reference's ensemble too (benchmarks.results.protocol): the standard deviation over them is the
+            uncertainty of a number.
+        series: of a roll-out, curves beside the trajectory, name -> (T,), or (T,V) of every vertex.
+        judge: of a roll-out and its values, status and reason where it failed though it ended well.
+        where_named: whether only scenes that name it are measured.
+        other_meshes: whether it applies to a roll-out on another mesh than the scene's.
+        suites: the parts of a study whose cells it is measured in; all by default.
+    """
+
+    name: str
+    metrics: tuple[Metric, ...]
+    measure: Callable[[RollOut], Mapping[str, float | Estimate]] | None = None
+    compare: Callable[[RollOut, RollOut], dict[str, float]] | None = None
+    series: Callable[[RollOut], Mapping[str, np.ndarray]] | None = None
+    judge: Callable[[RollOut, dict[str, Any]], tuple[str, str] | None] | None = None
+    where_named: bool = False
+    other_meshes: bool = False
+    suites: tuple[str, ...] = ()
+
+
+def measurements_in(home: str) -> Measurements:
+    """Return what a user's file measures."""
+    module = load(home)
+    functions: dict[str, Any] = {
+        name: getattr(module, name, None) for name in ("measure", "compare", "series", "judge")
+    }
+    return Measurements(home, tuple(module.METRICS), **functions)
 
 
 class Kept:

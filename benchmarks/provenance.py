@@ -185,13 +185,16 @@ def software(*places: str) -> dict[str, str]:
 
 
 def find_module(module: str) -> str:
-    """Return the file of a module, relative to the project where it is ours. Raises DeclarationError.
+    """Return the file of a module, or of "module:function"; relative to the project where it is ours.
+
+    Raises DeclarationError where it is missing.
 
     >>> find_module("benchmarks.scene")
     'benchmarks/scene.py'
     """
     if module.endswith(".py"):
         return module
+    module = module.partition(":")[0]
     stem = module.replace(".", "/")
     if path := next((p for p in (f"{stem}.py", f"{stem}/__init__.py") if (ROOT / p).is_file()), None):
         return path

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.declarations import DeclarationError, by_name, load
+from benchmarks.declarations import DeclarationError, by_name, load_function
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +31,8 @@ class Scene:
     Attributes:
         name: in commands, rows and files.
         description: one line, for --list and run.json.
-        module: has `build(scene, assets, **options)`, which returns a BuiltScene.
+        module: has `build(scene, assets, **options)`, which returns a BuiltScene, or says another function
+            behind a colon.
         declared_in, files: as of a MethodEntry.
         sizes: values of the preset that build() takes as options.
         options: further options of build().
@@ -100,7 +101,7 @@ class Scene:
         """Build everything that the scene declares. Deterministic. Raises ValueError for missing assets."""
         if self.dressed and assets is None:
             raise ValueError(f"scene {self.name} needs assets: a body, a garment and the motion")
-        return load(self.module).build(self, assets, **self.options)
+        return load_function(self.module, "build")(self, assets, **self.options)
 
 
 @dataclass(frozen=True)

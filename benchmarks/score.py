@@ -211,7 +211,7 @@ def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
         return cell
     if given is False:
         return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
-    from benchmarks.methods.outside.stored_roll_out import entry_of  # loads numpy
+    from benchmarks.methods.outside import entry_of  # loads numpy
 
     stored = RollOutOption("reference", str(given), FileConventions(), role="reference")
     entry = entry_of(stored, cell.scene.name)

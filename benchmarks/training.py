@@ -1,6 +1,6 @@
 """Training of a network of the benchmark: its recipe, the simulations it learns from, when it stops.
 
-The table of the project's own networks is benchmarks.methods.catalogue.trainings.TRAININGS; a method from
+The table of the project's own networks is benchmarks.methods.declared_networks.TRAININGS; a method from
 outside brings its own by `MethodEntry(training=Training(...))`. Imports nothing heavy.
 """
 

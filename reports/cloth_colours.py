@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse
 
-from benchmarks.metrics.surface.curvature import curvature_series
+from benchmarks.metrics.curvature import curvature_series
 from reference_sim.geometry.topology import corner_areas
 from reference_sim.obstacle import Obstacle
 from reports.figures.chosen_roll_outs import SceneRollOuts

@@ -29,7 +29,7 @@ import numpy as np
 from reference_sim.files.mesh_files import MESH_SUFFIXES, Surface, read_mesh, read_sequence
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
-MODULE = "benchmarks.methods.outside.stored_roll_out"
+MODULE = "benchmarks.methods.outside:make_stored"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
 
 

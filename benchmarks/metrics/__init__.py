@@ -1,13 +1,4 @@
-"""Metrics: the visible tuple of modules, each with the metrics it measures. See benchmarks.metric.
-
-| folder | metrics |
-| --- | --- |
-| energies | energy/*, excess/*, gap/*, step/*, gradient/norm |
-| surface | curvature/*, wrinkles/*, deformation/*, stretch/*, dihedral/mean, intersections/* |
-| surface | distance/*, surface/*, penetration/*, drift/hem, body/*, mesh/* |
-| motion | velocity/error, acceleration/error, dynamics/*, conservation/*, exact/distance |
-| motion | time_error/*, motion/*, roll_out/* |
-| cost | cost/*, solver/*, training_distance/* |
+"""Metrics: the visible tuple of what is measured, in the order of the tables. See benchmarks.metric.
 
 >>> find_metric("curvature/mean").unit
 '1/m'
@@ -18,66 +9,45 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from types import ModuleType
 
-from benchmarks.declarations import DeclarationError, by_name, load
-from benchmarks.metric import Metric
+from benchmarks.declarations import by_name
+from benchmarks.metric import Measurements, Metric, measurements_in
+from benchmarks.metrics.conservation import CONSERVATION
+from benchmarks.metrics.cost import COST, RELAXED, TRAINING_DISTANCE
+from benchmarks.metrics.curvature import CURVATURE
+from benchmarks.metrics.deformation import BODY_SHAPE, MESH, SHAPE, STRETCH
+from benchmarks.metrics.dynamics import DYNAMICS
+from benchmarks.metrics.energy import ENERGY, EXCESS, PRINTED_BENDING
+from benchmarks.metrics.energy_gap import GAP
+from benchmarks.metrics.intersections import BODY, SWEPT
+from benchmarks.metrics.penetration_and_distances import GEOMETRY
+from benchmarks.metrics.roll_out import EXTRAPOLATION, LONG_ROLL_OUT
+from benchmarks.metrics.surface_distance import SURFACE
+from benchmarks.metrics.time_errors import EXACT, TIME_ERROR, VELOCITY
+from benchmarks.metrics.wrinkle_spectrum import WRINKLES
 
-MODULES = {
-    "energy": "benchmarks.metrics.energies.energy",
-    "printed_bending": "benchmarks.metrics.energies.printed_bending",
-    "excess": "benchmarks.metrics.energies.excess",
-    "curvature": "benchmarks.metrics.surface.curvature",
-    "wrinkles": "benchmarks.metrics.surface.wrinkle_spectrum",
-    "shape": "benchmarks.metrics.surface.rest_shape",
-    "swept": "benchmarks.metrics.surface.swept_crossings",
-    "stretch": "benchmarks.metrics.surface.principal_stretches",
-    "geometry": "benchmarks.metrics.surface.penetration_and_distances",
-    "surface": "benchmarks.metrics.surface.surface_distance",
-    "body": "benchmarks.metrics.surface.body_intersections",
-    "optimality": "benchmarks.metrics.energies.energy_gap",
-    "solver": "benchmarks.metrics.cost.relaxed_frames",
-    "exact": "benchmarks.metrics.motion.exact_distance",
-    "velocity": "benchmarks.metrics.motion.velocity_error",
-    "dynamics": "benchmarks.metrics.motion.dynamics",
-    "training_distance": "benchmarks.metrics.cost.training_distance",
-    "conservation": "benchmarks.metrics.motion.conservation",
-    "time_error": "benchmarks.metrics.motion.time_step_error",
-    "cost": "benchmarks.metrics.cost.cost",
-}
-WHERE_NAMED = {
-    "extrapolation": "benchmarks.metrics.motion.extrapolation",
-    "roll_out": "benchmarks.metrics.motion.long_roll_out",
-    "mesh": "benchmarks.metrics.surface.mesh_size",
-    "body_shape": "benchmarks.metrics.surface.body_shape",
-}  # measured only in scenes that name them
-MODULE_OF = MODULES | WHERE_NAMED
-OF_OTHER_MESHES = ("surface",)  # all that is measured of a roll-out on another mesh than the scene's
+MEASUREMENTS = (
+    ENERGY, PRINTED_BENDING, EXCESS, CURVATURE, WRINKLES, SHAPE, SWEPT, STRETCH, GEOMETRY, SURFACE, BODY, GAP,
+    RELAXED, EXACT, VELOCITY, DYNAMICS, TRAINING_DISTANCE, CONSERVATION, TIME_ERROR, COST,
+    EXTRAPOLATION, LONG_ROLL_OUT, MESH, BODY_SHAPE,
+)  # fmt: skip
 
 
-def names_of(chosen: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the names of the modules that a scene measures, from what it declares."""
-    return tuple(MODULES) if chosen is None else tuple(name for name in MODULE_OF if name in chosen)
-
-
-@cache
-def modules() -> dict[str, ModuleType]:
-    """Load every module of metrics, by name."""
-    return {name: load(module) for name, module in MODULE_OF.items()}
+def measured_in(chosen: Sequence[str] | None) -> tuple[Measurements, ...]:
+    """Return what a scene measures, from the names that it declares; None for all that apply everywhere."""
+    return tuple(m for m in MEASUREMENTS if (not m.where_named if chosen is None else m.name in chosen))
 
 
 @cache
 def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
-    """Return every metric by name: of all modules, and of modules outside.
+    """Return every metric by name, also those of files outside.
 
-    Raises DeclarationError where a module declares no METRICS, or two declare one name.
+    Raises DeclarationError where two have one name.
     """
-    metrics: list[Metric] = []
-    for name, module in modules().items():
-        if not hasattr(module, "METRICS"):
-            raise DeclarationError(f"{MODULE_OF[name]} declares no METRICS, a tuple of Metric")
-        metrics += module.METRICS
-    others = [replace(metric, declared_in=home) for home in outside for metric in load(home).METRICS]
+    metrics = [metric for measurements in MEASUREMENTS for metric in measurements.metrics]
+    others = [
+        replace(metric, declared_in=home) for home in outside for metric in measurements_in(home).metrics
+    ]
     return by_name("metric", (*metrics, *others))
 
 
@@ -95,7 +65,5 @@ def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:
     family, _, last = name.rpartition("/")
     metric = metrics.get(f"{family}/*")
     if metric is None:
-        raise KeyError(
-            f"no module of metrics declares {name}: name it in METRICS of the one that measures it"
-        )
+        raise KeyError(f"no metric is called {name}: declare it among METRICS of what measures it")
     return replace(metric, name=name, title=metric.title.format(last.replace("_", " ").capitalize()))

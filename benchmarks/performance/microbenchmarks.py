@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.assets import embedded_motions
-from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.methods.declared_networks import TRAININGS
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_penalty import ContactPenalty

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from benchmarks.method import MethodEntry
-from benchmarks.metrics import MODULES
 from benchmarks.plan.cell import Cell
+from benchmarks.metrics import measured_in
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import Part, Study, StudyError, nearest
 from benchmarks.scene import Scene
@@ -152,7 +152,7 @@ def _timed_once(cells: Sequence[Cell]) -> list[Cell]:
 
     Timed cells run one by one, the others side by side. What a frame costs, one motion tells.
     """
-    untimed = tuple(name for name in MODULES if name != "cost")
+    untimed = tuple(m.name for m in measured_in(None) if m.name != "cost")
     begun: dict[str, Scene] = {}
     kept = []
     for cell in cells:
@@ -232,7 +232,7 @@ def roll_out_cells(study: Study, cells: Sequence[Cell], declared: Declared) -> l
     """
     if not study.rollouts:
         return []
-    from benchmarks.methods.outside.stored_roll_out import entry_of  # loads numpy
+    from benchmarks.methods.outside import entry_of  # loads numpy
 
     scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
     suites: dict[str, tuple[str, ...]] = {}

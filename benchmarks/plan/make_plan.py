@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.assets import Inputs, read_inputs
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import installed
-from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.methods import METHODS, find_method
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.choose_cells import Declared, choose_cells

@@ -11,7 +11,7 @@ from typing import Any
 
 from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import parse_roll_out
-from benchmarks.methods.catalogue.all_methods import METHODS
+from benchmarks.methods import METHODS
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.motions import split_motions
 from benchmarks.plan.study import Layer, Study, option, parse_setting, read_study, study_names

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
 from benchmarks.method import MethodEntry
-from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.study import Part, Study
 from benchmarks.provenance import digest, find_module, imported_beside
 from benchmarks.scene import Scene
@@ -165,9 +165,9 @@ def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
         listed = isinstance(names, tuple | list) and all(isinstance(name, str) for name in names)
         _demand(listed, f"{what}: {field}={names!r}: give a tuple of strings")
     if measured := set(getattr(entry, "metrics", None) or ()):
-        from benchmarks.metrics import MODULES, WHERE_NAMED  # loads numpy
+        from benchmarks.metrics import MEASUREMENTS  # loads numpy
 
-        known = (*MODULES, *WHERE_NAMED)
+        known = [measurements.name for measurements in MEASUREMENTS]
         wrong = f"{what}: metrics={entry.metrics!r}: choose from {', '.join(known)}"
         _demand(measured <= {*known}, wrong)
     try:

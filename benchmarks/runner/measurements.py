@@ -6,15 +6,14 @@ import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from benchmarks.declarations import load
-from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.metrics import OF_OTHER_MESHES, find_metric, modules, names_of
 from benchmarks.plan.cell import Cell, TaskId
+from benchmarks.metric import Estimate, Measurements, RollOut, SceneRollOuts, measurements_in
+from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import SECONDS, RunFolder
@@ -112,39 +111,40 @@ def measured(
 
     Args:
         roll_out: the roll-out, beside those that it is compared with.
-        chosen: names of the modules of metrics; None: all that apply.
-        outside: further modules, which are not the project's.
+        chosen: names of measurements; None: all that apply.
+        outside: files of users.
     """
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}
     ended = ("ok", "")
     judged = len(roll_out.positions) > roll_out.scene.warm_up
-    names = OF_OTHER_MESHES if roll_out.entry.other_mesh else (*names_of(chosen), *outside)
-    for name in names if judged else ():
+    if roll_out.entry.other_mesh:
+        chosen_ones = [measurements for measurements in MEASUREMENTS if measurements.other_meshes]
+    else:
+        chosen_ones = [*measured_in(chosen), *map(measurements_in, outside)]
+    for measurements in chosen_ones if judged else ():
+        suites = measurements.suites or roll_out.suites
+        if not any(suite in suites for suite in roll_out.suites):
+            continue
         try:
-            module = load(name) if name in outside else modules()[name]
-            suites = getattr(module, "SUITES", roll_out.suites)
-            if any(suite in suites for suite in roll_out.suites):
-                values = module.measure(roll_out) if hasattr(module, "measure") else {}
-                if hasattr(module, "compare"):
-                    values |= compared(roll_out, module.compare)
-                metrics |= {
-                    find_metric(metric, outside).name: number(metric, v) for metric, v in values.items()
-                }
-                curves |= module.series(roll_out) if hasattr(module, "series") else {}
-                ended = judgement(module, roll_out, values) or ended
+            values = dict(measurements.measure(roll_out)) if measurements.measure else {}
+            if measurements.compare:
+                values |= compared(roll_out, measurements.compare)
+            metrics |= {find_metric(name, outside).name: number(name, v) for name, v in values.items()}
+            curves |= measurements.series(roll_out) if measurements.series else {}
+            ended = judgement(measurements, roll_out, values) or ended
         except Exception as error:
-            if name in outside:
-                raise RuntimeError(f"{name}: {one_line(error)}") from error
+            if measurements.name in outside:
+                raise RuntimeError(f"{measurements.name}: {one_line(error)}") from error
             raise
     return metrics, curves, ended
 
 
 def judgement(
-    module: ModuleType, roll_out: RollOut, values: dict[str, float | Estimate]
+    measurements: Measurements, roll_out: RollOut, values: dict[str, float | Estimate]
 ) -> tuple[str, str] | None:
-    """Return status and reason by judge() of a module, None where it has none. Raises ValueError."""
-    ended = module.judge(roll_out, values) if hasattr(module, "judge") else None
+    """Return status and reason by judge(), None where there is none. Raises ValueError."""
+    ended = measurements.judge(roll_out, values) if measurements.judge else None
     if ended is None or (isinstance(ended, tuple) and len(ended) == 2 and ended[0] in STATUSES):
         return ended
     raise ValueError(

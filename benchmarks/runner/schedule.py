@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.method import MethodEntry
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
-from benchmarks.metrics import names_of
 from benchmarks.plan.cell import Cell, flat
 from benchmarks.plan.plan import Network, Plan, network_of, runs
+from benchmarks.metrics import measured_in
 from benchmarks.provenance import digest, digest_of_file, find_module
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.cells import BatchCell, RepeatCell, RunCase, RunCell, RunUntimedCell
@@ -47,7 +47,7 @@ RUNS = (
     SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
     "benchmarks/runner/isolated_process.py", "benchmarks/runner/cells.py",
 )  # fmt: skip
-SOLVERS = "benchmarks/methods/solvers"
+SOLVERS = "benchmarks/methods/simulation.py"
 METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "snug")
 CASES = (
     "benchmarks/runner/cells.py",
@@ -130,15 +130,12 @@ def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
 
 
 def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
-    """Return the code of a scene or a method: the folder of its module, and what files of a user depend on.
+    """Return the code of a scene or a method: the file of its module, and what files of a user depend on.
 
     Raises DeclarationError where its module is missing.
     """
     file = find_module(entry.module)
-    code = users_code(file, entry.declared_in)
-    if not code:
-        folder = Path(file).parent
-        code = (file if folder.name == "benchmarks" else folder.as_posix(),)
+    code = users_code(file, entry.declared_in) or (file,)
     if isinstance(entry, MethodEntry):
         code = (*code, SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
     return code
@@ -355,7 +352,7 @@ class Schedule:
             same = (c for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, counterpart.task_id)
-        names = names_of(scene.metrics)
+        names = [measurements.name for measurements in measured_in(scene.metrics)]
         of_scene = self.inputs.of_scene(
             scene, f"{TASKS}/measurements.py", *METRICS, *users_code(*plan.metrics)
         )

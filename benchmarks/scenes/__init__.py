@@ -24,7 +24,7 @@ from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and
 
 
 def _sheet(name: str, description: str, *, obstacle: bool = False) -> Scene:
-    module, sizes = f"benchmarks.scenes.{name}", ("sheet_cells", "sheet_frames")
+    module, sizes = f"benchmarks.scenes.sheets:build_{name}", ("sheet_cells", "sheet_frames")
     return Scene(name=name, description=description, module=module, sizes=sizes, obstacle=obstacle)
 
 
@@ -82,7 +82,7 @@ class GarmentScenes:
         return Scene(
             name=f"{self.garment}/{motion}" + ("@clip" if part == "clip" else ""),
             description=f"a body in {self.title}: {motion}{of}",
-            module="benchmarks.scenes.dressed_body",
+            module="benchmarks.scenes.dressed_body:build_dressed_body",
             sizes=("settle_frames", "warm_up_frames"),
             garment=self.garment,
             motion=motion,

@@ -3,6 +3,11 @@
 Before the motion starts the garment settles: the body, already facing and standing as in the first frame,
 moves its limbs from the T-pose into the first pose, then holds still for a while. A part of a motion begins
 with the positions and velocities that a simulation from the motion's own first frame has there.
+
+Scene of the mesh and time-step study: the T-shirt of a given size, at a given time step.
+
+How much of every headline number is the mesh's or the time step's: numbers of two meshes are two definitions
+of the energy, of contact and of curvature, so they are reported and never judged.
 """
 
 from __future__ import annotations
@@ -24,16 +29,19 @@ from reference_sim.obstacle import Obstacle
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory import Trajectory
 from snug.garments.garment import Garment
+from snug.garments.templates import find_template
+from snug.motion.library import make_motion
 from snug.motion.motion import Motion, transition
 
 if TYPE_CHECKING:
+    from benchmarks.presets import Dependence
     from snug.body.parametric_body import Body
 
 HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
 SHORT = 0.25  # share of a motion's frames that is left out at most
 
 
-def build(
+def build_dressed_body(
     scene: Scene,
     assets: Assets,
     *,
@@ -161,3 +169,19 @@ def _simulated(
             f"the garment did not {aim} of {motion.name}: {trajectory.reason}; the pose may leave it no room"
         )
     return trajectory.positions
+
+
+WARM_UP = 2  # it starts at rest, and few frames are simulated
+
+
+def build_dependence(
+    scene: Scene, assets: Assets, *, dependence: Dependence, vertices: int = 0, substeps: int = 1
+) -> BuiltScene:
+    """Build the scene; `vertices` of the garment, by default the middle mesh, and `substeps` of a frame."""
+    garment = find_template(scene.garment).tailor(assets.body, vertices=vertices or dependence.middle)
+    motion = make_motion(scene.motion).cut(0, dependence.frames)
+    tailored = replace(assets, garments={scene.garment: garment}, motions={scene.motion: motion})
+    built = build_dressed_body(
+        scene, tailored, settle_frames=dependence.settle_frames, warm_up_frames=WARM_UP
+    )
+    return replace(built, substeps=substeps)

@@ -21,7 +21,7 @@ def _scene(name: str, description: str, change: str, **options: Any) -> Scene:
     return Scene(
         name=name,
         description=description,
-        module="benchmarks.scenes.out_of_distribution",
+        module="benchmarks.scenes.hard_motions:build_hard_motion",
         sizes=("settle_frames",),
         options={"change": change, **options},
         garment="tshirt",
@@ -64,7 +64,7 @@ OUT_OF_DISTRIBUTION = (
     Scene(
         name="out_of_distribution/long",
         description="the walk in a loop without a reset; networks alone",
-        module="benchmarks.scenes.long_motion",
+        module="benchmarks.scenes.hard_motions:build_long_motion",
         sizes=("loop_frames",),
         garment="tshirt",
         motion=WALK,
@@ -93,7 +93,7 @@ def shapes(motion: str, garment: str = "tshirt") -> list[Scene]:
             name=f"shapes/{name}",
             description=f"{motion} (its liveliest part) on "
             + (f"body shape {name} of {SHAPES} unseen ones" if betas else "the mean body"),
-            module="benchmarks.scenes.dressed_body",
+            module="benchmarks.scenes.dressed_body:build_dressed_body",
             sizes=("settle_frames", "warm_up_frames"),
             options={"betas": betas},
             garment=garment,
@@ -126,7 +126,7 @@ def _dependence(name: str, description: str, **options: int) -> Scene:
     return Scene(
         name=f"dependence/{name}",
         description=description,
-        module="benchmarks.scenes.dependence",
+        module="benchmarks.scenes.dressed_body:build_dependence",
         sizes=("dependence",),
         options=options,
         garment="tshirt",
@@ -142,7 +142,7 @@ DRAPES = tuple(
     Scene(
         name=f"dependence/drape/{family}/{count}",
         description=f"a sheet of about {count} vertices draped over a sphere, {title}",
-        module="benchmarks.scenes.sheet_on_sphere",
+        module="benchmarks.scenes.sheets:build_sheet_on_sphere",
         sizes=("sheet_frames",),
         options={"sheet_cells": round(count**0.5) - 1, "family": family},
         obstacle=True,
@@ -160,7 +160,7 @@ def there_and_back(motion: str, garment: str = "tshirt") -> Scene:
     return Scene(
         name=f"{garment}/there_and_back",
         description=f"{motion} forwards and backwards for a thousand frames; networks alone",
-        module="benchmarks.scenes.long_motion",
+        module="benchmarks.scenes.hard_motions:build_long_motion",
         garment=garment,
         motion=motion,
         part="loop",

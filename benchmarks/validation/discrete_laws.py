@@ -17,18 +17,16 @@ from reference_sim import energies
 DT = 1.0 / 30.0
 SPACING = 0.015  # [m] of the sheet that takes one step
 
-FALL = Scene(name="free_fall", description="a thrown sheet", module="benchmarks.scenes.free_fall")
-HANGING = Scene(
-    name="hanging_sheet", description="held at two corners", module="benchmarks.scenes.hanging_sheet"
-)
+FALL = Scene(name="free_fall", description="a thrown sheet")
+HANGING = Scene(name="hanging_sheet", description="held at two corners")
 
 
 @known_answer(unit="m", expected=0.0, tolerance=1e-12, reason="round-off over a fall of 11 m")
 def free_fall() -> float:
     """Return the largest distance to backward Euler's own fall, x_0 + n dt v_0 + g dt^2 n (n+1)/2."""
-    from benchmarks.scenes import free_fall as fall
+    from benchmarks.scenes import sheets
 
-    scene = fall.build(FALL, sheet_cells=14, sheet_frames=45)
+    scene = sheets.build_free_fall(FALL, sheet_cells=14, sheet_frames=45)
     trajectory = sim.simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, velocity=scene.start_velocity
     )
@@ -39,9 +37,9 @@ def free_fall() -> float:
 @known_answer(unit="m", expected=0.0, tolerance=1e-12, reason="round-off over a fall of half a metre")
 def free_fall_in_substeps() -> float:
     """Return the largest distance of four steps a frame to the fall with a quarter of the time step."""
-    from benchmarks.scenes import free_fall as fall
+    from benchmarks.scenes import sheets
 
-    scene, steps = fall.build(FALL, sheet_cells=6, sheet_frames=10), 4
+    scene, steps = sheets.build_free_fall(FALL, sheet_cells=6, sheet_frames=10), 4
     trajectory = sim.simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.start, substeps=steps
     )
@@ -59,9 +57,9 @@ def moving_pins_in_substeps() -> float:
 
     Between frames pins move straight on.
     """
-    from benchmarks.scenes import hanging_sheet
+    from benchmarks.scenes import sheets
 
-    scene, steps, frames = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10), 4, 10
+    scene, steps, frames = sheets.build_hanging_sheet(HANGING, sheet_cells=6, sheet_frames=10), 4, 10
     places = scene.start[scene.cloth.pins]
     pulled = np.array([0.01, 0.02, 0.0]) * np.square(np.arange(frames))[:, None, None] / frames
 
@@ -195,9 +193,9 @@ def energy_inequality() -> float:
     Both sides are the step's objective, at its end and at the previous positions: a step that ends above the
     place it came from is wrong. Measured on the hanging sheet.
     """
-    from benchmarks.scenes import hanging_sheet
+    from benchmarks.scenes import sheets
 
-    scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=10)
+    scene = sheets.build_hanging_sheet(HANGING, sheet_cells=6, sheet_frames=10)
     trajectory = sim.simulate(scene.cloth, scene.energies, dt=scene.dt, frames=20, start=scene.start)
     x, masses = demand_converged(trajectory, "the simulation").positions, scene.cloth.masses
     potential = sim.Potential(scene.energies)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.meshes import cylinder_patch, icosphere, rectangle, torus
-from benchmarks.metrics.surface.curvature import boundary_mask, mean_curvature
+from benchmarks.metrics.curvature import boundary_mask, mean_curvature
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.equilibrium import fitted_order
 

@@ -274,9 +274,9 @@ class Viscosity(energies.Energy):
 )  # fmt: skip
 def hanging_sheet_order(viscous: bool) -> float:
     """Return the order in dt of a sheet held at two corners, wrinkled after 0.7 s."""
-    from benchmarks.scenes import hanging_sheet
+    from benchmarks.scenes import sheets
 
-    scene = hanging_sheet.build(HANGING, sheet_cells=6, sheet_frames=22)
+    scene = sheets.build_hanging_sheet(HANGING, sheet_cells=6, sheet_frames=22)
     terms = [*scene.energies, *([Viscosity(scene.cloth)] if viscous else [])]
     return halving_order(lambda n: _end(scene.cloth, terms, scene.start, 0.7, n), (42, 84, 168, 336))
 

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.metrics.energies.energy import energy_series
+from benchmarks.methods import find_method
+from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 from snug.motion.library import VALIDATION

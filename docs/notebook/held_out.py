@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import gc
 
-from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.methods.declared_networks import TRAININGS
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
 from snug.motion.library import TRAIN, VALIDATION, make_motion

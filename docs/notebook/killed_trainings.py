@@ -33,7 +33,7 @@ from dataclasses import replace
 from multiprocessing import parent_process
 from pathlib import Path
 
-from benchmarks.methods.catalogue.networks import network
+from benchmarks.methods.declared_networks import network
 from benchmarks.presets import find_preset
 from benchmarks.runner import networks as training
 from benchmarks.training import Training

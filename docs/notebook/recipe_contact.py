@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from benchmarks import MethodEntry
-from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.methods.simulation import Simulation
 from benchmarks.scene import BuiltScene
 from reference_sim.energies import ContactPenalty
 from snug.named_recipes import PAPER

@@ -45,7 +45,10 @@ RUNS = {
     ),
 }
 PLACES = {
-    "trainings": ("benchmarks.methods.catalogue.trainings:TRAININGS",),
+    "trainings": (
+        "benchmarks.methods.declared_networks:TRAININGS",
+        "benchmarks.methods.catalogue.trainings:TRAININGS",
+    ),
     "trajectory": ("reference_sim.trajectory:Trajectory",),
     "template": ("snug.garments.templates:find_template",),
     "motion": ("snug.motion.library:make_motion",),

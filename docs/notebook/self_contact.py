@@ -15,7 +15,7 @@ import ipctk
 import numpy as np
 
 from benchmarks.assets import open_assets
-from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.methods.simulation import Simulation
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 from benchmarks.scenes.self_contact import with_self_contact

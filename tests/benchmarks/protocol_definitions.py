@@ -82,7 +82,7 @@ def _rounded(array: np.ndarray) -> np.ndarray:
 
 def _probed(scene: Any) -> Iterator[tuple[str, list[str]]]:
     """Yield each term and its energies in the last frames of a falling, waving sheet: what formulas give."""
-    from benchmarks.metrics.energies.energy import energy_series
+    from benchmarks.metrics.energy import energy_series
 
     wave = 0.04 * np.sin(9.0 * scene.start[:, [2, 0, 1]])
     positions = np.stack([scene.start + share * (wave - [0.0, FALL, 0.0]) for share in PATH])
@@ -125,9 +125,7 @@ def _metrics() -> dict[str, Any]:
 
 
 def _sampling() -> dict[str, Any]:
-    from benchmarks.metrics.energies import energy_gap
-    from benchmarks.metrics.motion import hem
-    from benchmarks.metrics.surface import body_intersections, surface_distance, swept_crossings
+    from benchmarks.metrics import dynamics, energy_gap, intersections, surface_distance
     from benchmarks.scenes import dressed_body
     from snug.networks.roll_out import QUASI_STATIC_FRAMES
 
@@ -135,13 +133,14 @@ def _sampling() -> dict[str, Any]:
         "presets": {preset.name: asdict(replace(preset, description="", steps={})) for preset in PRESETS},
         "gap": (energy_gap.PRECISION, energy_gap.NEGLIGIBLE, energy_gap.ITERATIONS),
         "hem": (
-            hem.HELD, hem.SHIFTING, hem.MAX_LAG, hem.SHORTEST, hem.NO_MOTION, float(hem.TURNING), hem.AFTER,
+            dynamics.HELD, dynamics.SHIFTING, dynamics.MAX_LAG, dynamics.SHORTEST, dynamics.NO_MOTION,
+            float(dynamics.TURNING), dynamics.AFTER,
         ),
         "start": (dressed_body.HOLD, dressed_body.SHORT),
         "quasi-static frames": QUASI_STATIC_FRAMES,
-        "body": (body_intersections.SAMPLED_FRAMES, body_intersections.OFFSET),
+        "body": (intersections.SAMPLED_FRAMES, intersections.OFFSET),
         "surface": surface_distance.SAMPLED_FRAMES,
-        "crossings": swept_crossings.SAMPLED_STEPS,
+        "crossings": intersections.SAMPLED_STEPS,
     }  # fmt: skip
 
 

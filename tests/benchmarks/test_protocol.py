@@ -62,7 +62,7 @@ def _metrics():
             "__kwdefaults__",
             {"tolerance": 1e-5},
         ),
-        ("sampling", "benchmarks.metrics.surface.surface_distance", "SAMPLED_FRAMES", 24),
+        ("sampling", "benchmarks.metrics.surface_distance", "SAMPLED_FRAMES", 24),
         ("statistics", "benchmarks.results.protocol", "TIE", 0.1),
     ],
 )

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks import methods as methods
 from benchmarks import run
-from benchmarks.methods.catalogue import all_methods as methods
-from benchmarks.methods.catalogue.all_methods import METHODS
+from benchmarks.methods import METHODS
 from benchmarks.plan.make_plan import choose_folder, make_plan
 from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder

@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks import run, score
 from benchmarks.external.scene_files import write_obj
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.study import StudyError

@@ -82,9 +82,7 @@ def test_each_file_of_a_run_is_opened_once_before_its_tasks(tmp_path, openings):
     options += ["--rollout", f"out={mine}/out.npz", "-o", str(tmp_path / "run")]
     plan = planned(*options)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "benchmarks.methods.outside.stored_roll_out.fit_to_scene", lambda stored, *_: (stored, [])
-        )
+        patch.setattr("benchmarks.methods.outside.fit_to_scene", lambda stored, *_: (stored, []))
         assets = check_roll_outs(plan)
     assert assets is not None and assets.body is plan.inputs.wearer
     assert assets.garments["top"] is plan.inputs.garment.garment

@@ -15,11 +15,11 @@ from benchmarks import export, score
 from benchmarks.external.roll_out_files import FileConventions, RollOutOption
 from benchmarks.external.scene_files import facts_of, readme, write_motion, write_obj, write_scene
 from benchmarks.external.scene_fit import expected_positions
-from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.methods.outside.stored_roll_out import entry_of
+from benchmarks.methods import find_method
+from benchmarks.methods.outside import entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.energies.energy import energy_series
-from benchmarks.metrics.surface.curvature import curvature_series
+from benchmarks.metrics.curvature import curvature_series
+from benchmarks.metrics.energy import energy_series
 from benchmarks.runner.measurements import measured
 from benchmarks.scene import Dressed
 from reference_sim import Trajectory

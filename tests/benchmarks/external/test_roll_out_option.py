@@ -11,7 +11,7 @@ from benchmarks.external.roll_out_files import (
     parse_roll_out,
     roll_out_of,
 )
-from benchmarks.methods.outside.stored_roll_out import entry_of
+from benchmarks.methods.outside import entry_of
 
 
 def test_an_option_says_everything_of_a_roll_out():

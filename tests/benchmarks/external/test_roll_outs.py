@@ -17,8 +17,8 @@ from benchmarks.external.roll_out_files import (
     read_roll_out,
 )
 from benchmarks.external.scene_fit import MIRRORS, _check_sides
-from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.methods.outside.stored_roll_out import Stored, entry_of
+from benchmarks.methods import find_method
+from benchmarks.methods.outside import Stored, entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
 from benchmarks.runner.cells import judge
 from benchmarks.runner.measurements import measured

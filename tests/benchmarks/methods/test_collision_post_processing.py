@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.methods.networks.collision_post_processing import MARGIN, CollisionPostProcessing
+from benchmarks.methods.networks import MARGIN, CollisionPostProcessing
 from reference_sim import Obstacle
 from tests.snug.training.dressing import swaying, tube_dress
 

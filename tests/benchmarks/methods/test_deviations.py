@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.methods import find_method
+from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.motions import split_motions
 from benchmarks.plan.study import StudyError, read_study
 from benchmarks.presets import find_preset

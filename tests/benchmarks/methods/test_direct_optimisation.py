@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from benchmarks.assets import open_assets
-from benchmarks.methods.networks.direct_optimisation import ClipInertia, DirectOptimisation
-from benchmarks.metrics.energies.energy import energy_series
+from benchmarks.methods.lower_bounds import ClipInertia, DirectOptimisation
+from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 from benchmarks.scenes.dressed_body import declared_energies
@@ -90,8 +90,8 @@ def test_the_bound_is_far_below_skinning_and_below_a_simulation(scene, bound):
 
 def test_a_bound_that_still_falls_is_no_bound_yet(scene, bound, monkeypatch):
     assert bound[1].status == "ok"
-    monkeypatch.setattr("benchmarks.methods.networks.direct_optimisation.ROUNDS", 1)
-    monkeypatch.setattr("benchmarks.methods.networks.direct_optimisation.ITERATIONS", 2)
+    monkeypatch.setattr("benchmarks.methods.lower_bounds.ROUNDS", 1)
+    monkeypatch.setattr("benchmarks.methods.lower_bounds.ITERATIONS", 2)
     method = DirectOptimisation()
     method.prepare(scene)
     trajectory = method.run()

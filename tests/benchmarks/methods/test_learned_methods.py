@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
-from benchmarks.methods.catalogue.trainings import LEARN_FROM_SIMULATIONS, TRAININGS
+from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
+from benchmarks.methods.declared_networks import LEARN_FROM_SIMULATIONS, TRAININGS
 from benchmarks.plan.choose_cells import matching
 from benchmarks.plan.study import read_study
 from benchmarks.presets import PRESETS, find_preset

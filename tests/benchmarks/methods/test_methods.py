@@ -12,10 +12,10 @@ import pytest
 from benchmarks import timing
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.method import Method
-from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, METHODS, find_method
+from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.motion.dynamics import shares_quasi_static
 from benchmarks.plan.cell import Cell
+from benchmarks.metrics.dynamics import shares_quasi_static
 from benchmarks.plan.motions import Motions
 from benchmarks.presets import find_preset
 from benchmarks.results import run_folder

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import sphere, square_sheet
-from benchmarks.methods.minimisers.block_descent import VertexBlockDescent
-from benchmarks.methods.minimisers.kernels import block
-from benchmarks.methods.minimisers.xpbd import XPBD
-from benchmarks.methods.solvers.warm_started import SHARE, GivenFrames, WarmStarted
-from benchmarks.metrics.energies.replayed_step import first_guess
-from benchmarks.scenes.free_fall import exact_fall
+from benchmarks.methods.sweeps import XPBD, VertexBlockDescent, block
+from benchmarks.methods.warm_started import SHARE, GivenFrames, WarmStarted
+from benchmarks.metrics.energy import first_guess
+from benchmarks.scenes.sheets import exact_fall
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import (
     BendHinge,

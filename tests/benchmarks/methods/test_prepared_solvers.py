@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.method import Method
-from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.methods.solvers.simulation import Simulation
-from benchmarks.methods.solvers.warm_started import WarmStarted
+from benchmarks.methods import find_method
+from benchmarks.methods.simulation import Simulation
+from benchmarks.methods.warm_started import WarmStarted
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim import Cloth, Material, cholesky, potential, simulate

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.methods.catalogue.all_methods import FURTHER_METHODS, find_method
-from benchmarks.metrics.energies.replayed_step import copied_terms, freeze_step
+from benchmarks.methods import FURTHER_METHODS, find_method
+from benchmarks.metrics.energy import copied_terms, freeze_step
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
 from reference_sim import Potential, minimise

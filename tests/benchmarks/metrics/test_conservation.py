@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.motion import conservation
-from benchmarks.metrics.motion.conservation import law_series
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.plan import Plan
+from benchmarks.metrics import conservation
+from benchmarks.metrics.conservation import law_series
 from benchmarks.presets import find_preset
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.task import Outcome
@@ -46,7 +46,9 @@ def test_the_simulator_keeps_every_law(dropped):
     assert series.force.max() / series.weight <= 2e-6 and series.torque.max() <= 1e-6
     assert (series.rise < 0).all() and (series.climb < 0).all()
     metrics = series.metrics()
-    assert set(metrics) == {m.name for m in conservation.METRICS if m.reference_tolerance is None}
+    assert set(metrics) == {
+        m.name for m in conservation.CONSERVATION.metrics if m.reference_tolerance is None
+    }
     assert (
         metrics["conservation/energy"]
         == metrics["conservation/energy_frames"]
@@ -135,7 +137,7 @@ def test_one_moved_vertex_is_seen_by_every_law(dropped):
     assert np.array_equal(series.residual[:-1], honest.residual[:-1])
 
 
-WORST = {m.name: m for m in conservation.METRICS if m.reference_tolerance is not None}
+WORST = {m.name: m for m in conservation.CONSERVATION.metrics if m.reference_tolerance is not None}
 
 
 def as_if_dressed(scene):

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from benchmarks.meshes import cylinder_patch, right_grid
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.surface.curvature import (
+from benchmarks.metrics.curvature import (
     CurvatureSeries,
     boundary_mask,
     compare,

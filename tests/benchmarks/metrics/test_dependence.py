@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import Assets
-from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.presets import Dependence, find_preset
 from benchmarks.runner.measurements import measured
-from benchmarks.scenes import dependence as module
+from benchmarks.scenes import dressed_body as module
 from benchmarks.scenes import find_scene
 from benchmarks.scenes.variations import DRAPES
 from snug.body.parametric_body import Body

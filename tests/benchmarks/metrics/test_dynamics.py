@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks.method import MethodEntry
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.motion import dynamics
-from benchmarks.metrics.motion.hem import (
+from benchmarks.metrics import dynamics
+from benchmarks.metrics.dynamics import (
     AFTER,
     HELD,
     HemMotion,

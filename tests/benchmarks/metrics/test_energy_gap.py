@@ -14,13 +14,13 @@ import pytest
 import torch
 from scipy.optimize import minimize
 
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.energies import energy_gap as module
-from benchmarks.metrics.energies import replayed_step
-from benchmarks.metrics.energies.energy_gap import FINDERS, gap_scale, optimality, spread_evenly
-from benchmarks.metrics.energies.replayed_step import first_guess
-from benchmarks.metrics.surface.curvature import curvature_error, curvature_series
+from benchmarks.metrics import energy
+from benchmarks.metrics import energy_gap as module
+from benchmarks.metrics.curvature import curvature_error, curvature_series
+from benchmarks.metrics.energy import first_guess
+from benchmarks.metrics.energy_gap import FINDERS, gap_scale, optimality, spread_evenly
 from reference_sim import Potential, Trajectory, minimise, simulate
 from reference_sim.energies import Inertia, Step
 from tests.benchmarks.runner.tasks_by_hand import small_scene
@@ -275,7 +275,7 @@ def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypat
     """Its first guess has no energy; the minimum found from its frame has one."""
     scene = small_scene("hanging_sheet")
     still = np.repeat(scene.start[None], 3, axis=0)
-    monkeypatch.setattr(replayed_step, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
+    monkeypatch.setattr(energy, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
     gaps = optimality(scene, still, samples=1)
     assert gaps.values["gap/energy"][0] >= 0.0 and sum(gaps.found_by.values()) == 1
     nowhere = still.copy()

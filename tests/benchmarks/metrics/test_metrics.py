@@ -9,26 +9,25 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import icosphere, right_grid
-from benchmarks.methods.catalogue.all_methods import METHODS
+from benchmarks.methods import METHODS
 from benchmarks.metric import RollOut
-from benchmarks.metrics import declared, find_metric
-from benchmarks.metrics.cost import training_distance
-from benchmarks.metrics.energies.energy import accelerations, correlation_with_body, energy_series
-from benchmarks.metrics.motion.time_step_error import time_errors
-from benchmarks.metrics.surface import body_intersections as body_metrics
-from benchmarks.metrics.surface.body_intersections import inside_itself
-from benchmarks.metrics.surface.curvature import (
+from benchmarks.metrics import cost, declared, find_metric
+from benchmarks.metrics import intersections as body_metrics
+from benchmarks.metrics.curvature import (
     CurvatureSeries,
     histogram_distance,
 )
-from benchmarks.metrics.surface.penetration_and_distances import (
+from benchmarks.metrics.deformation import area_change, dihedral_angle, edge_change
+from benchmarks.metrics.energy import accelerations, correlation_with_body, energy_series
+from benchmarks.metrics.intersections import inside_itself
+from benchmarks.metrics.penetration_and_distances import (
     distance_rms,
     hem_drift,
     own_part_depth,
     penetration,
 )
-from benchmarks.metrics.surface.rest_shape import area_change, dihedral_angle, edge_change
-from benchmarks.metrics.surface.self_intersections import self_intersections, share_and_contours
+from benchmarks.metrics.self_intersections import self_intersections, share_and_contours
+from benchmarks.metrics.time_errors import time_errors
 from reference_sim import Obstacle, Trajectory, simulate
 from snug.body.skeleton import JOINT
 from tests.benchmarks.runner.tasks_by_hand import small_scene
@@ -163,12 +162,12 @@ def test_training_distance_is_of_judged_frames_to_the_nearest_training_pose():
     known = np.zeros((2, 24, 3))
     known[1] = poses[22]
     roll_out = SimpleNamespace(scene=scene, judged=slice(2, None), training_poses=known)
-    distances = training_distance.measure(roll_out)
+    distances = cost.measure_training_distance(roll_out)
     nearest = np.minimum(np.arange(2, 23), 22 - np.arange(2, 23)) / 2
     assert distances["training_distance/median"] == pytest.approx(np.median(nearest))
     assert distances["training_distance/p95"] == pytest.approx(np.percentile(nearest, 95))
     roll_out.training_poses = None
-    assert training_distance.measure(roll_out) == {}
+    assert cost.measure_training_distance(roll_out) == {}
 
 
 def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places():
@@ -244,11 +243,11 @@ def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_reference
     roll_out = SimpleNamespace(
         scene=scene, positions=np.zeros((4, 1, 3)), entry=SimpleNamespace(role="reference")
     )
-    metrics = body_metrics.measure(roll_out)
+    metrics = body_metrics.measure_body(roll_out)
     assert metrics["body/self_intersection"] == pytest.approx(100 * (0.375 - 0.125), abs=2.0)
     assert metrics["body/self_intersection_frame"] == 2.0
     roll_out.entry.role = "learned"
-    assert body_metrics.measure(roll_out) == {}
+    assert body_metrics.measure_body(roll_out) == {}
 
 
 def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import in_space, random_rotation, right_grid
-from benchmarks.metrics.surface.principal_stretches import measure, principal_stretches, weighted_percentiles
+from benchmarks.metrics.deformation import measure_stretch, principal_stretches, weighted_percentiles
 from reference_sim import Cloth
 
 PLANE, FACES = right_grid(4, 5, 1.0, 1.2)
@@ -36,7 +36,7 @@ def test_tension_and_compression_are_told_apart_and_the_warm_up_is_left_out():
     frames = np.stack([rest * 9.0, rest * [1.2, 0.9, 1.0], rest * [1.2, 0.9, 1.0], rest])
     roll_out = SimpleNamespace(scene=SimpleNamespace(cloth=SHEET), positions=frames, judged=slice(1, None))
     expected = {"tension": (0.0, 20.0, 20.0), "compression": (-10.0, -10.0, 0.0)}
-    assert measure(roll_out) == pytest.approx(
+    assert measure_stretch(roll_out) == pytest.approx(
         {f"stretch/{side}_p{p:02}": v for side, row in expected.items() for p, v in zip((1, 50, 99), row)},
         abs=1e-9,
     )

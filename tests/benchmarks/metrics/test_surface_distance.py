@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks.meshes import icosphere, in_space, random_rotation, right_grid
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.surface.penetration_and_distances import rms
-from benchmarks.metrics.surface.surface_distance import _one_way, chamfer_and_angle, compare, measure
+from benchmarks.metrics.penetration_and_distances import rms
+from benchmarks.metrics.surface_distance import _one_way, chamfer_and_angle, compare, measure
 from reference_sim import Trajectory
 
 COARSE, FINE = right_grid(3, 4, 1.0, 1.0), right_grid(7, 5, 1.0, 1.0)

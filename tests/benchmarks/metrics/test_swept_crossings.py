@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import in_space, random_rotation, right_grid
-from benchmarks.metrics.surface import swept_crossings as module
-from benchmarks.metrics.surface.self_intersections import self_intersections
-from benchmarks.metrics.surface.swept_crossings import coplanar_on_the_way, measure, swept_crossings
+from benchmarks.metrics import intersections as module
+from benchmarks.metrics.intersections import coplanar_on_the_way, measure_swept, swept_crossings
+from benchmarks.metrics.self_intersections import self_intersections
 
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
 LARGE = np.array([[-1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [-1.0, 3.0, 0.0]])
@@ -56,7 +56,7 @@ def test_a_cloth_that_has_fallen_apart_is_left_out(monkeypatch):
         assert swept_crossings(before, lost, FACES) is None
         scene = SimpleNamespace(cloth=SimpleNamespace(faces=FACES), kept=None)
         frames = np.stack([before, before, lost])
-        assert measure(SimpleNamespace(scene=scene, positions=frames, judged=slice(0, None))) == {}
+        assert measure_swept(SimpleNamespace(scene=scene, positions=frames, judged=slice(0, None))) == {}
     monkeypatch.setattr(module, "MOST_PAIRS", 2)
     assert swept_crossings(before, np.concatenate([LARGE, SMALL + DOWN]), FACES) is None
 
@@ -76,9 +76,9 @@ def test_the_mean_is_of_steps_after_the_warm_up(monkeypatch):
     scene = SimpleNamespace(cloth=SimpleNamespace(faces=FACES), kept=None)
     frames = np.stack([above, below, above, above, above, below])
     roll_out = SimpleNamespace(scene=scene, positions=frames, judged=slice(2, None))
-    assert measure(roll_out) == {"intersections/swept": pytest.approx(1.0)}
+    assert measure_swept(roll_out) == {"intersections/swept": pytest.approx(1.0)}
     roll_out.judged = slice(5, None)
-    assert measure(roll_out) == {}
+    assert measure_swept(roll_out) == {}
     roll_out.judged = slice(2, None)
     monkeypatch.setattr(module, "find_spec", lambda name: None)
-    assert measure(roll_out) == {}
+    assert measure_swept(roll_out) == {}

@@ -7,13 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.methods.catalogue.all_methods import METHODS, find_method
+from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.energies import energy, excess
-from benchmarks.metrics.motion import dynamics
-from benchmarks.metrics.motion.hem import HemMotion
-from benchmarks.metrics.surface import curvature
-from benchmarks.metrics.surface import penetration_and_distances as geometry
+from benchmarks.metrics import curvature, dynamics, energy
+from benchmarks.metrics import penetration_and_distances as geometry
+from benchmarks.metrics.dynamics import HemMotion
 from benchmarks.results.protocol import MEMBERS, is_member
 from benchmarks.results.row import Row
 from benchmarks.runner.measurements import compared, measured
@@ -117,15 +115,15 @@ def test_means_are_over_the_judged_frames_alone():
     wild = x.copy()
     wild[:1] += np.random.default_rng(0).normal(size=x[:1].shape)  # no inertia of frame 3 hangs on it
     one, other = (group_of(scene, simulation=x, newton_1=y).roll_outs[1] for y in (x, wild))
-    for module in (energy, curvature, geometry):
-        assert module.measure(one) == pytest.approx(module.measure(other)), module.__name__
-    for module in (curvature, geometry):
-        pair = [module.compare(roll_out, roll_out.reference) for roll_out in (one, other)]
-        assert pair[0] == pytest.approx(pair[1]), module.__name__
+    for measure in (energy.measure_energy, curvature.measure, geometry.measure):
+        assert measure(one) == pytest.approx(measure(other))
+    for compare in (curvature.compare, geometry.compare):
+        pair = [compare(roll_out, roll_out.reference) for roll_out in (one, other)]
+        assert pair[0] == pytest.approx(pair[1])
     late = x.copy()
     late[-1] += 0.1 * np.random.default_rng(0).normal(size=x[0].shape)
     last = group_of(scene, simulation=x, newton_1=late).roll_outs[1]
-    assert energy.measure(last)["energy/strain"] > 2.0 * energy.measure(one)["energy/strain"]
+    assert energy.measure_energy(last)["energy/strain"] > 2.0 * energy.measure_energy(one)["energy/strain"]
     # What ended in the warm-up has no number.
     assert measured(group_of(scene, newton_1=x[:3]).roll_outs[0]) == ({}, {}, ("ok", ""))
 
@@ -139,14 +137,14 @@ def test_an_excess_is_a_difference_of_sums_and_the_zero_of_gravity_is_no_part_of
             dataclasses.replace(scene, origin_heights=heights), simulation=stretched, direct_optimisation=x
         )
         ours, bound = group.roll_outs
-        metrics = excess.measure(ours)
+        metrics = energy.measure_excess(ours)
         terms = [{k: v[2:].mean() for k, v in energy.energies(r).items()} for r in (ours, bound)]
         assert metrics["excess/total"] == pytest.approx(terms[0]["total"] - terms[1]["total"])
         kept = ("strain", "bending", "inertia")
         without = sum(terms[0][k] - terms[1][k] for k in kept)
         assert metrics["excess/without_gravity"] == pytest.approx(without) and without > 1e-3
-        assert excess.measure(bound) == {}
-    assert excess.measure(group_of(scene, simulation=x).roll_outs[0]) == {}
+        assert energy.measure_excess(bound) == {}
+    assert energy.measure_excess(group_of(scene, simulation=x).roll_outs[0]) == {}
 
 
 def test_dynamics_are_told_by_the_own_static_answer_and_by_the_simulators(monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.motion.velocity_error import compare
+from benchmarks.metrics.time_errors import compare
 from reference_sim import Trajectory
 
 DT, FRAMES, WARM_UP = 0.1, 12, 3

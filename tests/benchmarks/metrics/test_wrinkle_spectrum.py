@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.meshes import icosphere, in_space, random_rotation, right_grid
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.surface.wrinkle_spectrum import (
+from benchmarks.metrics.wrinkle_spectrum import (
     BANDS,
     band_amplitudes,
     compare,

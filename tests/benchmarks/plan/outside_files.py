@@ -91,8 +91,8 @@ np.savez(sys.argv[2], positions=cloth["start_positions"] + up, seconds_per_frame
 PROGRAM_FILE = """
 import sys
 from pathlib import Path
-from benchmarks.methods.catalogue.all_methods import METHODS
-from benchmarks.methods.outside.program import program
+from benchmarks.methods import METHODS
+from benchmarks.methods.outside import program
 
 SCRIPT = Path(__file__).with_name("theirs_run.py")
 METHODS = (program("theirs", f"{sys.executable} -I {SCRIPT} {{scene}} {{out}}", files=("theirs_run.py",)),)

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.methods.catalogue.all_methods import METHODS
-from benchmarks.metrics import names_of
+from benchmarks.methods import METHODS
+from benchmarks.metrics import measured_in
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motions import Motions, split_motions
@@ -37,7 +37,7 @@ def test_of_whole_motions_the_first_alone_is_timed_and_all_else_is_measured_in_a
     scenes = {cell.scene.name: cell.scene for cell in planned("default:garments,speed", *TESTS).cells}
     assert scenes["tshirt/kick"].timed and not scenes["tshirt/punch"].timed
     assert scenes["tshirt/kick@clip"].timed and scenes["hanging_sheet"].timed
-    assert set(names_of(None)) - set(names_of(scenes["tshirt/punch"].metrics)) == {"cost"}
+    assert {m.name for m in {*measured_in(None)} - {*measured_in(scenes["tshirt/punch"].metrics)}} == {"cost"}
     assert scenes["tshirt/punch"].dynamic
     cells = planned("full:garments", *TESTS, "--scenes", "tshirt/punch").cells
     assert all(cell.scene.timed for cell in cells)

@@ -12,8 +12,8 @@ import pytest
 from benchmarks import metric, run
 from benchmarks.declarations import DeclarationError
 from benchmarks.method import MethodEntry
-from benchmarks.methods.catalogue.all_methods import METHODS
-from benchmarks.methods.outside.program import program
+from benchmarks.methods import METHODS
+from benchmarks.methods.outside import program
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import make_plan
@@ -308,7 +308,7 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
     Path(home).write_text("")
     recipe = dataclasses.replace(DEFAULT, name="windy", window=4)
     entry = MethodEntry(
-        name="windy", description="", module="benchmarks.methods.networks.network", declared_in=home,
+        name="windy", description="", module="benchmarks.methods.networks", declared_in=home,
         needs_body=True, trained="windy", training=Training("snug", recipe), options={"kind": "windy"},
     )  # fmt: skip
     cell = Cell(of_garment("tshirt").scene("kick").at(TINY), entry, 0, ("garments",))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import Assets
-from benchmarks.methods.catalogue.trainings import TRAININGS
+from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.networks import TrainNetwork

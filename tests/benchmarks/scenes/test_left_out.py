@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[3]
 CELL = """
 import sys
 from pathlib import Path
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.scenes import SCENES
 scene = next(scene for scene in SCENES if scene.name == sys.argv[1]).at(find_preset("smoke")).build()
@@ -35,7 +35,7 @@ print(*sys.modules)
 DRESSED = """
 import dataclasses, pickle, sys
 from pathlib import Path
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 assets, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())

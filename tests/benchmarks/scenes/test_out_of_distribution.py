@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import Assets
-from benchmarks.methods.catalogue.all_methods import METHODS, find_method
-from benchmarks.methods.networks.collision_post_processing import CollisionPostProcessing
+from benchmarks.methods import METHODS, find_method
+from benchmarks.methods.networks import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.motion import extrapolation
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.plan import Plan
+from benchmarks.metrics.roll_out import EXTRAPOLATION, judge, measure_extrapolation
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.measurements import measured
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome
-from benchmarks.scenes import find_scene, out_of_distribution
+from benchmarks.scenes import find_scene, hard_motions
 from benchmarks.scenes.variations import ORDINARY, OUT_OF_DISTRIBUTION
 from reference_sim import Trajectory
 from snug.body.parametric_body import Body
@@ -66,7 +66,7 @@ def built(assets, name):
 
 def motion_of(scene, walk):
     options = {k: v for k, v in scene.options.items() if k not in ("change", "betas", "material")}
-    return out_of_distribution.CHANGES[scene.options["change"]](walk, **options)
+    return hard_motions.CHANGES[scene.options["change"]](walk, **options)
 
 
 def plan_of(folder, cells):
@@ -91,7 +91,7 @@ def test_a_hard_motion_starts_where_the_shirt_has_settled(scene, walk):
 def test_what_is_hard_about_each(walk):
     made = {scene.name.partition("/")[2]: motion_of(scene, walk) for scene in CASES}
     assert np.array_equal(made["walk_x4"].poses, walk.poses[::4])
-    plain, wrong = out_of_distribution.ordinary(walk), out_of_distribution.GLITCH
+    plain, wrong = hard_motions.ordinary(walk), hard_motions.GLITCH
     jump = made["root_glitch"].translations - plain.translations
     assert np.flatnonzero(jump.any(axis=1)).tolist() == [wrong] and np.linalg.norm(jump) == pytest.approx(1.0)
     flip = np.argwhere((made["limb_glitch"].poses != plain.poses).any(axis=2))
@@ -107,7 +107,7 @@ def test_what_is_hard_about_each(walk):
 
 
 def test_only_wrong_frames_are_recovered_from_and_a_small_body_is_refused(assets):
-    assert built(assets, "out_of_distribution/root_glitch").glitch == out_of_distribution.GLITCH
+    assert built(assets, "out_of_distribution/root_glitch").glitch == hard_motions.GLITCH
     assert built(assets, "out_of_distribution/membrane_x10").glitch is None
     shapeless = dataclasses.replace(assets, body=SimpleNamespace(shape_count=1))
     with pytest.raises(ValueError, match="1 shapes"):
@@ -157,13 +157,13 @@ def test_a_scene_without_a_body_has_none_of_these_metrics():
     group = SceneRollOuts(scene)
     x = np.repeat(scene.start[None], 4, axis=0)
     fallen = RollOut(group, find_method("snug"), trajectory_of(scene, x), suites=("extremes",))
-    assert extrapolation.measure(fallen) == {} and extrapolation.judge(fallen, {}) is None
+    assert measure_extrapolation(fallen) == {} and judge(fallen, {}) is None
 
 
 def test_a_glitch_is_forgotten_or_not(positions):
     pair = roll_outs(positions, "out_of_distribution/root_glitch")
-    free, net = (extrapolation.measure(pair[name]) for name in ("skinning", "snug"))
-    assert set(free) == set(net) <= {metric.name for metric in extrapolation.METRICS}
+    free, net = (measure_extrapolation(pair[name]) for name in ("skinning", "snug"))
+    assert set(free) == set(net) <= {metric.name for metric in EXTRAPOLATION.metrics}
     assert [free[f"motion/recovery_{after}"] for after in (1, 10, 30)] == [0.0] * 3  # it has no memory
     assert net["motion/recovery_1"] > net["motion/recovery_30"] > 0.0
     assert free["motion/offset"] < 1e-3  # mm: its float32
@@ -175,16 +175,16 @@ def test_distance_is_that_from_skinning(positions):
     moved = trajectory_of(free.scene, free.positions + np.array([0.001, 0.0, 0.0]))
     other = RollOut(free.group, find_method("simulation"), moved)
     free.group.roll_outs.append(other)
-    metrics = extrapolation.measure(other)
+    metrics = measure_extrapolation(other)
     assert metrics["motion/offset"] == pytest.approx(1.0, abs=1e-3) and "motion/strain_ratio" not in metrics
 
 
 def test_another_material_judges_the_same_roll_out(positions):
     pair = roll_outs(positions, "out_of_distribution/membrane_x10")
-    free = extrapolation.measure(pair["skinning"])
+    free = measure_extrapolation(pair["skinning"])
     assert free["motion/strain_ratio"] == pytest.approx(10.0)
     assert free["motion/total"] > free["motion/strain"] / 10
-    assert extrapolation.measure(pair["snug"])["motion/total"] > 0
+    assert measure_extrapolation(pair["snug"])["motion/total"] > 0
 
 
 def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
@@ -280,7 +280,7 @@ def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_pat
     assert starts[splits].needs == (("start", ordinary),) and not starts["out_of_distribution-girth_+5"].needs
     settled = []
     monkeypatch.setattr(
-        out_of_distribution, "settled", lambda cloth, *_: settled.append(cloth) or cloth.rest_positions + 1.0
+        hard_motions, "settled", lambda cloth, *_: settled.append(cloth) or cloth.rest_positions + 1.0
     )
     context = Context(RunFolder(tmp_path), assets)
     for task in starts.values():

@@ -11,14 +11,14 @@ import pytest
 
 from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets, read_inputs
 from benchmarks.meshes import sphere, square_sheet
-from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.metrics.surface import body_shape
+from benchmarks.methods import find_method
+from benchmarks.metrics import deformation
 from benchmarks.plan.plan import network_of
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES, all_scenes
-from benchmarks.scenes.free_fall import exact_fall
+from benchmarks.scenes.sheets import exact_fall
 from benchmarks.scenes.variations import SHAPES, shapes
 from reference_sim import simulate
 from snug.body.parametric_body import Body
@@ -100,7 +100,7 @@ def test_how_far_a_shape_is_from_the_mean_is_said_once():
     def of(role, betas):
         entry = SimpleNamespace(role=role)
         scene = SimpleNamespace(dressed=SimpleNamespace(betas=betas))
-        return body_shape.measure(SimpleNamespace(entry=entry, scene=scene))
+        return deformation.measure_body_shape(SimpleNamespace(entry=entry, scene=scene))
 
     assert of("reference", np.array([3.0, 0.0, -4.0])) == {"body/shape": 5.0}
     assert of("reference", None) == {"body/shape": 0.0} and of("network", None) == {}

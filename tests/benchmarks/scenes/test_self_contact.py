@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.methods.catalogue.all_methods import find_method
-from benchmarks.methods.solvers.simulation import Simulation
+from benchmarks.methods import find_method
+from benchmarks.methods.simulation import Simulation
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics.motion import conservation
+from benchmarks.metrics import conservation
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import protocol_of
 from benchmarks.plan.study import StudyError

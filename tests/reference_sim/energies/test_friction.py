@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.metrics.energies.energy import energy_series
-from benchmarks.metrics.energies.energy_gap import optimality
-from benchmarks.metrics.energies.replayed_step import copied_terms, freeze_step
+from benchmarks.metrics.energy import copied_terms, energy_series, freeze_step
+from benchmarks.metrics.energy_gap import optimality
 from benchmarks.scene import BuiltScene
 from reference_sim import Cloth, Material, Obstacle, Potential, Trajectory, simulate
 from reference_sim.energies import ContactFriction, ContactPenalty, Gravity, Step, StretchStVK

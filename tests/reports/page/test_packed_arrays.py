@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.metrics.surface import curvature
+from benchmarks.metrics import curvature
 from reports.cloth_colours import area_change, depth, distance, mean_curvature, skin_of
 from reports.page.embedded_roll_outs import Pack
 from tests.reports.page.page_by_hand import block, unpacked

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.methods.catalogue.all_methods import METHODS
+from benchmarks.methods import METHODS
 from reports.pdf import lay_out_table
 from reports.statistics.effects import EXCESS
 from reports.statistics.means_and_spreads import share_of_frames, with_shares

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.ground_truth import SimulateQuasiStatic

@@ -9,14 +9,14 @@ import pytest
 import torch
 
 from benchmarks.assets import Assets
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts, skinned
-from benchmarks.metrics.motion import long_roll_out as metric
+from benchmarks.metrics import roll_out as metric
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import model_path
 from benchmarks.runner.cells import judge
-from benchmarks.scenes import find_scene, long_motion
-from benchmarks.scenes.long_motion import ENDS, EVERY, FRAMES, LOOP_BLEND
+from benchmarks.scenes import find_scene, hard_motions
+from benchmarks.scenes.hard_motions import ENDS, EVERY, FRAMES, LOOP_BLEND
 from benchmarks.scenes.variations import there_and_back
 from benchmarks.timing import Reading
 from reference_sim import Trajectory
@@ -37,7 +37,7 @@ def found_of(scene, x):
     group = SceneRollOuts(scene)
     trajectory = Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
     group.roll_outs.append(RollOut(group, find_method("snug"), trajectory))
-    return metric.measure(group.roll_outs[0])
+    return metric.measure_long_roll_out(group.roll_outs[0])
 
 
 def rolled(scene, models, name):
@@ -53,7 +53,7 @@ def rolled(scene, models, name):
 @pytest.mark.parametrize("frames", [5, 20, 77, 150])
 def test_the_last_hundred_frames_show_the_motion_of_the_first(frames):
     motion = swaying(frames)
-    long = long_motion.repeated_there_and_back(motion)
+    long = hard_motions.repeated_there_and_back(motion)
     assert FRAMES <= long.frames < FRAMES + 2 * frames
     assert np.array_equal(long.poses[-ENDS:], long.poses[:ENDS])
     assert np.array_equal(long.translations[-ENDS:], long.translations[:ENDS])
@@ -70,13 +70,13 @@ def test_a_static_network_does_not_drift_and_a_spoilt_one_is_named(tmp_path):
         moving.network.offsets.bias[0] = torch.nan
     moving.save(model_path(tmp_path, "snug", 0))
     trajectory, static = rolled(scene, tmp_path, "pbns")
-    measures = metric.measure(static)
+    measures = metric.measure_long_roll_out(static)
     assert trajectory.frames == scene.frames == 2 * ENDS and measures["roll_out/drift"] < 1e-3
     assert measures["roll_out/first"] == pytest.approx(measures["roll_out/last"], rel=1e-4)
     assert measures["roll_out/first"] > 0.0
     trajectory, spoilt = rolled(scene, tmp_path, "snug")
     assert judge(trajectory, Reading(0.0), scene, truncated=False)[0] == "diverged"
-    assert metric.measure(spoilt) == {}
+    assert metric.measure_long_roll_out(spoilt) == {}
 
 
 def test_the_frames_that_are_kept_are_those_of_the_whole_roll_out(tmp_path):
@@ -85,7 +85,7 @@ def test_the_frames_that_are_kept_are_those_of_the_whole_roll_out(tmp_path):
     model = untrained_model("snug", dressed, [motion], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
     trajectory, _ = rolled(scene, tmp_path, "snug")
-    whole = roll_out(model, dressed, long_motion.repeated_there_and_back(motion))
+    whole = roll_out(model, dressed, hard_motions.repeated_there_and_back(motion))
     assert np.array_equal(trajectory.positions[:ENDS], whole.positions[:ENDS])
     assert np.array_equal(trajectory.positions[ENDS:], whole.positions[-ENDS:])
     assert np.array_equal(trajectory.times[ENDS:], whole.times[-ENDS:])
@@ -93,7 +93,7 @@ def test_the_frames_that_are_kept_are_those_of_the_whole_roll_out(tmp_path):
 
 def test_a_loop_comes_back_to_its_pose_and_goes_on_over_the_ground():
     walk = make_motion("walk")
-    motion, early, late = long_motion.looped(walk, 1000)
+    motion, early, late = hard_motions.looped(walk, 1000)
     loop = walk.frames + LOOP_BLEND
     assert motion.frames == 1000 and len(early) == len(late) == loop and early[0] == loop
     for frames in (early, late):
@@ -105,7 +105,7 @@ def test_a_loop_comes_back_to_its_pose_and_goes_on_over_the_ground():
         np.linalg.norm(np.diff(walk.translations, axis=0), axis=1).max(), rel=0.2
     )
     with pytest.raises(ValueError, match="a drift needs three loops, 390 frames, not 389"):
-        long_motion.looped(walk, 389)
+        hard_motions.looped(walk, 389)
 
 
 def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_held(tmp_path):
@@ -114,7 +114,7 @@ def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_
     model = untrained_model("snug", dressed, [walk], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
     trajectory, record = rolled(scene, tmp_path, "snug")
-    motion, early, late = long_motion.looped(walk, SMOKE.loop_frames)
+    motion, early, late = hard_motions.looped(walk, SMOKE.loop_frames)
     assert set(scene.kept) == {*range(0, SMOKE.loop_frames, EVERY), *early, *late}
     whole = roll_out(model, dressed, motion).positions
     assert np.array_equal(trajectory.positions, whole[scene.kept])
@@ -122,7 +122,7 @@ def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_
     bare = dressed.skinned(motion, smoothing=20)
     assert skinned(record.group) == pytest.approx(bare[scene.kept], abs=1e-12)
     # The state of an untrained network is soon forgotten.
-    assert 0.0 < metric.measure(record)["roll_out/drift"] < 1.0
+    assert 0.0 < metric.measure_long_roll_out(record)["roll_out/drift"] < 1.0
 
 
 def test_a_garment_that_wanders_is_found_out_wherever_the_body_went():

@@ -1,1 +1,0 @@
-"""Declarations of methods: networks, ablations, equal data, solvers; and the trainings of networks."""

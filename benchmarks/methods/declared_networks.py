@@ -1,0 +1,263 @@
+"""Networks as methods: baselines, ablations, equal data; and their trainings.
+
+Trainings of the project's networks, by the name of the network that a method declares as `trained`.
+
+No result depends on this list, but on the training of its own network alone: a further line makes no
+finished network out of date.
+
+Networks that learn from the same motions (equal data). They run when they are named.
+
+The last training motion is held out of all of them. Those that simulated vertices teach get the same mixed
+clips with every seed, simulated once; the others mix as many anew. All have SNUG's number of steps, or go on
+until the held-out motion gets no better; learners without steps are fitted once. Members of a family differ
+in their number of frames alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from benchmarks.method import MethodEntry, Reporting
+from benchmarks.training import Simulated, Training
+from snug.named_recipes import (
+    ABLATIONS,
+    DEVIATIONS,
+    DYNAMIC,
+    PAPER,
+    PBNS_SPRINGS,
+    RECIPE_OF_KIND,
+    exchange_deviations,
+)
+from snug.recipe import DEFAULT
+
+LEARN_FROM_SIMULATIONS = ("supervised", "santesteban2019", "tailornet", "nearest-poses", "pose-regression")
+TRAININGS = {
+    # Each kind by its own recipe; `dynamic` learns from other simulations, as `snug-dynamic`.
+    **{
+        kind: Training(kind, recipe, Simulated() if kind in LEARN_FROM_SIMULATIONS else None)
+        for kind, recipe in RECIPE_OF_KIND.items()
+        if kind != "dynamic"
+    },
+    "pbns-paper": Training("pbns", PAPER),
+    "pbns-springs": Training("pbns", PBNS_SPRINGS),
+    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
+    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
+    # Each deviation has as many steps as the recipe that it changes.
+    **{
+        f"snug-{recipe.name}": Training(
+            "snug", recipe, steps_of="snug-paper" if recipe.name.startswith("paper-") else ""
+        )
+        for recipe in exchange_deviations(DEFAULT, PAPER)
+    },
+}
+
+
+def network(
+    name: str, label: str, description: str, *, base: str = "", pairing_group: str = "", **fields: Any
+) -> MethodEntry:
+    """Return the entry of a network.
+
+    Args:
+        name: that of its training in TRAININGS, unless `fields` has a `training`.
+        label: its name for people.
+        description: one line for --list and run.json.
+        base: the method that it is compared with.
+        pairing_group: shared by methods that are compared seed by seed; its own name by default.
+        fields: other fields of MethodEntry, in place of those of a network.
+
+    >>> network("snug-windy", "SNUG, windy", "SNUG, trained in a wind", base="snug").reporting.pairing_group
+    'snug-windy'
+    """
+    usual: dict[str, Any] = {
+        "module": "benchmarks.methods.networks:make_network",
+        "options": {"kind": name},
+        "needs_body": True,
+        "dtype": "float32",
+        "trained": name,
+        "seeded": True,
+        "batched": True,
+        "gives_first_frame": True,
+        "conserving": True,
+        "role": "network",
+        "reporting": Reporting(base=base, pairing_group=pairing_group or name),
+    }
+    return MethodEntry(name=name, label=label, description=description, **usual | fields)
+
+
+def post_processed(entry: MethodEntry) -> MethodEntry:
+    """Return the entry of a network with collision post-processing behind it."""
+    family = entry.reporting.family
+    return replace(
+        entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed",
+        description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
+        module="benchmarks.methods.networks:make_post_processed_network", batched=False,
+        reporting=replace(
+            entry.reporting, base=entry.name, family=f"{family}+cleanup" if family else ""
+        ),
+    )  # fmt: skip
+
+
+NETWORKS = (
+    network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
+    network("pbns-paper", "PBNS, paper's text", "PBNS with StVK, trained as SNUG by the paper's text",
+            base="pbns", pairing_group="pbns"),
+    network("santesteban2019", "Santesteban 2019",
+            "fit by shape and one GRU of 1500, trained on simulated vertices"),
+    network("tailornet", "TailorNet",
+            "low and high frequencies by static networks, trained on simulated vertices"),
+    network("ncs", "Neural Cloth Simulation",
+            "static and dynamic branch apart, trained on the energies (Bertiche et al. 2022)"),
+    network("ncs-static", "Neural Cloth Simulation, static branch",
+            "its static branch alone, trained on the energies of single frames",
+            base="ncs", pairing_group="ncs"),
+    network("handles-80-dynamic", "80 handles, dynamic",
+            "recurrent network that moves the garment by 80 handles, trained on the energies as SNUG is",
+            base="handles-80", pairing_group="handles"),
+    network("nearest-poses", "Nearest poses",
+            "no network: simulated offsets of the training frames nearest in pose, skinned",
+            seeded=False, role="baseline"),
+    network("pose-regression", "Ridge on principal components",
+            "no network: ridge regression from the pose to principal components of simulated offsets",
+            seeded=False, role="baseline"),
+    network("snug-dynamic", "SNUG, dynamic",
+            "SNUG that learns its dynamics from a simulation, the rest from the energies",
+            base="snug", pairing_group="snug"),
+    network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
+            base="snug", pairing_group="snug"),
+)  # fmt: skip
+
+COUNTS = (20, 40, 80)
+HANDLES = tuple(
+    network(f"handles-{count}", f"{count} handles",
+            f"static network that moves the garment by {count} handles, trained on the energies",
+            reporting=Reporting(family="handles", level=count, pairing_group="handles"))
+    for count in COUNTS
+)  # fmt: skip
+
+
+def _floor(name: str, label: str, space: str, **fields: Any) -> MethodEntry:
+    """Declare the simulation within what a network can express. Its time is not that of a network."""
+    return MethodEntry(
+        name=f"{name}-floor", label=label,
+        description=f"no network: each time step minimised over {space}",
+        module="benchmarks.methods.lower_bounds:make_floor", needs_body=True, gives_first_frame=True,
+        static_known=False, timed=False, role="solver",
+        **{"reporting": Reporting(base=name, pairing_group=name)} | fields,
+    )  # fmt: skip
+
+
+FLOORS = (
+    *(
+        _floor(
+            f"handles-{count}", f"Floor of {count} handles", f"the transforms of {count} handles",
+            options={"handles": count},
+            reporting=Reporting(
+                family="handles-floor", level=count, base=f"handles-{count}", pairing_group="handles"
+            ),
+        )
+        for count in COUNTS
+    ),
+    *(
+        _floor(
+            name, f"Floor of {label}", f"all that {space} can give", options={"network": name},
+            trained=name, seeded=seeded,
+        )
+        for name, label, space, seeded in (
+            ("snug", "SNUG", "SNUG's last layer", True),
+            ("pbns", "PBNS", "PBNS's last layer", True),
+            ("pose-regression", "principal components", "64 principal components of the offsets", False),
+        )
+    ),
+)  # fmt: skip
+
+POST_PROCESSED = tuple(
+    post_processed(network(name, label, ""))
+    for name, label in (
+        ("snug", "SNUG"), ("pbns", "PBNS"), ("supervised", "Supervised"),
+        ("santesteban2019", "Santesteban 2019"), ("tailornet", "TailorNet"),
+    )
+)  # fmt: skip
+
+
+_LABELS = {
+    "no-noise": "first states of zero",
+    "noise-alone": "first states of noise, none remembered",
+    "window6": "windows of 6",
+    "window12": "windows of 12",
+    "shapes": "trained on body shapes",
+    "detached-past": "inertia about a detached past",
+    "two-transitions": "inertia of two transitions",
+    "springs": "springs instead of StVK",
+}
+
+
+RECIPES = tuple(
+    network(
+        f"snug-{recipe.name}", f"SNUG, {_LABELS.get(recipe.name, recipe.name.replace('-', ' '))}",
+        f"ablation: SNUG, recipe {recipe.name}", role="ablation", base="snug", pairing_group="snug",
+    )
+    for recipe in ABLATIONS
+)  # fmt: skip
+
+# Each a training of its own, of equal steps: their times stand beside them.
+RECIPE_DEVIATIONS = tuple(
+    network(
+        f"{base}-{verb}-{deviation.name}", f"{label} {verb} {deviation.description}",
+        f"{base} {verb} {deviation.description}", role="ablation", base=base, pairing_group="snug",
+    )
+    for base, label, verb in (("snug", "SNUG", "without"), ("snug-paper", "SNUG, paper's text,", "with"))
+    for deviation in DEVIATIONS
+)  # fmt: skip
+
+
+# Mixed frames for each given one; between the ends for the curve of error against training frames.
+ENDS, CURVE = (0, 12), (0, 1, 3, 12)
+FAMILIES_OF_NETWORKS = (
+    ("snug", "SNUG", CURVE),
+    ("pbns", "PBNS", ENDS),
+    ("supervised", "Supervised", CURVE),
+    ("santesteban2019", "Santesteban 2019", ENDS),
+    ("tailornet", "TailorNet", ENDS),
+)
+FITTED = (("nearest-poses", "Nearest poses"), ("pose-regression", "Ridge on principal components"))
+
+
+def _training(name: str, mixed: int, *, converged: bool) -> Training:
+    training = TRAININGS[name]
+    recipe = replace(training.recipe, name=f"{training.recipe.name}-data-{mixed}")
+    if training.simulated:
+        training = replace(training, simulated=Simulated(mixed=mixed))
+    else:
+        recipe = replace(recipe, mixed=float(mixed))
+    return replace(training, recipe=recipe, steps_of="snug", held_out=1, converged=converged)
+
+
+def _entry(name: str, label: str, mixed: int, *, converged: bool = False, seeded: bool = True) -> MethodEntry:
+    """Declare a network on equal data. Not timed: its run time is that of the network of the usual data."""
+    family = f"{name}-data" + "-converged" * converged
+    data = f"original data and {mixed} augmented frames for each" if mixed else "original data"
+    title = f"{label}, {mixed} augmented for each" if mixed else f"{label}, original data"
+    return network(
+        f"{family}-{mixed}", title + ", converged" * converged,
+        f"{name} that learns from {data}" + ", until a held-out motion gets no better" * converged,
+        training=_training(name, mixed, converged=converged), role="ablation", batched=False, timed=False,
+        seeded=seeded,
+        reporting=Reporting(
+            family=family, level=float(mixed), base=f"{name}-data-{mixed}" if converged else name,
+            pairing_group=name,
+        ),
+    )  # fmt: skip
+
+
+def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry, ...]:
+    """Declare all numbers at equal steps, the ends to convergence too, and these with post-processing."""
+    equal = tuple(_entry(name, label, mixed, converged=False) for mixed in numbers)
+    converged = tuple(_entry(name, label, mixed, converged=True) for mixed in ENDS)
+    ends = (entry for entry in (*equal, *converged) if entry.reporting.level in ENDS)
+    return (*equal, *converged, *map(post_processed, ends))
+
+
+EQUAL_DATA = tuple(
+    entry for network_and_numbers in FAMILIES_OF_NETWORKS for entry in _block(*network_and_numbers)
+) + tuple(_entry(name, label, mixed, seeded=False) for name, label in FITTED for mixed in ENDS)

@@ -1,0 +1,191 @@
+"""Solvers as methods: variants of the reference, and solvers that stop before the minimum."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from benchmarks.method import MethodEntry, Reporting
+from benchmarks.results.protocol import MEMBERS
+
+SHIFTS = (1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4)  # [m]
+_SIMULATION = "benchmarks.methods.simulation:make_simulation"
+# Newton: every iteration is a factorisation of the true Hessian, or several. L-BFGS: the preconditioner
+# (mass over dt^2, a cotangent Laplacian, contacts) is factorised once a step; an iteration then costs one
+# evaluation of the energies and three triangular solves. Without memory it is preconditioned gradient
+# descent, in the manner of projective dynamics: one constant matrix, a line search, nothing learned from one
+# iteration to the next.
+# A few iterations of Newton begin with all negative curvature taken out: moving cloth needs that in nearly
+# every first one, and five Hessians would be assembled to find it out.
+_NEWTON: dict[str, Any] = {
+    "module": _SIMULATION,
+    "counted": "max_iterations",
+    "method": "newton",
+    "start_projected": True,
+}
+_LBFGS: dict[str, Any] = {
+    "module": _SIMULATION,
+    "counted": "max_iterations",
+    "method": "lbfgs",
+    "finish": False,
+}
+
+
+def _truncated(
+    family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
+    counted: str = "iterations", dtype: str = "float64", conserving: bool = False, **options: Any,
+) -> tuple[MethodEntry, ...]:  # fmt: skip
+    """Declare one entry for each number of iterations, which is the option `counted` of the module."""
+    return tuple(
+        MethodEntry(
+            name=f"{family}-{count}",
+            label=f"{label}, {_counted(count, unit)}",
+            description=description.format(_counted(count, unit)),
+            module=module,
+            options={counted: count, **options},
+            dtype=dtype,
+            conserving=conserving,
+            truncated=True,
+            role="solver",
+            reporting=Reporting(family=family, level=count),
+        )
+        for count in counts
+    )
+
+
+def warm_started(base: str, label: str, solver: str) -> tuple[MethodEntry, ...]:
+    """Declare steps from skinning, SNUG or a variant of it: "newton", "lbfgs" or "fast-lbfgs" goes on."""
+    trained = None if base == "skinning" else base
+    return tuple(
+        MethodEntry(
+            name=f"{base}+{solver}-{count}",
+            label=f"{label} + {_LABELS[solver]}, {_counted(count, 'iteration')}",
+            description=f"each step from {base}'s frame by {_counted(count, 'iteration')} of {solver}",
+            module="benchmarks.methods.warm_started:make_warm_started",
+            options={"guess": base, "solver": solver, "iterations": count},
+            needs_body=True,
+            trained=trained,
+            seeded=trained is not None,
+            truncated=True,
+            conserving=solver == "fast-lbfgs",
+            role="warm-started",
+            reporting=Reporting(
+                family=f"{base}+{solver}", level=count, base=base, pairing_group="snug" if trained else ""
+            ),
+        )
+        for count in (1, 2, 4, 8)
+    )
+
+
+def _counted(count: int, unit: str) -> str:
+    return f"{count} {unit}{'s' * (count > 1)}"
+
+
+_LABELS = {"newton": "Newton", "lbfgs": "L-BFGS", "fast-lbfgs": "fast L-BFGS"}
+
+SOLVERS = (
+    *(
+        MethodEntry(
+            name=f"simulation-1e-{power}",
+            label=f"Simulation to 1e-{power}",
+            description=f"the reference, minimised to tolerance 1e-0{power}",
+            module=_SIMULATION,
+            options={"tolerance": float(f"1e-{power}")},
+            role="reference-variant",
+            reporting=Reporting(family="simulation-tolerance", level=float(f"1e-{power}")),
+            timed=f"simulation-1e-{power}" not in MEMBERS,  # nobody asks for the time of the ensemble
+        )
+        for power in (2, 4, 8)
+    ),
+    *(
+        MethodEntry(
+            name=f"simulation-dt/{substeps}",
+            label=f"Simulation, step dt/{substeps}",
+            description=f"the reference with {substeps} time steps a frame",
+            module=_SIMULATION,
+            options={"substeps": substeps},
+            role="reference-variant",
+            reporting=Reporting(family="simulation-dt", level=substeps),
+        )
+        for substeps in (2, 4, 8)
+    ),
+    *(
+        MethodEntry(
+            name=f"simulation-perturbed-{shift:.0e}".replace("e-0", "e-"),
+            label=f"Simulation, perturbed by {shift * 1e3:g} mm",
+            description=f"the reference from a start perturbed by {shift:g} m: how far apart both end",
+            module="benchmarks.methods.simulation:make_perturbed_start",
+            options={"shift": shift},
+            role="reference-variant",
+            reporting=Reporting(family="simulation-perturbed", level=shift),
+            timed=False,
+        )
+        for shift in SHIFTS
+    ),
+    MethodEntry(
+        name="simulation-refrozen",
+        label="Simulation, planes searched twice",
+        description="the reference, each step solved again with contact planes searched at its end",
+        module=_SIMULATION,
+        options={"refreeze": 1},
+        role="reference-variant",
+        reporting=Reporting(family="simulation-refrozen"),
+        timed=False,
+    ),
+    # A variant of the physics, set beside its base: a "reference-variant" would be read as an uncertainty of
+    # the reference, and a "solver" as an approximation of it.
+    *(
+        MethodEntry(
+            name=f"simulation-{exchange}",
+            label=f"Simulation, {exchange.replace('-', ' ').replace('pbns', 'PBNS')}",
+            description=f"the reference with {change}",
+            module="benchmarks.methods.simulation:make_other_material",
+            options={"exchange": exchange},
+            role="ablation",
+            reporting=Reporting(base="simulation"),
+        )
+        for exchange, change in (
+            ("printed-bending", "hinges as the paper prints them, not scaled: some 3 times as stiff"),
+            ("springs", "springs on the edges in place of StVK's membrane, those of recipe springs"),
+            ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
+        )
+    ),
+    MethodEntry(
+        name="simulation-self-contact",
+        label="Simulation, self-contact",
+        description="the reference with a barrier that keeps the cloth from crossing itself",
+        module="benchmarks.methods.simulation:make_self_contact",
+        package="ipctk",
+        role="ablation",
+        reporting=Reporting(base="simulation"),
+    ),
+    *_truncated(
+        "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
+        (1, 2, 4, 8), **_NEWTON,
+    ),
+    *_truncated(
+        "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}",
+        (5, 10, 20, 40), **_LBFGS, memory=10,
+    ),
+    *_truncated(
+        "fast-lbfgs", "Fast L-BFGS", "iteration",
+        "L-BFGS compiled as a whole, float32, stopped after {}", (5, 10, 20, 40),
+        module="benchmarks.methods.simulation:make_fast_lbfgs", dtype="float32", conserving=True,
+    ),
+    *_truncated(
+        "gradient-descent", "Gradient descent", "iteration",
+        "preconditioned gradient descent, stopped after {}", (10, 40), **_LBFGS, memory=0,
+    ),
+    *_truncated(
+        "vbd", "Vertex block descent", "sweep", "vertex block descent on our energies, {} a step",
+        (5, 20, 80), module="benchmarks.methods.sweeps:make_block_descent",
+    ),
+    *_truncated(
+        "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
+        (10, 40, 160), module="benchmarks.methods.sweeps:make_xpbd",
+    ),
+    *warm_started("skinning", "Skinning", "lbfgs"),
+    *warm_started("skinning", "Skinning", "newton"),
+    *warm_started("snug", "SNUG", "lbfgs"),
+    *warm_started("snug", "SNUG", "newton"),
+    *warm_started("snug", "SNUG", "fast-lbfgs"),
+)  # fmt: skip

@@ -1,0 +1,276 @@
+"""Lower bounds: a clip's vertices optimised directly, and steps minimised over what a network can express.
+
+Lower bound: the vertices of a whole clip optimised directly under the training loss, without a network.
+
+    min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3} inertia(x_t)
+    inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
+
+It is what a network could reach whose output were not bound to its input: it sees the whole clip, the
+future too. All frames are one cloth of T copies, minimised by the L-BFGS of reference_sim on the very terms
+that judge every method; its preconditioner couples no frames. Contact planes are frozen for a round and then
+searched anew (towards the closest point, as the judge has them; training takes the skin's normal there). The
+sum is not convex: a bound found from skinning, not proven to be the lowest. Not a method to run a garment
+with: its time a frame is that of the whole clip divided by its frames.
+
+Floor of a subspace: each time step minimised over the few numbers a frame that a network would predict.
+
+    x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)       M: skinning, r: the unposed garment, m + U q: its offsets
+
+It is the simulation, from its own past and with its own contact planes, whose cloth can only do what the
+subspace expresses: handles, or all that the last layer of a network can give (for ridge on principal
+components these components, for SNUG the span of its last 256 numbers). So the excess of a network over the
+reference splits into the floor's, which no training removes, and the rest, which its training has not
+learned. Both are roll-outs with a past of their own, so that the rest may be negative where cloth is chaotic.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.method import Method
+from benchmarks.methods.simulation import Simulation
+from benchmarks.results.run_folder import model_path
+from benchmarks.scene import BuiltScene
+from benchmarks.scenes.dressed_body import declared_energies
+from reference_sim.cloth import Cloth
+from reference_sim.energies.contact_penalty import ContactPenalty
+from reference_sim.energies.energy import Energy
+from reference_sim.energies.gravity import Gravity
+from reference_sim.energies.inertia import Inertia
+from reference_sim.minimise.minimisers import make_minimiser
+from reference_sim.minimise.subspace import Placement, SubspaceNewton, nearest_offsets, orthonormal
+from reference_sim.potential import Potential
+from reference_sim.trajectory import Trajectory
+from snug.networks.dressed_body import DressedBody
+from snug.networks.handles import shape_functions, span
+from snug.networks.trained_model import TrainedModel
+from snug.recipe import DEFAULT
+
+ROUNDS, ITERATIONS, MEMORY = 40, 50, 20
+FALL = 1e-4  # a round that lowers the sum by a smaller share is the last
+TOLERANCE = 1e-4  # largest component of the gradient, in mean vertex weights
+
+
+class ClipInertia(Inertia):
+    """Inertia of a cloth that is `frames` copies of one: each vertex against its own two earlier frames."""
+
+    def __init__(self, cloth: Cloth, dt: float, frames: int) -> None:
+        super().__init__(cloth, dt)
+        self.frames = frames
+
+    def value_and_gradient(self, x: np.ndarray, x_hat: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+        """Return the inertia of the whole clip [J] and its gradient at x (T V, 3)."""
+        clip = x.reshape(self.frames, -1, 3)
+        masses = self.masses.reshape(self.frames, -1, 1)[2:] / self.dt**2
+        offset = clip[2:] - 2 * clip[1:-1] + clip[:-2]
+        force = masses * offset
+        gradient = np.zeros_like(clip)
+        gradient[2:] += force
+        gradient[1:-1] -= 2 * force
+        gradient[:-2] += force
+        return 0.5 * float(np.vdot(force, offset)), gradient.reshape(x.shape)
+
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the diagonal alone: 1 + 4 + 1 of m/dt^2 where a frame has two neighbours on either side."""
+        count = np.zeros(self.frames)
+        for shift, weight in ((2, 1.0), (1, 4.0), (0, 1.0)):
+            count[shift : self.frames - 2 + shift] += weight
+        diagonal = np.repeat(count, len(self.masses) // self.frames) * self.masses / self.dt**2
+        return np.arange(len(self.masses)), diagonal[:, None, None]
+
+
+class DirectOptimisation(Method):
+    """Direct optimisation of one clip. `sums`: minimised sum [J] at the end of each round.
+
+    Raises ValueError for a scene with other terms than the paper's of a garment.
+    """
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Lay the frames out as one cloth and start from skinning. Raises ValueError for other terms."""
+        assert scene.dressed is not None
+        if _identity(scene.energies) != _identity(declared_energies(scene.cloth)):
+            names = ", ".join(term.name for term in scene.energies)
+            raise ValueError(
+                f"direct optimisation minimises the paper's terms, scene {scene.name} has: {names}"
+            )
+        self.scene, motion = scene, scene.dressed.motion
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.start = dressed.skinned(motion, scene.dressed.betas, smoothing=DEFAULT.smoothing)
+        one, frames = scene.cloth, scene.frames
+        faces = one.faces + one.vertex_count * np.arange(frames)[:, None, None]
+        # Side by side: a rest state is only sound where no two vertices coincide.
+        apart = 2 * np.ptp(one.rest_positions[:, 0]) * np.arange(frames)[:, None, None] * [1.0, 0.0, 0.0]
+        rest = (one.rest_positions + apart).reshape(-1, 3)
+        pins = np.asarray(one.pins, dtype=np.int64) + one.vertex_count * np.arange(frames)[:, None]
+        flat = None if one.rest_uv is None else np.concatenate([one.rest_uv] * frames)
+        self.cloth = Cloth(rest, faces.reshape(-1, 3), one.material, pins=pins.ravel(), rest_uv=flat)
+        self.terms = [
+            *declared_energies(self.cloth),
+            ClipInertia(self.cloth, scene.dt, frames),
+        ]
+        # What the pelvis's own height adds to gravity: large, the same for all, and no measure of a fall.
+        gravity = next(term for term in scene.energies if isinstance(term, Gravity))
+        heights = np.zeros(frames) if scene.origin_heights is None else scene.origin_heights
+        self.carried = float(gravity.weights.sum() * (heights - gravity.origin_height).sum())
+
+    def run(self) -> Trajectory:
+        """Minimise the clip in rounds, contact planes searched anew before each."""
+        x = self.start.reshape(-1, 3)
+        self.sums: list[float] = []
+        potential = Potential(self.terms)
+        descent = make_minimiser(
+            potential, "lbfgs", finish=False, max_iterations=ITERATIONS, memory=MEMORY, tolerance=TOLERANCE
+        )
+        finite = settled = True
+        for _ in range(ROUNDS):
+            self.search(x)
+            before = potential.value(x)
+            result = descent.minimise(x)
+            finite = bool(np.isfinite(result.positions).all()) and result.status != "diverged"
+            if not finite:
+                break
+            x = result.positions
+            self.sums.append(result.energy)
+            settled = before - result.energy < FALL * abs(result.energy - self.carried)
+            if settled:
+                break
+        status, reason = "ok", ""
+        if not finite:
+            status, reason = "diverged", f"round {len(self.sums) + 1}: {result.reason}"
+        elif not settled:
+            status, reason = "stalled", f"the sum was still falling after {ROUNDS} rounds"
+        frames = self.scene.frames
+        return Trajectory(
+            positions=x.reshape(frames, -1, 3),
+            faces=np.asarray(self.scene.cloth.faces),
+            times=np.arange(frames) * self.scene.dt,
+            status=status,
+            reason=reason,
+            provenance={"method": "direct-optimisation", "sums_J": [float(value) for value in self.sums]},
+        )
+
+    def search(self, x: np.ndarray) -> None:
+        """Search the contact planes of all frames at x (T V, 3)."""
+        obstacle, frames = self.scene.obstacle, self.scene.frames
+        for single, whole in zip(self.scene.energies, self.terms):
+            if not isinstance(single, ContactPenalty):
+                continue
+            assert obstacle is not None and isinstance(whole, ContactPenalty)
+            clip = x.reshape(frames, -1, 3)
+            planes = [
+                obstacle.planes(single.sample_matrix @ clip[frame], frame, single.rest_samples)
+                for frame in range(frames)
+            ]
+            kinds = _kinds(single)
+            whole.points = _by_kind(np.stack([p.points for p in planes]), kinds)
+            whole.normals = _by_kind(np.stack([p.normals for p in planes]), kinds)
+
+
+def _identity(terms: Sequence[Energy]) -> list[tuple[type[Energy], object]]:
+    """Return type and parameters of each term, which tell two lists of terms apart."""
+    return [(type(term), term.parameters()) for term in terms]
+
+
+def _kinds(contact: ContactPenalty) -> list[int]:
+    """Return where edge midpoints and centroids begin among the samples of one frame."""
+    vertices, edges = contact.cloth.vertex_count, len(contact.cloth.edges)
+    return [vertices, vertices + edges] if contact.samples == "all" else []
+
+
+def _by_kind(values: np.ndarray, kinds: list[int]) -> np.ndarray:
+    """Reorder (T, S, 3) of frames to (T S, 3) of the whole cloth: all vertices, all edges, all centroids."""
+    return np.ascontiguousarray(
+        np.concatenate([part.reshape(-1, 3) for part in np.split(values, kinds, axis=1)])
+    )
+
+
+def make_direct_optimisation(*, models: Path, seed: int) -> DirectOptimisation:
+    """Make the bound; it has no seed and no model."""
+    return DirectOptimisation()
+
+
+Space = tuple[np.ndarray, np.ndarray, int]  # U (3 V, K), m (3 V,) [m], sweeps over the skinning weights
+
+
+@dataclass(kw_only=True)
+class SubspaceFloor(Simulation):
+    """Simulation within a subspace of offsets.
+
+    space: makes the subspace for a dressed body.
+    Raises ValueError for a scene of several steps a frame: there is a pose for its last alone.
+    """
+
+    space: Callable[[DressedBody], Space]
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Pose the subspace in each frame, start from its point nearest to the scene's start, compile."""
+        if scene.substeps > 1:
+            raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, poses are of one")
+        assert scene.dressed is not None
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        columns, centre, smoothing = self.space(dressed)
+        vertices = dressed.vertices
+        basis = orthonormal(columns).reshape(vertices, 3, -1)
+        placements = _placements(dressed, scene, centre.reshape(vertices, 3), smoothing)
+        offsets = nearest_offsets(basis, placements[0].unposed(scene.start))
+        start = placements[0].posed(offsets)
+        start[scene.cloth.pins] = scene.start[scene.cloth.pins]
+
+        def in_subspace(potential: Potential, **options: Any) -> SubspaceNewton:
+            return SubspaceNewton(
+                potential, basis=basis, placements=placements[1:], offsets=offsets, **options
+            )
+
+        self.options = {"method": in_subspace}
+        state = np.stack([start, scene.start_velocity])
+        super().prepare(dataclasses.replace(scene, settle=lambda: state))
+
+
+def _placements(
+    dressed: DressedBody, scene: BuiltScene, centre: np.ndarray, smoothing: int
+) -> list[Placement]:
+    """Return turns and places of the vertices in each frame, with offsets `centre` (V, 3) [m]."""
+    assert scene.dressed is not None
+    motion, betas = scene.dressed.motion, scene.dressed.betas
+    weights = dressed.weights(smoothing).double().numpy()
+    transforms = dressed.transforms(motion.poses, betas).double().numpy()
+    unposed = dressed.rest(betas).double().numpy() + centre
+    placements = []
+    for joints, pelvis in zip(transforms, dressed.pelvis(motion, betas)):
+        blended = np.einsum("vj,jik->vik", weights, joints)
+        turns = np.ascontiguousarray(blended[..., :3])
+        placements.append(
+            Placement(turns, np.einsum("vij,vj->vi", turns, unposed) + blended[..., 3] + pelvis)
+        )
+    return placements
+
+
+def _handle_space(count: int) -> Callable[[DressedBody], Space]:
+    def space(dressed: DressedBody) -> Space:
+        functions = shape_functions(dressed.garment, count)
+        return span(functions), np.zeros(3 * dressed.vertices), DEFAULT.smoothing
+
+    return space
+
+
+def _last_layer(path: Path) -> Callable[[DressedBody], Space]:
+    def space(dressed: DressedBody) -> Space:
+        model = TrainedModel.load(path)
+        basis, centre = (part.double().numpy().copy() for part in model.network.offset_space())
+        rows = (3 * np.asarray(model.network.pins, dtype=np.int64)[:, None] + np.arange(3)).ravel()
+        basis[rows], centre[rows] = 0.0, 0.0
+        return basis, centre, model.recipe.smoothing
+
+    return space
+
+
+def make_floor(*, models: Path, seed: int, handles: int = 0, network: str = "") -> SubspaceFloor:
+    """Make the floor of so many handles, or that of the last layer of a network."""
+    space = _last_layer(model_path(models, network, seed)) if network else _handle_space(handles)
+    return SubspaceFloor(options={}, space=space)

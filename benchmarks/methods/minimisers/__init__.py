@@ -1,1 +1,0 @@
-"""Minimisers that the comparison alone needs: same call and same result as those of reference_sim."""

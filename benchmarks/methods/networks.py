@@ -1,0 +1,207 @@
+"""Methods that need a body: trained networks, collision post-processing, skinning.
+
+Collision post-processing: vertices below or within 2 mm of the skin are pushed out to 2 mm.
+
+    x' = x + max(2 mm - n.(x - c), 0) n      c: closest body point that x may touch, n: the skin's normal
+
+The released SNUG models and Santesteban 2019 end with such a step, so numbers from them are post-processed.
+Here it is never part of a network's row: it is a method of its own, and its time is on that method's clock.
+One push for each vertex, none for edges and faces: where skin is hollow a vertex may end nearer than 2 mm,
+and a long edge may still cut through the body.
+
+Skinning alone: the garment follows the body's joints. The free baseline of every table.
+
+Weights are smoothed as much as those of the networks' default recipe, so that what a network adds to
+skinning is all that tells them apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.method import Method, posed_body
+from benchmarks.results.run_folder import model_path
+from benchmarks.scene import BuiltScene
+from reference_sim.geometry.surface import vertex_normals
+from reference_sim.trajectory import Trajectory
+from snug.networks.dressed_body import DressedBody
+from snug.networks.roll_out import (
+    collect_frames,
+    prepare_batch,
+    prepare_frame_inputs,
+    prepare_roll_out,
+    prepare_skinned_frames,
+    roll_out,
+)
+from snug.networks.trained_model import TrainedModel
+from snug.recipe import DEFAULT
+from snug.training.contact_cache import Patch
+
+
+@dataclass
+class Network(Method):
+    """Network read from its file. Features are made and the network is warmed up before run().
+
+    then: applied to each frame, as post-processing.
+    """
+
+    path: Path
+    then: Callable[[np.ndarray, int], np.ndarray] | None = field(default=None, init=False)
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Read the model, make the features and warm up. Not timed."""
+        assert scene.dressed is not None
+        self.model = TrainedModel.load(self.path)
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.frames = prepare_roll_out(
+            self.model, self.dressed, self.motion, self.betas, kept=scene.kept,
+            earlier=scene.dressed.before, postprocess=self.then,
+        )  # fmt: skip
+
+    def run(self) -> Trajectory:
+        """Roll out all frames."""
+        return self.frames()
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Return a function of the frame that makes features and joint transforms."""
+        assert scene.dressed is not None
+        return prepare_frame_inputs(
+            self.model, self.dressed, self.motion, self.betas, earlier=scene.dressed.before
+        )
+
+    def batch(self, copies: int) -> Callable[[], np.ndarray]:
+        """Return a function that computes `copies` bodies in this motion at once, (T, copies, V, 3) [m]."""
+        return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
+
+    def quasi_static(self) -> Trajectory:
+        """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock."""
+        return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
+
+
+def make_network(*, models: Path, seed: int, kind: str) -> Network:
+    """Make the network of that name and seed: "untrained" or a key of TRAININGS in catalogue/trainings.py."""
+    return Network(model_path(models, kind, seed))
+
+
+MARGIN = 2e-3  # [m]
+
+
+class CollisionPostProcessing:
+    """Push-out of a garment from a body that moves in a known way.
+
+    Args:
+        rest_positions: (V, 3) [m] of the garment.
+        body_rest, body_faces: (B, 3) [m] and (G, 3) of the body in T-pose, which say what may touch what.
+        body_positions: (T, B, 3) [m] of each frame; any origin shared with the garment.
+
+    Raises:
+        ValueError: garment and body are nowhere near each other.
+    """
+
+    def __init__(
+        self,
+        rest_positions: np.ndarray,
+        body_rest: np.ndarray,
+        body_faces: np.ndarray,
+        body_positions: np.ndarray,
+    ) -> None:
+        self.patch = Patch.around(rest_positions, body_rest, body_faces)
+        self.body = body_positions[:, self.patch.body_vertices].astype(np.float32)
+        self._faces: np.ndarray | None = None  # found last, where the next search begins
+
+    def __call__(self, x: np.ndarray, frame: int) -> np.ndarray:
+        """Return vertices (V, 3) [m] of a frame, pushed out where need be; `x` is left as it is."""
+        patch, skin = self.patch, self.body[frame]
+        patch.tree.refit(skin)
+        # Exact at any depth, unlike the anchors of training: what lies deep must find the near way out.
+        nearest = patch.tree.nearest(x, hints=self._faces, samples=patch.samples)
+        self._faces = nearest.faces
+        corners = vertex_normals(skin, patch.faces)[patch.faces[nearest.faces]]
+        normals = np.einsum("va,vai->vi", nearest.barycentric, corners)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True) + 1e-30
+        lack = MARGIN - np.einsum("vi,vi->v", normals, x - nearest.points)
+        return x + np.maximum(lack, 0.0)[:, None] * normals
+
+
+WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
+
+
+class PostProcessedNetwork(Network):
+    """Network read from its file, and the body that its garment is pushed out of, posed before run()."""
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Pose the body, compile the post-processing and prepare the network. Not timed."""
+        assert scene.dressed is not None and scene.obstacle is not None
+        body, garment = scene.dressed.body, scene.dressed.garment
+        positions = np.asarray(scene.obstacle.positions)
+        self.then = clean = CollisionPostProcessing(
+            garment.rest_positions, body.shaped(), body.faces, positions
+        )
+        for frame in range(min(WARM_UP, len(positions))):
+            clean(np.asarray(scene.cloth.rest_positions), frame)
+        super().prepare(scene)
+
+    def run(self) -> Trajectory:
+        """Roll out, each frame post-processed."""
+        cleaned = super().run()
+        facts = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}
+        return replace(cleaned, provenance=cleaned.provenance | facts)
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Return a function of the frame that makes features, joint transforms and the posed body."""
+        assert scene.dressed is not None
+        features, body = super().inputs(scene), posed_body(scene.dressed)
+        return lambda frame: (features(frame), body(frame))
+
+    def quasi_static(self) -> Trajectory:
+        """Return the network's quasi-static solutions, post-processed as well. Never on the clock."""
+        assert self.then is not None
+        still = super().quasi_static()
+        cleaned = [self.then(x, frame) for frame, x in enumerate(still.positions)]
+        return replace(still, positions=np.stack(cleaned))
+
+
+def make_post_processed_network(*, models: Path, seed: int, kind: str) -> PostProcessedNetwork:
+    """Make the network of that name and seed with post-processing."""
+    return PostProcessedNetwork(model_path(models, kind, seed))
+
+
+class Skinning(Method):
+    """One linear blend a frame; joint transforms are ready before, as for the networks."""
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Smooth the weights and make the joint transforms. Not timed."""
+        assert scene.dressed is not None
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        self.frames = prepare_skinned_frames(self.dressed, self.motion, DEFAULT.smoothing, self.betas)
+        self.faces = np.asarray(scene.cloth.faces)
+
+    def run(self) -> Trajectory:
+        """Skin all frames."""
+        positions, seconds = collect_frames(self.frames(), np.arange(self.motion.frames))
+        return Trajectory(
+            positions=positions,
+            faces=self.faces,
+            times=np.arange(len(positions)) / self.motion.fps,
+            frame_seconds=seconds,
+            provenance={"method": "skinning"},
+        )
+
+    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
+        """Return a function of the frame that makes joint transforms."""
+        return prepare_frame_inputs(None, self.dressed, self.motion, self.betas)
+
+    def quasi_static(self) -> Trajectory:
+        """Return the roll-out itself: skinning has no dynamics."""
+        return self.run()
+
+
+def make_skinning(*, models: Path, seed: int) -> Skinning:
+    """Make skinning alone; it has no seed and no model."""
+    return Skinning()

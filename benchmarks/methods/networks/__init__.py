@@ -1,1 +1,0 @@
-"""Methods that need a body: networks, skinning, post-processing, vertices optimised directly."""

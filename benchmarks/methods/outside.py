@@ -1,0 +1,234 @@
+"""Methods from outside: programs that read an exported scene, and stored roll-outs.
+
+Method that is a program with its own environment: it reads an exported scene and writes a roll-out.
+
+What its start, its imports and its files take is no work of the method, so the harness's clock says nothing
+of it. A time of its own that it writes beside the positions is reported, and marked as declared.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+import shlex
+import subprocess
+import tempfile
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.declarations import DeclarationError
+from benchmarks.external.roll_out_files import (
+    MODULE,
+    FileConventions,
+    RollOutFileError,
+    RollOutOption,
+    first_not_finite,
+    read_roll_out,
+)
+from benchmarks.external.scene_files import facts_of, write_scene_files
+from benchmarks.external.scene_fit import fit_to_scene
+from benchmarks.method import Method, MethodEntry, WorkerDied
+from benchmarks.provenance import digest
+from benchmarks.scene import BuiltScene
+from reference_sim.files.array_file import read_arrays
+from reference_sim.trajectory import Trajectory
+
+
+@dataclass
+class Stored(Method):
+    """Positions of a file, once they have been shown to belong to the scene."""
+
+    path: str
+    stated: FileConventions
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Read the file and compare it with the scene. Raises RollOutFileError."""
+        self.scene = scene
+        try:
+            self.stored, self.done = fit_to_scene(read_roll_out(self.path), scene, self.stated)
+        except RollOutFileError as error:
+            raise RollOutFileError(
+                str(error) if self.path in str(error) else f"{self.path}: {error}"
+            ) from None
+
+    def run(self) -> Trajectory:
+        """Return the roll-out of the file."""
+        return self._trajectory(self.stored.positions)
+
+    def quasi_static(self) -> Trajectory | None:
+        """Return the quasi-static solutions of the file; None where it has none."""
+        held = None if self.stated.other_mesh else self.stored.quasi_static
+        return None if held is None else self._trajectory(held)
+
+    def _trajectory(self, positions: np.ndarray) -> Trajectory:
+        stored = self.stored
+        changes, place = "; ".join(self.done), first_not_finite(positions)
+        where = "frame {}, vertex {}".format(*place) if place else ""
+        # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
+        claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
+        return Trajectory(
+            positions=positions,
+            faces=np.asarray(stored.faces if self.stated.other_mesh else self.scene.cloth.faces),
+            times=np.arange(len(positions)) * self.scene.dt,
+            status="diverged" if where else "ok",
+            reason=f"{self.path}: {where}: a position is not finite" if where else changes,
+            provenance={"method": "stored roll-out", "file": Path(self.path).name, "changes": changes},
+            frame_fields={"converged": claims},
+        )
+
+
+def make_stored(*, models: Path, seed: int, path: str, digest: str, **stated: object) -> Stored:
+    """Make the roll-out of that file, without seed or model; digest: of its content, for the cache."""
+    return Stored(path, FileConventions(**stated))  # type: ignore[arg-type]
+
+
+def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
+    """Return the entry of that scene; None where it has no file. Raises RollOutFileError."""
+    path = option.path_for(scene)
+    if option.places and not Path(path).exists() and not glob.glob(path):
+        return None
+    stored = read_roll_out(path)
+    declared = option.declared_ms is not None
+    return MethodEntry(
+        name=option.name,
+        label=option.name,
+        description=f"roll-out of {Path(path).name}" + ", time as its author says" * declared,
+        module=MODULE,
+        options={"path": path, "digest": digest(stored), **asdict(option.stated)},
+        dtype=stored.dtype,
+        gives_first_frame=True,
+        conserving=not option.stated.other_mesh,
+        timed=False,
+        declared_ms=option.declared_ms,
+        other_mesh=option.stated.other_mesh,
+        static_known=False,
+        role=option.role,
+    )
+
+
+TIME_LIMIT = 100.0  # after which it is ended
+PLACES = ("{scene}", "{out}")
+TAIL_BYTES = 4096  # bytes of what it has said that are looked at
+OWN_ENVIRONMENT = (
+    "PYTHONPATH",
+    "PYTHONHOME",
+    "VIRTUAL_ENV",
+)  # of this process: another environment has its own
+
+
+def program(
+    name: str, command: str, *, seconds: float = TIME_LIMIT, description: str = "", **fields: Any
+) -> MethodEntry:
+    """Return the entry of a program.
+
+    Args:
+        name: of the method.
+        command: words as in a shell, which is not used. {scene} becomes the folder of the exported scene,
+            {out} the npz file to be written: positions (T,V,3) [m], and what else benchmarks.score reads. In
+            it seconds_per_frame, one number, is its declared time. {seed} becomes the seed.
+        seconds: after which it is ended.
+        description: one line; by default that it is this program.
+        fields: of MethodEntry, as label, files and needs_body.
+
+    Raises:
+        DeclarationError: the command lacks {scene} or {out}.
+
+    >>> program("mine", "python mine.py {scene} {out}").role
+    'external'
+    """
+    for place in PLACES:
+        if place not in command:
+            raise DeclarationError(f"program {name}: its command has no {place}: {command}")
+    return MethodEntry(**{
+        "name": name, "description": description or f"the program {shlex.split(command)[0]}",
+        "module": f"{__name__}:make_program",
+        "options": {"command": command, "seconds": seconds}, "timed": False,
+        "gives_first_frame": True, "static_known": False, "role": "external", **fields,
+    })  # fmt: skip
+
+
+@dataclass
+class Program(Stored):
+    """Roll-out that a program writes when it is asked for."""
+
+    command: str = ""
+    seconds: float = TIME_LIMIT
+    seed: int = 0
+
+    def prepare(self, scene: BuiltScene) -> None:
+        """Remember the scene: the program's own start is no work of the method."""
+        self.scene = scene
+
+    def run(self) -> Trajectory:
+        """Return what the program writes, in a folder that is gone afterwards.
+
+        Raises:
+            RuntimeError: the program fails.
+            WorkerDied: it takes too long.
+            RollOutFileError: what it has written does not belong to the scene.
+        """
+        with tempfile.TemporaryDirectory(prefix="program-") as folder:
+            exported, out, output = (Path(folder) / name for name in ("scene", "out.npz", "said.txt"))
+            exported.mkdir()
+            write_scene_files(exported, self.scene, facts_of(self.scene))
+            places = {"{scene}": str(exported), "{out}": str(out), "{seed}": str(self.seed)}
+            self._execute([_filled(word, places) for word in shlex.split(self.command)], output)
+            if not out.is_file():
+                raise RuntimeError(
+                    f"the program has ended well and has not written {{out}}{_last_line(output)}"
+                )
+            self.path = str(out)
+            super().prepare(self.scene)
+            declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
+        declared_time = {} if declared is None else {"declared_ms": _milliseconds(declared)}
+        provenance = {"method": "program", "changes": list(self.done), **declared_time}
+        return replace(super().run(), provenance=provenance)
+
+    def _execute(self, arguments: list[str], output: Path) -> None:
+        environment = {name: value for name, value in os.environ.items() if name not in OWN_ENVIRONMENT}
+        with output.open("wb") as stream:
+            try:
+                process = subprocess.Popen(
+                    arguments, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment
+                )
+            except OSError as error:
+                raise RuntimeError(f"the program cannot be started: {error}") from None
+            try:
+                status = process.wait(self.seconds)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+                why = f"the program was ended after {self.seconds:g} s{_last_line(output)}"
+                raise WorkerDied(why, "timeout") from None
+        if status:
+            raise RuntimeError(f"the program has ended with status {status}{_last_line(output)}")
+
+
+def _filled(word: str, places: dict[str, str]) -> str:
+    for place, path in places.items():
+        word = word.replace(place, path)
+    return word
+
+
+def _last_line(output: Path) -> str:
+    """Its last line, behind a colon; empty where it has said nothing."""
+    with output.open("rb") as stream:
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - TAIL_BYTES))
+        lines = stream.read().decode("utf-8", "replace").split("\n")
+    last = next((" ".join(line.split()) for line in reversed(lines) if line.strip()), "")
+    return f": {last}" if last else ""
+
+
+def _milliseconds(seconds: np.ndarray) -> float:
+    """Return [ms] of the program's number [s]. Raises ValueError where it is none."""
+    if seconds.size != 1 or not 0.0 < float(seconds.item()) < 1e6:
+        raise ValueError("seconds_per_frame of the program is no positive number of seconds")
+    return 1e3 * float(seconds.item())
+
+
+def make_program(*, models: Path, seed: int, command: str, seconds: float) -> Program:
+    """Make a fresh one; it has no model."""
+    return Program("", FileConventions(), command=command, seconds=seconds, seed=seed)

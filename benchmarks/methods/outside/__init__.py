@@ -1,1 +1,0 @@
-"""Methods from outside: stored roll-outs and programs."""

@@ -1,0 +1,246 @@
+"""Vertex block descent and XPBD: solvers that sweep over a mesh a given number of times.
+
+Sweeps over vertices and over constraints, with the kernels of the terms as arguments.
+
+See reference_sim.kernels.fast_kernels for the kernels.
+
+Vertex block descent (Chen et al. 2024) on the energies of reference_sim.
+
+One sweep visits the free vertices one after the other. Each takes a Newton step of its own three coordinates,
+all others held still:
+
+    x_i <- x_i - H_ii^-1 g_i,    g_i, H_ii: gradient and 3 x 3 block of the whole step's potential
+
+with H_ii made positive definite as in the simulator (compressive stress and the hinge's second derivative
+left out). So it minimises exactly the potential that Newton minimises, and a vertex at rest for all sweeps is
+a stationary point of it. On one core a sweep in the order of the mesh needs no colours. As in the paper there
+is no line search; its guess and its Chebyshev acceleration are left out: all solvers start alike here.
+
+Extended position-based dynamics (Macklin et al. 2016) with constraints whose energies are ours, exactly.
+
+Each element is a constraint C(x) (a vector for the membrane) with energy C . K C / 2:
+
+    strain      C = (G00, G11, G01),  K = A [[l + 2 mu, l, 0], [l, l + 2 mu, 0], [0, 0, 4 mu]], l = lambda
+    bending     C = theta - theta_0,  K = k
+    collision   C = depth^(3/2),      K = 2 k a_s
+
+so the sum over elements is StVK, hinges and the cubic penalty, to the last digit; the weight is in the
+predicted positions x_hat + dt^2 g, where a step starts. A sweep solves one constraint after the other:
+
+    (grad C M^-1 grad C^T + K^-1/dt^2) dlam = -C - K^-1/dt^2 lam,    x += M^-1 grad C^T dlam
+
+What it does not do is find the potential's minimum: the positions keep the gradients of C from where each
+dlam was found, and the second derivatives of C are left out. Its fixed point obeys lam = -dt^2 K C, but the
+momentum equation only as far as grad C did not turn on the way from the prediction. It minimises the
+potential where C is linear in x; elsewhere its limit for many sweeps is another configuration.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.methods.simulation import Simulation
+from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE, step_terms
+from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit, with_types_resolved
+from reference_sim.minimise.descent import Descent, Result, Stop, iterate
+from reference_sim.potential import Potential
+
+RUNAWAY_DISTANCE = 100.0  # [m] from the guess: nowhere
+
+
+class SweepRun(Descent):
+    """State of one minimisation by sweeps; x, value and g stay those of the start until the last one.
+
+    Attributes:
+        swept: (V, 3) [m] positions that the sweeps move in place.
+        sweep: moves them once.
+    """
+
+    swept: np.ndarray
+    sweep: Callable[[], object]
+
+
+class SweepSolver(ABC):
+    """Minimiser that takes `max_iterations` sweeps; a subclass says how they begin and what one does."""
+
+    timeout = float("inf")
+
+    def __init__(self, potential: Potential, *, max_iterations: int) -> None:
+        self.potential, self.max_iterations = potential, max_iterations
+
+    def minimise(self, x0: np.ndarray) -> Result:
+        """Sweep from x0 (V, 3) [m]; the status is "max_iterations" or, where it runs away, "diverged"."""
+        run = SweepRun(self.potential, x0)
+        return run.result(iterate(self, run))
+
+    def start_again(self) -> None:
+        """Do nothing: sweeps learn nothing from step to step."""
+        return
+
+    @abstractmethod
+    def init(self, run: SweepRun) -> Stop | None:
+        """Set `run.swept` and `run.sweep`."""
+
+    def step(self, run: SweepRun) -> Stop | None:
+        """Sweep once."""
+        run.sweep()
+        return None
+
+    def terminate(self, run: SweepRun) -> Stop | None:
+        """Stop after the last sweep, or the one that threw a vertex RUNAWAY_DISTANCE from where it began."""
+        # Written so that NaN is as far.
+        if run.iterations and not (np.abs(run.swept - run.x).max(initial=0.0) < RUNAWAY_DISTANCE):
+            return Stop("diverged", f"sweep {run.iterations} threw a vertex far away")
+        if run.iterations < self.max_iterations:
+            return None
+        run.x = run.swept
+        run.value, run.g = run.evaluate(run.x)
+        return Stop("max_iterations", f"{run.iterations} sweeps done")
+
+
+@njit(cache=True, error_model="numpy")
+def sweep_vertices(x, free, inertia, terms):
+    """Take a Newton step of one free vertex after the other; x (V, 3) [m] is moved in place.
+
+    inertia: m / dt^2 (V,) [N/m], x_hat (V, 3) [m] and weights (V,) [N]. terms: (kernel, data) of each.
+    """
+    g, H = np.empty(3), np.empty((3, 3))
+    scratch, out = np.empty(SCRATCH_SHAPE), np.empty(len(terms))
+    for v in free:
+        block(x, v, inertia, terms, g, H, scratch, out)
+        _newton(x, v, g, H)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def block(x, v, inertia, terms, g, H, scratch, out):
+    """Write the gradient g (3,) and the convex block H (3, 3) of vertex v.
+
+    scratch and out (terms,) are room for the kernels.
+    """
+    mass, x_hat, weight = inertia
+    for i in range(3):
+        g[i] = mass[v] * (x[v, i] - x_hat[v, i])
+        for j in range(3):
+            H[i, j] = mass[v] if i == j else 0.0
+    g[1] += weight[v]
+    call_each(terms, out, x, v, g, H, scratch)
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _newton(x, v, g, H):
+    """Subtract H^-1 g, by the adjugate, from x_v; H is positive definite, for a mass is on its diagonal."""
+    c0 = H[1, 1] * H[2, 2] - H[1, 2] * H[2, 1]
+    c1 = H[1, 2] * H[2, 0] - H[1, 0] * H[2, 2]
+    c2 = H[1, 0] * H[2, 1] - H[1, 1] * H[2, 0]
+    scale = 1.0 / (H[0, 0] * c0 + H[0, 1] * c1 + H[0, 2] * c2)
+    d0 = H[0, 2] * H[2, 1] - H[0, 1] * H[2, 2]
+    d1 = H[0, 0] * H[2, 2] - H[0, 2] * H[2, 0]
+    d2 = H[0, 1] * H[2, 0] - H[0, 0] * H[2, 1]
+    f0 = H[0, 1] * H[1, 2] - H[0, 2] * H[1, 1]
+    f1 = H[0, 2] * H[1, 0] - H[0, 0] * H[1, 2]
+    f2 = H[0, 0] * H[1, 1] - H[0, 1] * H[1, 0]
+    x[v, 0] -= scale * (c0 * g[0] + d0 * g[1] + f0 * g[2])
+    x[v, 1] -= scale * (c1 * g[0] + d1 * g[1] + f1 * g[2])
+    x[v, 2] -= scale * (c2 * g[0] + d2 * g[1] + f2 * g[2])
+
+
+@njit(cache=True, error_model="numpy")
+def sweep_constraints(x, w, terms):
+    """Solve the constraints of one term after the other; x (V, 3) [m] is moved in place.
+
+    w: dt^2 over the mass (V,) [m/N]. terms: (kernel, data) of each.
+    """
+    call_each(terms, np.empty(len(terms)), x, w)
+
+
+class VertexBlockDescent(SweepSolver):
+    """Vertex block descent for one potential.
+
+    Args:
+        potential: the sum of energies.
+        max_iterations: sweeps over all free vertices.
+
+    Raises:
+        ValueError: the potential has a term without a sweep, or no inertia.
+    """
+
+    def __init__(self, potential: Potential, *, max_iterations: int) -> None:
+        super().__init__(potential, max_iterations=max_iterations)
+        self._terms = step_terms(potential, "vertex_block", "vertex block descent")
+        self._free = np.flatnonzero(potential.cloth.free)
+        vertices = potential.cloth.vertex_count
+        self._blocks = [
+            (kernel_argument(blocks.kernel), incidence(blocks.stencils, blocks.used, vertices), blocks.freeze)
+            for blocks in self._terms.kernels
+        ]
+
+    def freeze(self) -> tuple[tuple, tuple]:
+        """Return inertia and the other terms as `sweep_vertices` takes them in this step."""
+        terms, inertia = self._terms, self._terms.inertia
+        return (
+            (inertia.masses / inertia.dt**2, inertia.x_hat, terms.weights),
+            tuple((kernel, (*around, *freeze())) for kernel, around, freeze in self._blocks),
+        )
+
+    def init(self, run: SweepRun) -> Stop | None:
+        """Begin at the guess."""
+        run.swept = run.x.copy()
+        run.sweep = with_types_resolved(sweep_vertices, run.swept, self._free, *self.freeze())
+        return None
+
+
+def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
+    """Find the elements around each vertex among stencils (N, k), by the corners marked used (N, k).
+
+    Returns:
+        first (V + 1,) and corners (M,): corner c of element e is e * k + c, and those of vertex v are
+        corners[first[v] : first[v + 1]].
+    """
+    corners = np.flatnonzero(used)
+    owner = stencils.ravel()[corners]
+    first = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=vertices))])
+    return first, corners[np.argsort(owner, kind="stable")]
+
+
+def make_block_descent(*, models: Path, seed: int, iterations: int) -> Simulation:
+    """Make a simulation whose every step is `iterations` sweeps of vertex block descent."""
+    return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})
+
+
+class XPBD(SweepSolver):
+    """Extended position-based dynamics for one potential, of which it finds no minimum in general.
+
+    Args:
+        potential: the sum of energies.
+        max_iterations: sweeps over all constraints.
+
+    Raises:
+        ValueError: the potential has a term without a sweep, or no inertia.
+    """
+
+    def __init__(self, potential: Potential, *, max_iterations: int) -> None:
+        super().__init__(potential, max_iterations=max_iterations)
+        self._terms = terms = step_terms(potential, "constraint", "XPBD")
+        self._kernels = [kernel_argument(constraints.kernel) for constraints in terms.kernels]
+        masses, dt = terms.inertia.masses, terms.inertia.dt
+        self._inverse = np.where(potential.cloth.free, dt**2 / masses, 0.0)
+
+    def init(self, run: SweepRun) -> Stop | None:
+        """Begin at the predicted positions; of the guess only the pinned vertices are read."""
+        x = self._terms.inertia.x_hat.copy()
+        x[:, 1] -= self._inverse * self._terms.weights
+        pins = self.potential.cloth.pins
+        x[pins] = run.x[pins]
+        frozen = (constraints.freeze() for constraints in self._terms.kernels)
+        terms = tuple(zip(self._kernels, frozen))
+        run.swept, run.sweep = x, with_types_resolved(sweep_constraints, x, self._inverse, terms)
+        return None
+
+
+def make_xpbd(*, models: Path, seed: int, iterations: int) -> Simulation:
+    """Make a simulation whose every step is `iterations` sweeps of XPBD."""
+    return Simulation(options={"method": XPBD, "max_iterations": iterations})

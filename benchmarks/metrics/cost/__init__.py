@@ -1,1 +1,0 @@
-"""Metrics of cost and of training data: cost/*, solver/*, training_distance/*."""

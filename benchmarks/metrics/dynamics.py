@@ -1,0 +1,309 @@
+"""Metrics dynamics/*: the hem of a method against the simulator's. Formulas stand in hem.py.
+
+Dynamics of a hem: does cloth move by itself, or only follow the pose? In the axes of the body's root.
+
+A method's dynamic part is what motion adds to its own static answer:
+
+    D(t, v) = x(t, v) - x_static(t, v),  less its mean over time for each hem vertex v
+
+with x_static the simulator's quasi-static solution of the same frames for a solver, and for a network its
+output once each pose has been held still. Neither the energy gap of a step nor the inertia term shows D: a
+dresser without memory has a small gap from its own history.
+
+    amplitude    rms D / rms D of the simulator
+    correlation  <D, D_sim> / (|D| |D_sim|)
+    gain, lag    g and l of the least-squares fit  s(t) = g s_static(t - l),  s the hem's yaw, or its
+                 displacement where the static hem does not turn
+    ringing      rms distance of the hem to where it ends, frames after the body has stopped
+    spectrum     sum |S - S_sim| / sum S_sim,  S(f) the rms over hem vertices of the acceleration's spectrum
+
+No import of ours: numpy alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.metric import Measurements, Metric
+from benchmarks.metrics.penetration_and_distances import rms
+from snug.body.skeleton import rotation_matrices
+
+if TYPE_CHECKING:
+    from benchmarks.method import MethodEntry
+    from benchmarks.metric import RollOut
+
+Array = np.ndarray
+
+AFTER = (0, 1, 2, 4, 8, 16)  # frames after the stop at which ringing is measured
+HELD = 24  # frames a body must hold still at the end to count as stopped
+TURNING = np.deg2rad(5.0)  # rms static yaw from which on gain and lag are those of the yaw
+SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to be a gain of
+MAX_LAG = 12.0  # frames
+SHORTEST = 8  # frames of which a motion can be said
+NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none
+
+
+def in_root_frame(positions: Array, rotations: Array, origins: Array) -> Array:
+    """Return positions (T,V,3) [m] in the axes of the root: rotations (T,3,3) to world, origins (T,3) [m]."""
+    return np.einsum("tji,tvj->tvi", rotations, positions - origins[:, None])
+
+
+def dynamic_part(moving: Array, static: Array) -> Array:
+    """Return D (T,H,3) [m] of a hem and its quasi-static solution, both (T,H,3) in the root frame."""
+    difference = moving - static
+    return difference - difference.mean(axis=0)
+
+
+def root_mean_square(part: Array) -> float:
+    """Return the square root of the mean squared length of vectors (T,H,3)."""
+    return float(np.sqrt((part**2).sum(axis=-1).mean()))
+
+
+def amplitude(part: Array, reference: Array) -> float:
+    """Return the rms of D (T,H,3) over that of the reference's; nan where the reference has none.
+
+    >>> import numpy as np
+    >>> amplitude(np.full((2, 1, 3), 0.01), np.full((2, 1, 3), 0.02))
+    0.5
+    """
+    if root_mean_square(reference) < NO_MOTION:
+        return float("nan")
+    return root_mean_square(part) / root_mean_square(reference)
+
+
+def correlation(part: Array, reference: Array) -> float:
+    """Return the cosine between D (T,H,3) and the reference's, as vectors; nan where one is zero."""
+    if min(root_mean_square(part), root_mean_square(reference)) < NO_MOTION:
+        return float("nan")
+    return float(np.vdot(part, reference) / (np.linalg.norm(part) * np.linalg.norm(reference)))
+
+
+def hem_yaw(hem: Array, axes: Array) -> Array:
+    """Return the turn (T,) [rad] of a hem about the vertical since frame 0: best rotation of its shape.
+
+    hem: (T,H,3) in the root's axes; axes: (T,3,3) root to world.
+    """
+    world = np.einsum("tij,tvj->tvi", axes, hem)
+    flat = (world - world.mean(axis=1, keepdims=True))[..., [2, 0]]  # z, x: the yaw is positive from z to x
+    z = flat[..., 0] + 1j * flat[..., 1]
+    # The rotation about the centroid nearest to frame 0's shape in the sense of least squares.
+    return np.unwrap(np.angle((z * z[0].conj()).sum(axis=1)))
+
+
+def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
+    """Return g and l [frames] for which g static(t - l) fits moving(t), both (T,) less their means.
+
+    Lags within MAX_LAG are tried in hundredths of a frame by linear interpolation; before its first frame a
+    signal rests. Where no lag has a gain above 0, as of a hem that rests, the gain is 0 and the lag nan.
+    """
+    frames = np.arange(len(static), dtype=np.float64)
+    moving = moving - moving.mean()
+    best = (np.inf, 0.0, float("nan"))
+    for lag in np.arange(-100 * MAX_LAG, 100 * MAX_LAG + 1) / 100:
+        shifted = np.interp(frames - lag, frames, static)
+        shifted = shifted - shifted.mean()
+        power = float(shifted @ shifted)
+        if power == 0:
+            continue
+        gain = float(moving @ shifted) / power
+        left = float(((moving - gain * shifted) ** 2).sum())
+        if gain > 0 and left < best[0]:
+            best = (left, gain, float(lag))
+    return best[1], best[2]
+
+
+def response(moving: Array, static: Array, axes: Array) -> tuple[float, float]:
+    """Return gain and lag [frames] of a hem (T,H,3) to its quasi-static one; nan where that rests."""
+    turn = hem_yaw(static, axes)
+    if turn.std() >= TURNING:
+        return gain_and_lag(hem_yaw(moving, axes), turn)
+    centre = static.mean(axis=1)
+    centre = centre - centre.mean(axis=0)
+    if np.sqrt((centre**2).sum(axis=1).mean()) < SHIFTING:
+        return float("nan"), float("nan")
+    along = np.linalg.svd(centre, full_matrices=False)[2][0]
+    return gain_and_lag(moving.mean(axis=1) @ along, centre @ along)
+
+
+def stop_frame(poses: Array, translations: Array) -> int | None:
+    """Return the last frame of a body that then holds still for HELD frames, or None."""
+    still = np.all(poses == poses[-1], axis=tuple(range(1, poses.ndim)))
+    still &= np.all(translations == translations[-1], axis=1)
+    first = len(still) - int(np.argmin(still[::-1])) if not still.all() else 0
+    return first if first > 0 and len(still) - first > HELD else None
+
+
+def ringing(hem: Array, stop: int) -> Array:
+    """Return rms distances (6,) [m] of a hem (T,H,3), in the root frame, to its last, AFTER frames on."""
+    away = hem[[stop + after for after in AFTER]] - hem[-1]
+    return np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
+
+
+def acceleration_spectrum(hem: Array, dt: float) -> Array:
+    """Return S(f) of a hem (T,H,3): rms over vertices of its acceleration's amplitude, Hann window."""
+    acceleration = np.diff(hem, n=2, axis=0) / dt**2
+    window = np.hanning(len(acceleration) + 2)[1:-1, None, None]
+    amplitudes = np.abs(np.fft.rfft(window * acceleration, axis=0))
+    return np.sqrt((amplitudes**2).sum(axis=-1).mean(axis=-1))
+
+
+def spectrum_distance(hem: Array, reference: Array, dt: float) -> float:
+    """Return sum |S - S_ref| / sum S_ref of two hems (T,H,3) over the same frames."""
+    ours, theirs = acceleration_spectrum(hem, dt), acceleration_spectrum(reference, dt)
+    return float(np.abs(ours - theirs).sum() / theirs.sum()) if theirs.any() else float("nan")
+
+
+@dataclass(frozen=True)
+class HemMotion:
+    """Frame of reference of dynamics: the body's root, when it stops, and the simulator's two answers.
+
+    axes: (T,3,3) root to world; origins: (T,3) [m]; stop: frame or None; hem: vertices (H,); simulated and
+    quasi_static: the simulator's positions (T,V,3) [m], world; dt [s]; first: frame that is judged.
+    """
+
+    axes: Array
+    origins: Array
+    stop: int | None
+    hem: Array
+    simulated: Array
+    quasi_static: Array
+    dt: float
+    first: int = 0
+
+    def of(self, positions: Array) -> Array:
+        """Return the hem (T,H,3) in the root frame of positions (T,V,3) [m]."""
+        frames = len(positions)
+        return in_root_frame(positions[:, self.hem], self.axes[:frames], self.origins[:frames])
+
+    def curves(self, positions: Array) -> dict[str, Array]:
+        """Return curves over time: yaw of the hem against the root [rad], its rms distance to its end [m]."""
+        hem = self.of(positions)
+        # In the root's own axes the root does not turn: what is left is the hem's lead and overshoot.
+        root = np.broadcast_to(np.eye(3), (len(hem), 3, 3))
+        away = np.sqrt(((hem - hem[-1]) ** 2).sum(axis=-1).mean(axis=-1))
+        return {"hem/yaw": hem_yaw(hem, root), "hem/from_end": away}
+
+    def measure(self, positions: Array, static: Array | None = None) -> dict[str, float]:
+        """Return every dynamic metric of positions (T,V,3), [1], [frames] or [mm]; undefined ones left out.
+
+        static: (T,V,3), the method's own answer to poses held still; None takes the simulator's.
+        """
+        last = min(len(positions), len(self.simulated), len(self.quasi_static))
+        if last - self.first < SHORTEST:
+            return {}
+        judged = slice(self.first, last)
+        moving, simulated = self.of(positions[:last])[judged], self.of(self.simulated[:last])[judged]
+        quiet = self.of(self.quasi_static[:last])[judged]
+        still = quiet if static is None else self.of(static[:last])[judged]
+        part, reference = dynamic_part(moving, still), dynamic_part(simulated, quiet)
+        gain, lag = response(moving, still, self.axes[judged])
+        values = {
+            "dynamics/amplitude": amplitude(part, reference),
+            "dynamics/correlation": correlation(part, reference),
+            "dynamics/gain": gain,
+            "dynamics/lag": lag,
+            "dynamics/spectrum": spectrum_distance(moving, simulated, self.dt),
+        }
+        if self.stop is not None and self.first <= self.stop < last - AFTER[-1]:
+            distances = 1e3 * ringing(moving, self.stop - self.first)
+            values["dynamics/ringing"] = float(distances.mean())
+            values |= {f"dynamics/ringing/{after}": float(d) for after, d in zip(AFTER, distances)}
+        return {name: value for name, value in values.items() if np.isfinite(value)}
+
+
+def _dynamics(name: str, unit: str, title: str, definition: str, table: str = "dynamics") -> Metric:
+    return Metric(name=f"dynamics/{name}", unit=unit, title=title, definition=definition, table=table)
+
+
+COMMON = ("amplitude", "correlation", "gain", "lag")
+
+DYNAMICS_METRICS = (
+    _dynamics("quasi_static_difference", "mm", "From quasi-static",
+              "root mean square distance to the method's own answer to each pose held still"),
+    _dynamics("amplitude", "1", "Hem amplitude",
+              "amplitude of the hem's dynamic part over that of the simulation's; the "
+              "dynamic part is what motion adds to the own answer to poses held still"),
+    _dynamics("correlation", "1", "Correlation", "cosine between the two dynamic parts"),
+    _dynamics("gain", "1", "Gain", "factor by which the hem answers its own quasi-static turn or shift"),
+    _dynamics("lag", "frames", "Lag", "frames by which it comes later"),
+    *(_dynamics(f"common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
+                f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to "
+                "poses held still", table="dynamics" if name in COMMON[:2] else "")
+      for name, title in zip(COMMON, ("Hem amplitude", "Correlation", "Gain", "Lag"))),
+    _dynamics("ringing", "mm", "Ringing", "distance of the hem to where it ends, after the body has stopped"),
+    *(_dynamics(f"ringing/{after}", "mm", f"Ringing, {after} frames",
+                f"the same {after} frames after the stop", table="") for after in AFTER),
+    _dynamics("spectrum", "1", "Spectrum", "difference of the hem's acceleration spectrum from the "
+              "simulation's, as a share of the latter"),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the distance to the quasi-static solution [mm] and, for the reference, its own dynamics."""
+    x, group = roll_out.positions, roll_out.group
+    static = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
+    values: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
+    if static is not None:
+        frames = roll_out.judged_beside(static)
+        values["dynamics/quasi_static_difference"] = rms(x[frames], static[frames])
+    return values
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """Return dynamics by the method's own quasi-static solution and, as common_*, by the simulator's.
+
+    Without a quasi-static solution of its own the numbers are left out that it enters.
+    """
+    hem, x, static = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
+    if hem is None:
+        return {}
+    values: dict[str, float] = {}
+    common = hem.measure(x)
+    if static is None:
+        shared = shares_quasi_static(roll_out.entry)
+        values |= {n: v for n, v in common.items() if shared or n.removeprefix("dynamics/") not in COMMON}
+    elif len(static) >= len(x) and np.isfinite(static).all():
+        values |= hem.measure(x, static)
+    return values | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
+                    if f"dynamics/{name}" in common}  # fmt: skip
+
+
+def shares_quasi_static(entry: MethodEntry) -> bool:
+    """Return whether the simulation's quasi-static solution is the method's too, where it returns none.
+
+    It is that of solvers that minimise the reference's potential from their last frame; not of another
+    material, of a network, or of a method that says nothing of itself.
+    """
+    return entry.static_known and entry.role in ("reference", "reference-variant", "solver")
+
+
+def series(roll_out: RollOut) -> dict[str, np.ndarray]:
+    """Return curves of the hem to be drawn over time."""
+    reference = roll_out.group.reference
+    hem = None if reference is None else reference.kept(hem_motion)
+    return {} if hem is None else hem.curves(roll_out.positions)
+
+
+def hem_motion(reference: RollOut) -> HemMotion | None:
+    """Return the frame of reference of the scene's hems; None without a body or a quasi-static solution."""
+    group, dressed = reference.group, reference.scene.dressed
+    if dressed is None or group.quasi_static is None:
+        return None
+
+    motion = dressed.motion
+    return HemMotion(
+        axes=rotation_matrices(motion.poses[:, 0]),
+        origins=dressed.pelvis,
+        stop=stop_frame(motion.poses, motion.translations),
+        hem=dressed.garment.hem,
+        simulated=reference.positions,
+        quasi_static=group.quasi_static,
+        dt=group.scene.dt,
+        first=group.scene.warm_up,
+    )
+
+
+DYNAMICS = Measurements("dynamics", DYNAMICS_METRICS, measure=measure, compare=compare, series=series)

@@ -1,1 +1,0 @@
-"""Metrics of energy: energy/*, excess/*, gap/*, step/* and gradient/norm."""

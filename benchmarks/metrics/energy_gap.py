@@ -1,0 +1,262 @@
+"""Metrics gap/*, step/* and gradient/norm: how far a frame is from the minimum of its own time step.
+
+At frame t the step's objective is Phi(x) = inertia + all declared terms, with x_hat from the method's own
+two previous frames and contact planes frozen at the step's initial guess x_0 (the same guess as the
+simulator's: carried by the obstacle, else x + dt v). Phi* is the lowest value found by the simulator's
+minimiser, L-BFGS and then Newton, from x_0 and from x_t itself. A step has several minima; y_t is the one
+found from x_t, the one that lies below the frame. Over the judged frames
+
+    gap        mean of Phi(x_t) - Phi* [J]
+    local      mean of Phi(x_t) - Phi(y_t) [J]
+    relative   gap / scale,  scale = mean of Phi(x_s) - Phi(x_r) over steps of the reference simulation x_r
+    refrozen   the local gap where planes are frozen at x_t instead: what depends on where they are frozen
+    distance   mean of the root mean square distance of vertices between x_t and y_t [mm]
+    curvature  mean of |H(x_t) - H(y_t)| by the areas of y_t [1/m]
+    norm       mean of the largest component of grad Phi(x_t), in mean vertex weights
+
+x_s is the garment skinned to the frame's pose or, where there is no body, the guess x_0. The scale is the
+same for every method of a scene. Each method is judged from its own history, which a chaotic roll-out cannot
+blur: a small gap says that a step was solved, not that the past was right; it does not measure dynamics.
+
+All judged frames are looked at or, of more than the preset's `gap_samples`, as many, evenly spread, as
+bring the standard error of the gap below PRECISION of it, or below NEGLIGIBLE of the scale; that error is the
+uncertainty of its row. Planes are frozen at the frame in the first `gap_samples` of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Estimate, Measurements, Metric, skinned
+from benchmarks.metrics.curvature import boundary_mask, mean_curvature
+from benchmarks.metrics.energy import copied_terms, freeze_step
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut, SceneRollOuts
+    from benchmarks.scene import BuiltScene
+    from reference_sim.potential import Potential
+
+Floats = NDArray[np.float64]
+
+SUITES = ("speed",)  # each sampled frame is two minimisations or three
+
+ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
+FINDERS = {
+    "simulator": "by a solve as the simulator does it", "from_frame": "by descending from the frame",
+    "frame": "at the frame itself",
+}  # fmt: skip
+SAME_MINIMUM = 1e-9  # of the scale: minima this near are one
+PRECISION = 0.1  # standard error of the gap, as a share of it
+NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
+MM = 1e3
+MEANS = (
+    "gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curvature", "gradient/norm",
+)  # fmt: skip
+
+_metric_gap = partial(Metric, lower_is_better=True)
+
+GAP_METRICS = (
+    _metric_gap(name="gap/energy", unit="J", title="Energy gap", table="speed",
+            definition="how far frames lie above the lowest minimum found of their own time step, mean over "
+            "frames"),
+    _metric_gap(name="gap/relative", unit="1", title="Relative energy gap", table="speed",
+            definition="the same over what skinning, or the first guess, lies above the steps of the "
+            "simulation: one scale a scene, the same for all methods"),
+    Metric(name="gap/scale", unit="J", title="Scale of the gap",
+           definition="that scale: what skinning, or the first guess, lies above the steps of the "
+           "simulation"),
+    _metric_gap(name="gap/local", unit="J", title="Local gap",
+            definition="how far frames lie above the minimum below the frame itself"),
+    _metric_gap(name="gap/refrozen", unit="J", title="Refrozen gap", table="speed",
+            definition="how far frames lie above the minimum below them where contact planes are searched at "
+            "the frame instead of the step's first guess"),
+    _metric_gap(name="step/distance", unit="mm", title="One-step distance", table="speed",
+            definition="root mean square distance of vertices between a frame and the minimum of its own "
+            "time step that lies below it, mean over frames"),
+    _metric_gap(name="step/curvature", unit="1/m", title="One-step curvature error", table="speed",
+            definition="|H - H_min| of the same vertices between a frame and that minimum, mean by its "
+            "areas"),
+    _metric_gap(name="gradient/norm", unit="1", title="Gradient", table="speed",
+            definition="largest component of the gradient left in a step, in mean vertex weights"),
+    *(Metric(name=f"gap/found_by_{finder}", unit="frames", title=f"Found by {finder.replace('_', ' ')}",
+             definition=f"sampled frames whose lowest minimum was found {how}")
+      for finder, how in FINDERS.items()),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
+    """Return gaps, one-step distances and the gradient left, of the sampled frames."""
+    group = roll_out.group
+    scale = group.kept(gap_scale)
+    values: dict[str, float | Estimate] = {}
+    values |= roll_out.kept(_judge_steps).metrics()
+    if scale is None or not values:
+        return values
+    gap = values["gap/energy"]
+    assert isinstance(gap, Estimate)
+    if scale > 0.0:
+        values["gap/relative"] = Estimate(gap.value / scale, gap.uncertainty / scale)
+    return values | ({"gap/scale": scale} if roll_out is group.reference else {})
+
+
+def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
+    """Return step/vertices (T,V) [mm]: distance of each vertex to y_t; nan in other than sampled frames."""
+    away = roll_out.kept(_judge_steps).away
+    shown = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
+    for frame, distances in away.items():
+        shown[frame] = distances
+    return {"step/vertices": shown} if away else {}
+
+
+def _judge_steps(roll_out: RollOut) -> Optimality:
+    group = roll_out.group
+    scale = group.kept(gap_scale)
+    return optimality(roll_out.scene, roll_out.positions, samples=group.gap_samples, scale=scale)
+
+
+def gap_scale(group: SceneRollOuts) -> float | None:
+    """Return the scale [J] of the scene; None without a reference that has an evaluated frame."""
+    reference = group.reference
+    frames = [] if reference is None else list(_judged(group.scene, reference.positions))
+    if reference is None or not frames:
+        return None
+    potential, bare = _potential(group.scene), group.kept(skinned)
+    above = []
+    for frame in frames:
+        guess = freeze_step(group.scene, potential, reference.positions, frame)
+        start = guess if bare is None else np.ascontiguousarray(bare[frame])
+        here = np.ascontiguousarray(reference.positions[frame])
+        above.append(potential.value(start) - potential.value(here))
+    return float(np.mean(above))
+
+
+@dataclass
+class Optimality:
+    """Numbers of the sampled frames, of `judged` in all.
+
+    values: of each of MEANS, gap/refrozen at the first of these frames alone. found_by: number of frames
+    whose lowest minimum each found; of equals the first in FINDERS. away: frame -> (V,) [mm] from y_t.
+    """
+
+    judged: int = 0
+    values: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in MEANS})
+    found_by: dict[str, int] = field(default_factory=lambda: dict.fromkeys(FINDERS, 0))
+    away: dict[int, Floats] = field(default_factory=dict)
+
+    def estimate(self, values: list[float]) -> Estimate:
+        """Return the mean and its standard error as a sample of the judged frames; 0 for all of them."""
+        count = len(values)
+        if count >= self.judged:
+            return Estimate(float(np.mean(values)), 0.0)
+        left = 1.0 - count / self.judged  # correction for a finite population
+        error = float(np.std(values, ddof=1)) * np.sqrt(left / count) if count > 1 else float("nan")
+        return Estimate(float(np.mean(values)), float(error))
+
+    def metrics(self) -> dict[str, float | Estimate]:
+        """Return gap/*, step/* and gradient/norm; empty without a frame."""
+        if not self.values["gap/energy"]:
+            return {}
+        means: dict[str, float | Estimate] = {name: self.estimate(v) for name, v in self.values.items() if v}
+        return means | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
+
+    def precise(self, scale: float) -> bool:
+        """Return whether the standard error of the gap is small enough."""
+        gap = self.estimate(self.values["gap/energy"])
+        return gap.uncertainty <= max(PRECISION * abs(gap.value), NEGLIGIBLE * scale)
+
+
+def optimality(
+    scene: BuiltScene, positions: Floats, *, samples: int, scale: float | None = None
+) -> Optimality:
+    """Solve the time steps of at least `samples` frames again and compare, as the module says.
+
+    Args:
+        scene: its terms and its step.
+        positions: (T,V,3) [m] of a roll-out.
+        samples: number of frames; more are solved until the gap is precise.
+        scale: [J] of the scene's gaps.
+
+    Returns:
+        The numbers of each sampled frame; nan where a frame has no finite energy.
+    """
+    from reference_sim.minimise.descent import mean_weight
+    from reference_sim.minimise.lbfgs import LBFGS  # loads numba
+
+    if scale is not None and not scale > 0.0:  # the reference lies above the first guess, or has no energy
+        scale = None
+    frames = _judged(scene, positions)
+    numbers, potential = Optimality(judged=len(frames)), _potential(scene)
+    values = numbers.values
+    minimiser = LBFGS(potential, max_iterations=ITERATIONS)
+    inner = ~boundary_mask(scene.cloth.faces, scene.cloth.vertex_count)
+    for frame in spread_evenly(frames):
+        x = np.ascontiguousarray(positions[frame])
+        guess = freeze_step(scene, potential, positions, frame)
+        here, gradient = potential.value_and_gradient(x)
+        if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
+            numbers.values = {name: [np.nan] for name in ("gap/energy", "gap/local", "gradient/norm")}
+            numbers.away = {}
+            return numbers
+        below = minimiser.minimise(x)
+        energies = {"simulator": minimiser.minimise(guess).energy, "from_frame": below.energy, "frame": here}
+        # A guess that has no energy, as of a garment that collapsed a frame ago, leads nowhere.
+        best = min(energy for energy in energies.values() if np.isfinite(energy))
+        alike = SAME_MINIMUM * (scale or abs(here))
+        numbers.found_by[next(name for name in FINDERS if energies[name] <= best + alike)] += 1
+        values["gap/energy"].append(here - best)
+        values["gap/local"].append(here - min(here, below.energy))
+        largest = float(np.abs(gradient[scene.cloth.free]).max())
+        values["gradient/norm"].append(largest / mean_weight(potential))
+        y = below.positions
+        numbers.away[frame] = MM * np.linalg.norm(x - y, axis=1)
+        values["step/distance"].append(float(np.sqrt((numbers.away[frame] ** 2).mean())))
+        if inner.any():
+            values["step/curvature"].append(_curvature_error(x, y, scene.cloth.faces, inner))
+        if scene.obstacle is not None and len(values["gap/refrozen"]) < samples:
+            freeze_step(scene, potential, positions, frame, guess=x)
+            again = potential.value(x)
+            values["gap/refrozen"].append(again - min(again, minimiser.minimise(x).energy))
+        if len(values["gap/energy"]) >= samples and numbers.precise(scale or 0.0):
+            break
+    return numbers
+
+
+def _judged(scene: BuiltScene, positions: Floats) -> range:
+    """Return the frames that are evaluated; none where a frame is not one time step."""
+    return range(scene.warm_up, len(positions) if scene.substeps == 1 else 0)
+
+
+def _potential(scene: BuiltScene) -> Potential:
+    from reference_sim.potential import Potential  # loads numba
+
+    return Potential(copied_terms(scene))
+
+
+def spread_evenly(frames: range) -> Iterator[int]:
+    """Yield all of the frames, in an order whose every beginning is spread evenly: halves, quarters.
+
+    >>> list(spread_evenly(range(2, 10)))
+    [2, 6, 4, 8, 3, 7, 5, 9]
+    """
+    count = len(frames)
+    bits = max(count - 1, 1).bit_length()
+    for place in range(1 << bits):
+        turned = int(f"{place:0{bits}b}"[::-1], 2)  # the bits in reverse: van der Corput's sequence
+        if turned < count:
+            yield frames[turned]
+
+
+def _curvature_error(x: Floats, y: Floats, faces: NDArray[np.int64], inner: NDArray[np.bool_]) -> float:
+    """Return the mean of |H(x) - H(y)| [1/m] over inner vertices, by the areas of y (V,3) [m]."""
+    ours, _ = mean_curvature(x, faces)
+    theirs, areas = mean_curvature(y, faces)
+    return float(np.average(np.abs(ours - theirs)[inner], weights=areas[inner]))
+
+
+GAP = Measurements("optimality", GAP_METRICS, measure=measure, series=series, suites=SUITES)

@@ -1,1 +1,0 @@
-"""Metrics of motion over time: dynamics/*, conservation/*, exact/*, time_error/*, roll_out/*."""

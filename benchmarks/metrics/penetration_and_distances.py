@@ -1,0 +1,223 @@
+"""Metrics distance/*, penetration/* and drift/hem: distances between surfaces and into the body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Measurements, Metric
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut, SceneRollOuts
+    from reference_sim.obstacle import Obstacle
+
+Floats = NDArray[np.float64]
+
+MM = 1e3
+DEEP = 5e-3  # [m] below the skin: what an eye sees
+
+_metric_geometry = partial(Metric, table="penetration", lower_is_better=True)
+
+GEOMETRY_METRICS = (
+    _metric_geometry(name="distance/rms", unit="mm", title="Distance",
+            definition="root mean square distance between the same vertices of method and simulation"),
+    _metric_geometry(name="distance/p95", unit="mm", title="95 %",
+            definition="95 % of these distances are smaller"),
+    _metric_geometry(name="penetration/vertices", unit="%", title="Penetration",
+            definition="vertices inside the body, none left out, mean over frames"),
+    _metric_geometry(name="penetration/surface", unit="%", title="Surface inside",
+            definition="share of the cloth's area inside the body, at vertices, midpoints of edges and "
+            "centroids, mean over frames"),
+    _metric_geometry(name="penetration/deep", unit="%", title="Deep",
+            definition="vertices more than 5 mm inside the body"),
+    _metric_geometry(name="penetration/depth_p99", unit="mm", title="Depth, 99 %", table="",
+            definition="99 % of all vertices and frames are less deep; 0 outside"),
+    _metric_geometry(name="penetration/own_part_p999", unit="mm", title="Own part, 99.9 %",
+            definition="99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold "
+            "of a hip does not count"),
+    _metric_geometry(name="drift/hem", unit="mm", title="Hem drift", lower_is_better=None,
+            definition="how far the hem's mean height above the pelvis has risen from the first evaluated "
+            "frame to the last"),
+)  # fmt: skip
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """Return distances [mm] of the same vertices to the reference's."""
+    frames = roll_out.judged_beside(reference.positions)
+    x, y = roll_out.positions[frames], reference.positions[frames]
+    return {
+        "distance/rms": rms(x, y),
+        "distance/p95": MM * float(np.percentile(np.linalg.norm(x - y, axis=2), 95)),
+    }
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return penetration into the obstacle, and the drift of the hem on a body."""
+    scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
+    if scene.obstacle is None:
+        return {}
+    part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
+    values = penetration_values(inside_of(roll_out), judged) | {
+        "penetration/own_part_p999": MM * float(np.percentile(part_depth, 99.9)),
+    }
+    if scene.dressed is not None and scene.origin_heights is not None:
+        heights = scene.origin_heights[: len(x)][judged]
+        values["drift/hem"] = MM * hem_drift(x[judged], scene.dressed.garment.hem, heights)
+    return values
+
+
+def penetration_values(inside: Penetration, judged: slice) -> dict[str, float]:
+    """Return shares [%] of vertices and area inside an obstacle and depth [mm] over the evaluated frames."""
+    depth = inside.depth[judged]
+    return {
+        "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
+        "penetration/surface": 100.0 * float(inside.area[judged].mean()),
+        "penetration/deep": 100.0 * float((depth > DEEP).mean()),
+        "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
+    }
+
+
+def inside_of(roll_out: RollOut) -> Penetration:
+    """Return the penetration of a roll-out; computed for all roll-outs of the scene at once."""
+    return roll_out.group.kept(_of_all)[roll_out.place]
+
+
+def _of_all(group: SceneRollOuts) -> list[Penetration]:
+    assert group.scene.obstacle is not None
+    faces = [roll_out.trajectory.faces for roll_out in group.roll_outs]
+    return penetration(group.positions, faces, group.scene.obstacle)
+
+
+def rms(x: Floats, y: Floats) -> float:
+    """Return the root mean square distance [mm] between vertices of x and y (T,V,3) [m], over all frames.
+
+    >>> import numpy as np
+    >>> rms(np.zeros((2, 4, 3)), np.full((2, 4, 3), [0.003, 0.0, 0.004]))
+    5.0
+    """
+    return MM * float(np.sqrt((distance_rms(x, y) ** 2).mean()))
+
+
+def distance_rms(positions: Floats, reference: Floats) -> Floats:
+    """Return the root mean square distance between the same vertices of each frame, (T,) [m].
+
+    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read this
+    beside the spread between two references, never alone.
+    """
+    return np.sqrt(((positions - reference) ** 2).sum(2).mean(1))
+
+
+@dataclass(frozen=True)
+class Penetration:
+    """Penetration per frame, with nothing left out: shares of vertices and of area, and depth (0 outside)."""
+
+    share: Floats  # (T,) of the vertices [1]
+    depth: Floats  # (T,V) [m]
+    area: Floats  # (T,) share of the area [1]
+
+
+class SurfaceSamples:
+    """Points of a triangle mesh whose weights give integrals over its area.
+
+    The seven-point rule of degree 3 for triangles: vertices, midpoints of edges and centroid have weights of
+    1/20, 2/15 and 9/20 of a triangle's area, and integrals of cubic polynomials are exact.
+
+    Args:
+        faces: (F,3).
+
+    >>> import numpy as np
+    >>> x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> samples = SurfaceSamples(np.array([[0, 2, 1]]))
+    >>> samples.points(x).shape, round(float(samples.weights(x) @ samples.points(x)[:, 0] ** 3), 12)
+    ((7, 3), 0.05)
+    """
+
+    def __init__(self, faces: NDArray[np.int64]) -> None:
+        self.faces = faces
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        self.edges, places = np.unique(sides, axis=0, return_inverse=True)
+        self.edges_of_faces = places.reshape(-1, 3)
+
+    def points(self, x: Floats) -> Floats:
+        """Return vertices, midpoints of edges and centroids (V+E+F,3) [m] of positions (V,3)."""
+        return np.concatenate([x, x[self.edges].mean(axis=1), x[self.faces].mean(axis=1)])
+
+    def weights(self, x: Floats) -> Floats:
+        """Return the weight [m^2] of each of these points (V+E+F,); their sum is the area."""
+        sides = x[self.faces[:, 1:]] - x[self.faces[:, :1]]
+        areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        of_vertices = np.bincount(self.faces.ravel(), np.repeat(areas / 20.0, 3), len(x))
+        of_edges = np.bincount(self.edges_of_faces.ravel(), np.repeat(areas * 2.0 / 15.0, 3), len(self.edges))
+        return np.concatenate([of_vertices, of_edges, 0.45 * areas])
+
+
+def penetration(
+    trajectories: Sequence[Floats], faces: Sequence[NDArray[np.int64]], obstacle: Obstacle
+) -> list[Penetration]:
+    """Return how far each trajectory lies in the obstacle, by its signed distance.
+
+    All trajectories are asked about together at each frame: the obstacle's search tree is made once.
+
+    Args:
+        trajectories: positions (T,V,3) [m] each.
+        faces: (F,3) each.
+        obstacle: with a signed distance, as a body.
+    """
+    samples = [SurfaceSamples(each) for each in faces]
+    penetrations = [
+        Penetration(share=np.empty(len(x)), depth=np.empty(x.shape[:2]), area=np.empty(len(x)))
+        for x in trajectories
+    ]
+    for frame in range(max(map(len, trajectories), default=0)):
+        present = [k for k, positions in enumerate(trajectories) if frame < len(positions)]
+        points = [samples[k].points(trajectories[k][frame]) for k in present]
+        distances = np.asarray(obstacle.signed_distance(np.concatenate(points), frame))
+        for k, distance in zip(present, np.split(distances, np.cumsum([len(each) for each in points])[:-1])):
+            x, inside = trajectories[k][frame], distance < 0.0
+            weights = samples[k].weights(x)
+            penetrations[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])
+            penetrations[k].share[frame] = inside[: len(x)].mean()
+            # Of a cloth drawn together to a point nothing is inside or outside by area.
+            penetrations[k].area[frame] = weights @ inside / max(weights.sum(), np.finfo(float).tiny)
+    return penetrations
+
+
+def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats) -> Floats:
+    """Return the depth of each vertex under the part of the body that it belongs to, (T,V) [m].
+
+    The true signed distance also counts cloth in the fold of a hip or between arm and chest, which no eye
+    sees; this one measures against the faces near a vertex's own rest position alone.
+
+    Args:
+        positions: (T,V,3) [m].
+        obstacle: the body.
+        rest_positions: (V,3) [m] of the garment.
+    """
+    depth = np.empty(positions.shape[:2])
+    for frame, x in enumerate(positions):
+        planes = obstacle.planes(np.ascontiguousarray(x), frame, rest_positions)
+        gap = np.einsum("vi,vi->v", planes.normals, x - planes.points)
+        depth[frame] = np.maximum(0.0, -gap)
+    return depth
+
+
+def hem_drift(positions: Floats, hem: NDArray[np.int64], origin_heights: Floats) -> float:
+    """Return how far the hem's mean height above the pelvis rose from the first frame to the last [m].
+
+    A shirt that crept up stays up.
+
+    Args:
+        positions: (T,V,3) [m].
+        hem: (H,) vertices.
+        origin_heights: (T,) [m] of the pelvis.
+    """
+    heights = positions[:, hem, 1].mean(1) - origin_heights[: len(positions)]
+    return float(heights[-1] - heights[0])
+
+
+GEOMETRY = Measurements("geometry", GEOMETRY_METRICS, measure=measure, compare=compare)

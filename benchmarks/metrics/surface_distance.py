@@ -1,0 +1,120 @@
+"""Metrics surface/*: a roll-out against the reference as surfaces, whatever their vertices and triangles.
+
+With d the distance from a vertex to the nearest point of the other surface, and theta the angle between the
+normals there, both weighted by a third of the triangles around the vertex,
+
+    Chamfer distance   (mean of d from A to B + mean of d from B to A) / 2                        [mm]
+    angle of normals   the same of theta                                                          [degrees]
+
+(Cignoni, Rocchini and Scopigno 1998 for distances from samples to a surface, taken both ways.) They are blind
+to cloth that slides along itself. What moves on another mesh than the scene's has these numbers and its
+penetration alone: energies, curvature errors and distances are of the same vertices.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metric import Measurements, Metric
+from benchmarks.metrics.penetration_and_distances import MM, penetration, penetration_values
+from reference_sim.geometry.topology import triangle_areas
+
+if TYPE_CHECKING:
+    from benchmarks.metric import RollOut
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
+LOST = 1e6  # [m] from the origin: a vertex so far off is on no surface, and its square may overflow
+
+_metric_surface = partial(Metric, table="surface", lower_is_better=True)
+
+SURFACE_METRICS = (
+    _metric_surface(name="surface/chamfer", unit="mm", title="Chamfer",
+            definition="mean distance from vertices to the nearest point of the reference's surface and from "
+            "its vertices back, by area, mean of both ways and of 12 evaluated frames"),
+    _metric_surface(name="surface/normals", unit="deg", title="Normals",
+            definition="angle between the normals of the two surfaces at these nearest points, mean as "
+            "above"),
+)  # fmt: skip
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return penetration into the obstacle for a roll-out of another mesh; others have it elsewhere."""
+    obstacle = roll_out.scene.obstacle
+    if obstacle is None or not roll_out.entry.other_mesh:
+        return {}
+    (inside,) = penetration([roll_out.positions], [roll_out.trajectory.faces], obstacle)
+    return penetration_values(inside, roll_out.judged)
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """Return Chamfer distance [mm] and angle of normals [degrees] to the reference.
+
+    Empty of a cloth that is lost, or has no area in some frame.
+    """
+    common = roll_out.judged_beside(reference.positions)
+    x, y = roll_out.positions[common], reference.positions[common]
+    if not len(x) or np.abs(x).max() > LOST:
+        return {}
+    faces, others = roll_out.trajectory.faces, reference.trajectory.faces
+    if not all(triangle_areas(frame, faces).any() for frame in x):
+        return {}
+    sampled = np.unique(np.linspace(0, len(x) - 1, SAMPLED_FRAMES).round().astype(int))
+    measures = [chamfer_and_angle(x[frame], faces, y[frame], others) for frame in sampled]
+    distance, angle = np.mean(measures, axis=0)
+    return {"surface/chamfer": MM * float(distance), "surface/normals": float(np.rad2deg(angle))}
+
+
+def chamfer_and_angle(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[float, float]:
+    """Return Chamfer distance [m] and mean angle of normals [rad] between two surfaces.
+
+    Args:
+        x: (V,3) [m].
+        faces: (F,3), outward.
+        y: (W,3) [m].
+        others: (G,3), outward.
+
+    >>> from benchmarks.meshes import icosphere
+    >>> inner, outer = icosphere(3, 1.0), icosphere(4, 1.2)
+    >>> distance, angle = chamfer_and_angle(*inner, *outer)
+    >>> round(distance, 2), round(angle, 2)
+    (0.2, 0.0)
+    """
+    forth, back = _one_way(x, faces, y, others), _one_way(y, others, x, faces)
+    return (forth[0] + back[0]) / 2.0, (forth[1] + back[1]) / 2.0
+
+
+def _one_way(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[float, float]:
+    """Return mean distance [m] and angle [rad] from the vertices x to the surface of y."""
+    import igl
+
+    from reference_sim.geometry.surface import vertex_normals  # loads numba
+
+    squared, nearest, points = igl.point_mesh_squared_distance(x, y, others)
+    corners = others[nearest]
+    shares = _barycentric(points, y[corners])
+    of_nearest = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
+    here = vertex_normals(np.ascontiguousarray(x), faces)
+    angles = np.arctan2(np.linalg.norm(np.cross(here, of_nearest), axis=1), (here * of_nearest).sum(axis=1))
+    weights = np.bincount(faces.ravel(), np.repeat(triangle_areas(x, faces), 3), len(x))
+    means = np.average(np.stack([np.sqrt(squared), angles]), axis=1, weights=weights)
+    return float(means[0]), float(means[1])
+
+
+def _barycentric(points: Floats, corners: Floats) -> Floats:
+    """Return the weights (N,3) [1] by which points (N,3) lie between the corners (N,3,3) of triangles."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normals, away = np.cross(first, second), points - corners[:, 0]
+    whole = np.maximum((normals**2).sum(axis=1), np.finfo(float).tiny)
+    beside = (np.cross(away, second) * normals).sum(axis=1) / whole
+    beyond = (np.cross(first, away) * normals).sum(axis=1) / whole
+    return np.stack([1.0 - beside - beyond, beside, beyond], axis=1)
+
+
+SURFACE = Measurements("surface", SURFACE_METRICS, measure=measure, compare=compare, other_meshes=True)
