@@ -3,7 +3,7 @@
 | module | what lies there |
 | --- | --- |
 | declared_networks, declared_solvers | declarations, and trainings of networks |
-| simulation, warm_started, sweeps | solvers of the time step: the reference, variants, stopped solvers |
+| simulation, reference_variants, warm_started, sweeps | solvers of the time step |
 | networks | trained networks, collision post-processing, skinning |
 | lower_bounds | vertices of a clip optimised directly, steps within what a network can express |
 | outside | stored roll-outs and programs |

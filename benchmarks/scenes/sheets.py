@@ -16,12 +16,18 @@ import numpy as np
 from benchmarks.meshes import in_space, rectangle, sheet, sphere, square_sheet
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth
-from reference_sim.energies.bend_hinge import BendHinge
-from reference_sim.energies.contact_penalty import ContactPenalty
+from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.material import GRAVITY, Material
-from reference_sim.obstacle import Obstacle
+
+
+def _cloth_energies(cloth: Cloth) -> tuple[Energy, ...]:
+    """Return strain, bending and weight; a scene without them does not load them."""
+    from reference_sim.energies.bend_hinge import BendHinge
+    from reference_sim.energies.stretch_stvk import StretchStVK
+
+    return StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)
+
 
 VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s]
 
@@ -71,7 +77,7 @@ def build_hanging_sheet(
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
-        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
+        energies=_cloth_energies(cloth),
         dt=1.0 / 30.0,
         frames=sheet_frames,
         settle=lambda: cloth.rest_positions,
@@ -99,7 +105,7 @@ def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_f
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
-        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
+        energies=_cloth_energies(cloth),
         dt=dt,
         frames=sheet_frames,
         settle=lambda: positions,
@@ -120,6 +126,9 @@ def build_sheet_on_sphere(
     family: of triangles, as `rectangle` has them; such a sheet lies on the sphere and is held at its middle,
     so that it drapes and does not slide off.
     """
+    from reference_sim.energies.contact_penalty import ContactPenalty
+    from reference_sim.obstacle import Obstacle
+
     if family:
         flat, faces = rectangle(family, sheet_cells, sheet_cells, DRAPED_SIZE, DRAPED_SIZE)
         positions = in_space(flat - DRAPED_SIZE / 2)[:, [1, 2, 0]]  # faces up
@@ -136,7 +145,7 @@ def build_sheet_on_sphere(
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
-        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth)),
+        energies=(*_cloth_energies(cloth), ContactPenalty(cloth)),
         dt=1.0 / 30.0,
         frames=frames,
         settle=lambda: positions,
@@ -177,7 +186,7 @@ def build_twisted_strip(
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
-        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
+        energies=_cloth_energies(cloth),
         dt=1.0 / 30.0,
         frames=frames,
         settle=lambda: positions,
