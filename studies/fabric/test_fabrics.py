@@ -13,7 +13,7 @@ import pytest
 import textile_scenes
 import textile_tables
 from benchmarks import DeclarationError, RollOut
-from benchmarks.methods.catalogue.all_methods import find_method
+from benchmarks.methods import find_method
 from benchmarks.metric import SceneRollOuts
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.study import read_study

@@ -1,1 +1,0 @@
-"""Metrics of a surface, from positions alone: curvature/*, distance/*, penetration/*, shape, body."""
