@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from benchmarks.method import MethodEntry
-from benchmarks.plan.cell import Cell
 from benchmarks.metrics import measured_in
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import Part, Study, StudyError, nearest
 from benchmarks.scene import Scene

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.assets import Inputs
 from benchmarks.external.roll_out_files import MODULE as STORED
-from benchmarks.plan.cell import Cell, TaskId
-from benchmarks.method import MethodEntry
 from benchmarks.methods.declared_networks import TRAININGS
+from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import StudyError
 from benchmarks.presets import Preset, find_preset

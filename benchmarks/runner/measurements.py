@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.declarations import load
-from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.metric import Estimate, Measurements, RollOut, SceneRollOuts, measurements_in
 from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
+from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import SECONDS, RunFolder

@@ -16,9 +16,9 @@ from benchmarks import provenance
 from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
+from benchmarks.metrics import measured_in
 from benchmarks.plan.cell import Cell, flat
 from benchmarks.plan.plan import Network, Plan, network_of, runs
-from benchmarks.metrics import measured_in
 from benchmarks.provenance import digest, digest_of_file, find_module
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.cells import BatchCell, RepeatCell, RunCase, RunCell, RunUntimedCell

@@ -14,8 +14,8 @@ from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.method import Method
 from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.plan.cell import Cell
 from benchmarks.metrics.dynamics import shares_quasi_static
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.presets import find_preset
 from benchmarks.results import run_folder

@@ -10,10 +10,10 @@ import pytest
 
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.plan.cell import Cell
-from benchmarks.plan.plan import Plan
 from benchmarks.metrics import conservation
 from benchmarks.metrics.conservation import law_series
+from benchmarks.plan.cell import Cell
+from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.task import Outcome

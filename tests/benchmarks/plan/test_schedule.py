@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
-from benchmarks.plan.cell import Cell
 from benchmarks.methods import find_method
 from benchmarks.methods.declared_networks import TRAININGS
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.plan.cell import Cell
-from benchmarks.plan.plan import Plan
 from benchmarks.methods import find_method
 from benchmarks.methods.outside import program
+from benchmarks.plan.cell import Cell
+from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder

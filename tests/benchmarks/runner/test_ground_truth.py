@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks import export
-from benchmarks.plan.cell import Cell
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.declared_networks import TRAININGS
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.runner import ground_truth, training_motions

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from benchmarks.plan.cell import Cell
 from benchmarks.methods import find_method
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import check_trained
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import make_parser, study_of

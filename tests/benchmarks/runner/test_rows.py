@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
-from benchmarks.plan.cell import Cell
 from benchmarks.methods import METHODS, find_method
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.row import Row
 from benchmarks.runner.cells import judge

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.plan.cell import Cell
 from benchmarks.methods import find_method
+from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder

@@ -13,9 +13,9 @@ from benchmarks.assets import Assets
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.networks import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metrics.roll_out import EXTRAPOLATION, judge, measure_extrapolation
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.plan import Plan
-from benchmarks.metrics.roll_out import EXTRAPOLATION, judge, measure_extrapolation
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.measurements import measured
