@@ -34,7 +34,7 @@ class Training:
     """Training of one network.
 
     Attributes:
-        kind: one of snug.training.kinds.KINDS.
+        kind: one of snug.kinds.KINDS.
         recipe: options of network and training.
         simulated: simulations that it learns from; None if it learns from the energies alone.
         steps_of: name of the training whose number of steps it takes; empty for its own number.

@@ -3,7 +3,7 @@
 | room | what lies there |
 | --- | --- |
 | body, motion, garments | the parametric body, its motions, the garments it wears |
-| recipes | options of network and training, and the named sets of them |
+| recipe, named_recipes, kinds | options of network and training, named sets of them, kinds of networks |
 | kernels | compiled closed forms that training and roll-outs run on a CPU |
 | networks | architectures, their inputs, trained models in files, roll-outs |
 | training | losses, one optimisation step, the loop over steps, checkpoints |

@@ -128,25 +128,6 @@ ABLATIONS = (
 RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, PBNS, PBNS_SPRINGS, *ABLATIONS)}
 
 
-# The recipe that trains each kind of network (snug.training.kinds.KINDS) unless another is named.
-RECIPE_OF_KIND = {
-    "snug": DEFAULT,
-    "pbns": PBNS,
-    "supervised": SUPERVISED,
-    "santesteban2019": SANTESTEBAN2019,
-    "tailornet": TAILORNET,
-    "nearest-poses": NEAREST_POSES,
-    "pose-regression": POSE_REGRESSION,
-    "dynamic": DYNAMIC,
-    "handles-20": HANDLES,
-    "handles-40": HANDLES,
-    "handles-80": HANDLES,
-    "handles-80-dynamic": HANDLES,
-    "ncs": NCS,
-    "ncs-static": NCS,
-}
-
-
 def find_recipe(name: str) -> Recipe:
     """Return the recipe of that name. Raises RecipeError naming the known ones.
 

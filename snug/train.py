@@ -18,6 +18,7 @@ from snug.file_options import (
     make_garment_file,
     parse_motion_options,
 )
+from snug.kinds import KINDS
 from snug.named_recipes import RECIPES
 
 if TYPE_CHECKING:
@@ -26,10 +27,7 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
     from snug.networks.trained_model import TrainedModel
 
-MODELS = (
-    "snug", "pbns", "supervised", "santesteban2019", "tailornet", "ncs", "ncs-static", "handles-20",
-    "handles-40", "handles-80", "handles-80-dynamic",
-)  # fmt: skip
+MODELS = [name for name, kind in KINDS.items() if not (kind.fitted or kind.past)]
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
 GONE = {
     "--threads": "a training has one thread",
@@ -90,11 +88,9 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 def check_options(options: argparse.Namespace) -> None:
     """Raise ValueError for an option that means nothing without another, or a file that cannot be written."""
-    from snug.training.kinds import find_kind  # loads torch
-
     if options.dataset and options.motions:
         raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
-    simulated = not find_kind(options.model).physics
+    simulated = not KINDS[options.model].physics
     if simulated and not options.dataset:
         raise ValueError(f"--model {options.model}: learns from simulations; add --dataset FILE")
     if options.recipe and simulated:

@@ -20,24 +20,23 @@ from typing import Any
 
 from benchmarks.method import MethodEntry, Reporting
 from benchmarks.training import Simulated, Training
+from snug.kinds import KINDS
 from snug.named_recipes import (
     ABLATIONS,
     DEVIATIONS,
     DYNAMIC,
     PAPER,
     PBNS_SPRINGS,
-    RECIPE_OF_KIND,
     exchange_deviations,
 )
 from snug.recipe import DEFAULT
 
-LEARN_FROM_SIMULATIONS = ("supervised", "santesteban2019", "tailornet", "nearest-poses", "pose-regression")
 TRAININGS = {
     # Each kind by its own recipe; `dynamic` learns from other simulations, as `snug-dynamic`.
     **{
-        kind: Training(kind, recipe, Simulated() if kind in LEARN_FROM_SIMULATIONS else None)
-        for kind, recipe in RECIPE_OF_KIND.items()
-        if kind != "dynamic"
+        name: Training(name, kind.recipe, None if kind.physics else Simulated())
+        for name, kind in KINDS.items()
+        if not kind.past
     },
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),

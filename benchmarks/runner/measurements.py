@@ -192,8 +192,8 @@ def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | No
 
     Mixing takes seconds and depends on little, so networks of one seed share the poses, in every scene.
     """
+    from snug.kinds import find_kind
     from snug.training.augmentation import augment, make_shared_clips
-    from snug.training.kinds import find_kind
 
     assets, how = context.assets, training.chosen
     if how is None or assets is None:

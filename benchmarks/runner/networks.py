@@ -15,6 +15,7 @@ from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.task import Context, Outcome, Task
 from reference_sim.files.atomic_files import replacing
+from snug.kinds import KINDS
 from snug.networks.tensor_file import TensorFileError, read_header
 from snug.trained import FOLDER, SUFFIX, network_name
 
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
-# Of a step, where a step of SNUG's network takes 1: the longest training begins first.
-COST = {"pbns": 0.4, "ncs": 2.5, "ncs-static": 2.5, "handles-20": 0.4, "handles-40": 0.4, "handles-80": 0.5}
 PREPARATION = 25.0  # [s] expected before the first step: clips are mixed, bodies posed
 LOG_EVERY = 20  # training steps between two reports of progress
 # Of a training's summary: what its guard against divergence has done, and its epochs.
@@ -71,7 +70,7 @@ class TrainNetwork(Task):
         """Expected duration [s]."""
         if self.chosen is None:
             return 0.0
-        return PREPARATION + super().expected_seconds * COST.get(self.chosen.kind, 1.0)
+        return PREPARATION + super().expected_seconds * KINDS[self.chosen.kind].cost
 
     @property
     def key(self) -> str:

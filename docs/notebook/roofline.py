@@ -17,12 +17,12 @@ import numpy as np
 from benchmarks.assets import embedded_motions
 from benchmarks.performance.microbenchmarks import dressed_body
 from benchmarks.timing import one_thread
+from snug.kinds import KINDS
 from snug.motion.library import TRAIN
-from snug.named_recipes import RECIPE_OF_KIND
 from snug.networks.roll_out import prepare_frames
 from snug.training.train_network import untrained_model
 
-KINDS = ("snug", "pbns", "handles-20", "handles-40", "handles-80", "ncs", "ncs-static", "tailornet")
+MEASURED = ("snug", "pbns", "handles-20", "handles-40", "handles-80", "ncs", "ncs-static", "tailornet")
 REPEATS = 200
 
 
@@ -55,8 +55,8 @@ def main():
     operations = 2 * 1024**3 / least(lambda: square @ square)  # a second
     print(f"{dressed.vertices} vertices; {operations / 1e9:.0f} GFLOP/s")
     print("network      weights  reading  arithmetic    frame  frame over reading")
-    for kind in KINDS:
-        model = untrained_model(kind, dressed, motions, seed=0, recipe=RECIPE_OF_KIND[kind])
+    for kind in MEASURED:
+        model = untrained_model(kind, dressed, motions, seed=0, recipe=KINDS[kind].recipe)
         count = sum(p.numel() for p in model.network.parameters())
         weights, inputs = np.ones((2, count // 2), np.float32)
         reading = least(partial(np.dot, weights, inputs))

@@ -33,7 +33,6 @@ class NearestPoses(GarmentNetwork):
 
     feature_set = "pose"
     sequential = False
-    fitted = True
 
     def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
@@ -83,7 +82,6 @@ class PoseRegression(PoseSpaceDeformation):
     widths = (COMPONENTS,)
     activation = nn.Identity
     constant = True
-    fitted = True
 
     def learn(self, features: Tensor, offsets: Tensor, *, ridge: float = RIDGE) -> None:
         """Find the components, and the least squared error of their coefficients with a ridge penalty."""

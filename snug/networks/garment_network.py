@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
@@ -19,6 +19,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import torch
 from torch import Tensor, nn
+
+from snug.kinds import find_kind
+from snug.recipe import Recipe
 
 if TYPE_CHECKING:
     from snug.garments.garment import Garment
@@ -34,10 +37,9 @@ class GarmentNetwork(nn.Module):
     Attributes:
         feature_set: inputs it reads, one of snug.networks.dressed_body.FEATURE_SETS.
         sequential: whether it carries a state from frame to frame.
-        fitted: whether `learn` teaches it, in one go, in place of training steps.
         lead: frames before a training window that it reads first, from a state of zero, with their gradient.
         closed_form: whether it trains by snug.kernels.gru, on a CPU; its next state then has no gradient.
-        pins: vertices without offset, which the body carries; see snug.networks.architectures.make_network.
+        pins: vertices without offset, which the body carries; see `make_network`.
         output_scale: factor on the predicted offsets.
         offsets: last layer; a network without one overrides `last_layers`.
         gru: recurrent units, whose state (layers, N, hidden) is the network's; a `sequential` network without
@@ -46,7 +48,6 @@ class GarmentNetwork(nn.Module):
 
     feature_set: ClassVar[str]
     sequential: ClassVar[bool]
-    fitted: ClassVar[bool] = False
     lead: ClassVar[int] = 0
     closed_form: bool = False
     pins: tuple[int, ...] = ()
@@ -89,7 +90,7 @@ class GarmentNetwork(nn.Module):
         raise NotImplementedError
 
     def learn(self, features: Tensor, offsets: Tensor) -> None:
-        """Learn offsets (F, V, 3) [m] of frames with features (F, D), for a network that is `fitted`."""
+        """Learn offsets (F, V, 3) [m] of frames with features (F, D), for a kind that is `fitted`."""
         raise NotImplementedError
 
     def last_layers(self) -> tuple[nn.Linear, ...]:
@@ -176,3 +177,53 @@ def initialise(network: nn.Module, rules: str) -> None:
             else:
                 limit = math.sqrt(6 / sum(parameter.shape))
                 nn.init.uniform_(parameter, -limit, limit)
+
+
+def make_network(
+    kind: str, inputs: int, vertices: int, recipe: Recipe, *, seed: int, pins: Iterable[int] = ()
+) -> GarmentNetwork:
+    """Make a network at its start; the same seed gives the same weights, whatever was drawn before.
+
+    Args:
+        kind: one of snug.kinds.KINDS.
+        inputs: number of features D.
+        vertices: number of vertices V.
+        recipe: gives the rules of initialisation, whether the last layer starts at zero instead, and the
+            scale of the output.
+        seed: of the random weights.
+        pins: vertices without offset, which the body carries.
+
+    Returns:
+        A network that maps features (N, T, D) to offsets (N, T, V, 3) [m].
+
+    Raises:
+        ValueError: for an unknown kind.
+
+    Example:
+        >>> from snug.recipe import DEFAULT
+        >>> network = make_network("pbns", 141, 4, DEFAULT, seed=0)
+        >>> offsets, state = network(torch.zeros(2, 3, 141))
+        >>> tuple(offsets.shape), state
+        ((2, 3, 4, 3), None)
+    """
+    architecture = find_kind(kind).network
+    with seeded(seed):
+        network = architecture(inputs, vertices, output_scale=recipe.output_scale)
+        initialise(network, recipe.initialisation)
+    if recipe.zero_last_layer:
+        for layer in network.last_layers():  # training then starts at the skinned garment
+            for parameter in layer.parameters():
+                nn.init.zeros_(parameter)
+    network.pins = tuple(pins)
+    if network.pins:
+        free = torch.ones(vertices, 1)
+        free[list(network.pins)] = 0.0
+        network.register_buffer("free", free, persistent=False)
+
+        def hold_pins(
+            network: nn.Module, _features: object, output: tuple[Tensor, Tensor | None]
+        ) -> tuple[Tensor, Tensor | None]:
+            return output[0] * network.get_buffer("free"), output[1]
+
+        network.register_forward_hook(hold_pins)
+    return network

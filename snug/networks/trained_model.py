@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from snug.networks.architectures import make_network
-from snug.networks.garment_network import GarmentNetwork
+from snug.networks.garment_network import GarmentNetwork, make_network
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.recipe import Recipe
 from snug.trained import trained_networks
@@ -35,7 +34,7 @@ class TrainedModel:
     """A network and its training.
 
     Attributes:
-        kind: one of snug.networks.architectures.ARCHITECTURES.
+        kind: one of snug.kinds.KINDS.
         network: maps features (N, T, D) to offsets (N, T, V, 3) [m].
         recipe: options of network and training.
         seed: of everything random.

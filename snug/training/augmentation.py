@@ -31,6 +31,7 @@ import numpy as np
 import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.kinds import Kind
 from snug.motion.motion import (
     Motion,
     arm_clearance,
@@ -45,7 +46,6 @@ from snug.motion.motion import (
 from snug.motion.posture import SPINE_SHARES
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import DEFAULT, Recipe
-from snug.training.kinds import Kind
 from snug.training.training_set import TrainingSet
 
 ORIGINAL_SHARE = 0.5  # of the clips: pieces of the original motions

@@ -17,9 +17,10 @@ from torch import Tensor, nn
 
 from snug.body.skinning import skin
 from snug.kernels.skinning import FastSkin
+from snug.kinds import find_kind
 from snug.motion.motion import Motion
-from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
+from snug.networks.garment_network import make_network
 from snug.networks.regressor import MotionPerceptron
 from snug.networks.tensor_file import select_tensors
 from snug.recipe import Recipe
@@ -28,11 +29,10 @@ from snug.training.captured_step import CapturedStep
 from snug.training.contact_planes import Posed, TrainingContact
 from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
-from snug.training.kinds import find_kind
 from snug.training.physics_loss import PhysicsLoss
 from snug.training.simulated_data import SimulatedPast
 from snug.training.training_set import Batch, HiddenStateCache, TrainingError, TrainingSet
-from snug.training.vertex_targets import Trajectories, VertexTargets
+from snug.training.vertex_targets import TARGETS, Trajectories, VertexTargets
 
 # On a GPU "captured" is all from the windows to the gradients; see snug.training.captured_step.
 PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "captured", "optimiser", "requery")
@@ -155,8 +155,8 @@ class Trainer:
     def _set_up_supervision(self, motions: Sequence[Motion], trajectories: Trajectories | None) -> None:
         """Prepare the loss: simulated vertices, or the energies, perhaps about a simulated past."""
         how, recipe, data = self.how, self.recipe, self.data
-        if how.targets:
-            self.targets = how.targets(data, motions, trajectories, self.weights)
+        if not how.physics:
+            self.targets = TARGETS[how.targets](data, motions, trajectories, self.weights)
             return
         self.loss = PhysicsLoss(
             self.dressed.cloth, recipe, dt=data.dt, device=self.device, kernels=self.kernels

@@ -6,19 +6,18 @@ import gc
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from importlib import import_module
 
 import torch
 
 from snug.body.skinning import skin, unskin_damped
+from snug.kinds import find_kind
 from snug.motion.motion import Motion
-from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
+from snug.networks.garment_network import make_network
 from snug.networks.trained_model import TrainedModel, digest_of_triangles
 from snug.recipe import Recipe
 from snug.training.checkpoint import Checkpoint
 from snug.training.device import find_device
-from snug.training.kinds import find_kind
 from snug.training.optimisation_step import Trainer
 from snug.training.training_loop import TrainingLoop
 from snug.training.training_set import TrainingSet
@@ -52,7 +51,7 @@ def train_network(
     is used.
 
     Args:
-        model_kind: one of snug.training.kinds.KINDS, which says whether energies or simulated vertices
+        model_kind: one of snug.kinds.KINDS, which says whether energies or simulated vertices
             teach it.
         dressed: a garment on a body.
         motions: training motions, all of one frame rate.
@@ -60,7 +59,7 @@ def train_network(
         seed: of everything random.
         trajectories: for kinds that learn from a simulation, motion name -> simulated world vertices
             (T, V, 3) [m].
-        recipe: options of network and training; None: those of the kind (snug.named_recipes.RECIPE_OF_KIND).
+        recipe: options of network and training; None: those of the kind.
         log: called with each row of the history, every `every` steps.
         progress: whether a bar is shown on standard error.
         every: steps between two rows of the history.
@@ -83,8 +82,8 @@ def train_network(
     """
     start = time.perf_counter()
     gc.collect()  # an earlier training refers to itself, and holds gigabytes
-    recipe = recipe or _own_recipe(model_kind)
-    if find_kind(model_kind).network.fitted:
+    recipe = recipe or find_kind(model_kind).recipe
+    if find_kind(model_kind).fitted:
         return _fitted_model(model_kind, dressed, motions, trajectories, seed=seed, recipe=recipe)
     trainer = Trainer(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
@@ -95,14 +94,6 @@ def train_network(
         setup_seconds=time.perf_counter() - start,
     )  # fmt: skip
     return loop.run()
-
-
-def _own_recipe(model_kind: str) -> Recipe:
-    """Return the recipe that a kind of network has where none is given."""
-    # By the name of its module: a task of benchmarks is given its recipe, and another recipe in the list of
-    # all would put it out of date if its code imported them.
-    recipe: Recipe = import_module("snug.named_recipes").RECIPE_OF_KIND[model_kind]
-    return recipe
 
 
 def _fitted_model(
@@ -155,7 +146,7 @@ def untrained_model(
     statistics are those of the training motions. Without a recipe it is the kind's.
     """
     kind = find_kind(model_kind)
-    recipe = replace(recipe or _own_recipe(model_kind), zero_last_layer=False)
+    recipe = replace(recipe or find_kind(model_kind).recipe, zero_last_layer=False)
     data = TrainingSet(
         dressed, motions, recipe, features=kind.network.feature_set, sequences=kind.network.sequential
     )

@@ -19,6 +19,7 @@ from torch import Tensor
 from snug.body.skinning import skin
 from snug.motion.motion import Motion
 from snug.training.training_set import Batch, TrainingError, TrainingSet
+from snug.training.vertex_targets import TARGETS
 
 if TYPE_CHECKING:
     from snug.training.optimisation_step import Trainer
@@ -64,8 +65,8 @@ class Validator:
             )
         self.contact = trainer.contact_of(self.data)
         self.targets = None
-        if how.targets:
-            self.targets = how.targets(self.data, motions, validation.trajectories, trainer.weights)
+        if not how.physics:
+            self.targets = TARGETS[how.targets](self.data, motions, validation.trajectories, trainer.weights)
 
     @torch.no_grad()
     def value(self) -> float:

@@ -60,8 +60,6 @@ class VertexTargets:
         TargetError: for a motion without a fitting trajectory.
     """
 
-    unit = "cm²"  # of the loss
-
     def __init__(
         self, data: TrainingSet, motions: Sequence[Motion], trajectories: Trajectories | None, weights: Tensor
     ) -> None:
@@ -84,8 +82,6 @@ class VertexTargets:
 class BandTargets(VertexTargets):
     """Simulated vertices, unposed and taken apart into two bands; arguments as for VertexTargets."""
 
-    unit = "cm"
-
     def __init__(
         self, data: TrainingSet, motions: Sequence[Motion], trajectories: Trajectories | None, weights: Tensor
     ) -> None:
@@ -107,6 +103,9 @@ class BandTargets(VertexTargets):
         rows = torch.as_tensor(batch.frames)
         low, high = cast(FrequencyMixture, network).bands(batch.features, state)
         return {"low": band_loss(low, self.low[rows]), "high": band_loss(high, self.high[rows])}
+
+
+TARGETS = {"vertices": VertexTargets, "bands": BandTargets}  # by snug.kinds.Kind.targets
 
 
 def smooth_offsets(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from reports.blocks.block import Report
 from reports.run.finished_run import Run, make_run
 from reports.run.stored_files import RollOuts
 from reports.tables import make_tables
-from snug.training.kinds import find_kind
+from snug.kinds import find_kind
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
 METHODS = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}

@@ -6,16 +6,15 @@ import pytest
 import torch
 
 from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
-from benchmarks.methods.declared_networks import LEARN_FROM_SIMULATIONS, TRAININGS
+from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.choose_cells import matching
 from benchmarks.plan.study import read_study
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
+from snug.kinds import KINDS
 from snug.named_recipes import ABLATIONS, RECIPES
-from snug.networks.architectures import ARCHITECTURES
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import TERMS
-from snug.training.kinds import KINDS
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress
@@ -27,10 +26,6 @@ def plan(*options):
 
 def methods(*options):
     return {cell.method for cell in plan(*options).cells}
-
-
-def test_kinds_that_learn_vertices_are_those_that_get_simulations():
-    assert set(LEARN_FROM_SIMULATIONS) == {name for name, kind in KINDS.items() if not kind.physics}
 
 
 def test_they_run_when_named_and_not_otherwise(tmp_path):
@@ -54,7 +49,7 @@ def test_they_run_when_named_and_not_otherwise(tmp_path):
 @pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
 def test_every_trained_method_has_a_training_and_steps_in_each_preset(entry):
     kind = (entry.training or TRAININGS[entry.trained]).kind
-    assert entry.seeded != ARCHITECTURES[kind].fitted and entry.reporting.pairing_group
+    assert entry.seeded != KINDS[kind].fitted and entry.reporting.pairing_group
     assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
 
 

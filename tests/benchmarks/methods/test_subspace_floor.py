@@ -14,8 +14,8 @@ from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
 from reference_sim import Potential, minimise
 from snug.body.skinning import unskin
-from snug.networks.architectures import make_network
 from snug.networks.dressed_body import DressedBody
+from snug.networks.garment_network import make_network
 from snug.networks.handles import shape_functions, span
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT

@@ -116,7 +116,7 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
     assert "reference_sim.energies.stretch_stvk" in result["modules"] and "numba" in result["modules"]
     snug = {name for name in result["modules"] if name.startswith("snug")}
     # Names of trainings, which the list of methods holds.
-    assert snug <= {"snug", *(f"snug.recipes{name}" for name in ("", ".recipe", ".named", ".deviations"))}
+    assert snug <= {"snug", "snug.recipe", "snug.named_recipes", "snug.kinds"}
     for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
         assert name not in result["modules"], f"{name} was loaded"
     costs, remark = clock_costs(plan.cells[0], 1, {("cell", plan.cells[0].name): outcome})

@@ -17,7 +17,7 @@ from reference_sim import Trajectory
 from reference_sim.trajectory import write_obj, write_point_cache
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
-from snug.networks.architectures import make_network
+from snug.networks.garment_network import make_network
 from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT

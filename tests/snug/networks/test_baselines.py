@@ -9,9 +9,10 @@ import pytest
 import torch
 
 from snug.body.skinning import skin, unskin
-from snug.named_recipes import ABLATIONS, RECIPE_OF_KIND
-from snug.networks.architectures import make_network
+from snug.kinds import KINDS
+from snug.named_recipes import ABLATIONS
 from snug.networks.dressed_body import DressedBody
+from snug.networks.garment_network import make_network
 from snug.networks.roll_out import roll_out
 from snug.networks.tailornet import DROPOUT, FrequencyMixture
 from snug.recipe import DEFAULT
@@ -31,7 +32,7 @@ def puffed(motion):
 
 def taught(kind, steps, **changes):
     motion = swaying(24)
-    recipe = replace(RECIPE_OF_KIND[kind], **changes)
+    recipe = replace(KINDS[kind].recipe, **changes)
     model = train_network(
         kind, tube_dress(), [motion], steps=steps, seed=0, trajectories={motion.name: puffed(motion)},
         recipe=recipe, progress=False, every=10,
@@ -50,10 +51,10 @@ def test_a_taught_baseline_learns_its_targets(kind, narrow):
 
 
 def test_sizes_are_those_of_the_papers():
-    santesteban = make_network("santesteban2019", 151, 4, RECIPE_OF_KIND["santesteban2019"], seed=0)
+    santesteban = make_network("santesteban2019", 151, 4, KINDS["santesteban2019"].recipe, seed=0)
     fit, gru = 10 * 20 + 20 + 20 * 12 + 12, 3 * (1500 * (151 + 1500) + 2 * 1500)
     assert sum(p.numel() for p in santesteban.parameters()) == fit + gru + 1500 * 12 + 12
-    tailornet = make_network("tailornet", 151, 4, RECIPE_OF_KIND["tailornet"], seed=0)
+    tailornet = make_network("tailornet", 151, 4, KINDS["tailornet"].recipe, seed=0)
     inner = 1024 * 1024 + 1024 + 1024 * 12 + 12
     assert sum(p.numel() for p in tailornet.parameters()) == (151 + 1) * 1024 + (141 + 1) * 1024 + 2 * inner
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from snug.body.skinning import skin, unskin_damped
-from snug.named_recipes import RECIPE_OF_KIND
+from snug.kinds import KINDS
 from snug.networks.fitted import COMPONENTS, NEIGHBOURS, NearestPoses, PoseRegression
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
@@ -17,7 +17,7 @@ from snug.training.train_network import train_network
 from snug.training.vertex_targets import TargetError
 from tests.snug.training.dressing import swaying, tube_dress
 
-KINDS = ("nearest-poses", "pose-regression")
+FITTED = ("nearest-poses", "pose-regression")
 
 
 def frames(count: int, inputs: int = 6, vertices: int = 5) -> tuple[torch.Tensor, torch.Tensor]:
@@ -35,7 +35,7 @@ def swelling(motion):
 
 def fitted(kind: str, count: int = 40, **changes) -> tuple[TrainedModel, np.ndarray]:
     motion = swaying(count)
-    recipe, target = replace(RECIPE_OF_KIND[kind], **changes), swelling(motion)
+    recipe, target = replace(KINDS[kind].recipe, **changes), swelling(motion)
     model = train_network(
         kind, tube_dress(), [motion], steps=1, seed=0, recipe=recipe, trajectories={motion.name: target}
     )
@@ -100,7 +100,7 @@ def test_damped_offsets_are_those_of_skin_but_where_a_blend_is_nearly_singular()
     assert torch.allclose(lying, torch.tensor([[[0.0, 0.0, 3.0 / 1.01]]]))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", FITTED)
 def test_a_fitted_model_follows_its_training_motion_and_loads_as_it_was(kind, tmp_path):
     model, target = fitted(kind)
     positions = roll_out(model, tube_dress(), swaying(40)).positions
@@ -120,18 +120,18 @@ def test_a_fitted_model_follows_its_training_motion_and_loads_as_it_was(kind, tm
     assert np.abs(still - positions).max() < 2e-5  # it has no dynamics
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", FITTED)
 def test_a_fit_has_no_seed_and_needs_simulations(kind):
     motion = swaying(40)
     first, second = (
-        train_network(kind, tube_dress(), [motion], steps=1, seed=seed, recipe=RECIPE_OF_KIND[kind],
+        train_network(kind, tube_dress(), [motion], steps=1, seed=seed, recipe=KINDS[kind].recipe,
                       trajectories={motion.name: swelling(motion)})
         for seed in (0, 3)
     )  # fmt: skip
     for one, other in zip(first.network.parameters(), second.network.parameters()):
         assert torch.equal(one, other)
     with pytest.raises(TargetError, match="simulation of each training motion"):
-        train_network(kind, tube_dress(), [motion], steps=1, seed=0, recipe=RECIPE_OF_KIND[kind])
+        train_network(kind, tube_dress(), [motion], steps=1, seed=0, recipe=KINDS[kind].recipe)
 
 
 def test_the_compiled_frame_finds_the_nearest_of_many():

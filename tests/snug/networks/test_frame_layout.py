@@ -6,9 +6,9 @@ import torch
 
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
-from snug.named_recipes import RECIPE_OF_KIND
-from snug.networks.architectures import ARCHITECTURES, make_network
+from snug.kinds import KINDS
 from snug.networks.frame_layout import CompiledFrame
+from snug.networks.garment_network import make_network
 from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from tests.snug.training.dressing import swaying, tube_dress
@@ -18,8 +18,8 @@ PINS = (3, 77)
 
 def random_model(kind: str) -> TrainedModel:
     """Nothing in it is zero or one: weights, biases, statistics of the inputs; two vertices are held."""
-    dressed, recipe = tube_dress(), RECIPE_OF_KIND[kind]
-    inputs = dressed.features(swaying(2), recipe, feature_set=ARCHITECTURES[kind].feature_set).shape[1]
+    dressed, recipe = tube_dress(), KINDS[kind].recipe
+    inputs = dressed.features(swaying(2), recipe, feature_set=KINDS[kind].network.feature_set).shape[1]
     network = make_network(kind, inputs, dressed.vertices, recipe, seed=0, pins=PINS)
     generator = torch.Generator().manual_seed(1)
     with torch.no_grad():
@@ -41,7 +41,7 @@ def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
     return posed, offsets.numpy()
 
 
-@pytest.mark.parametrize("kind", ARCHITECTURES)
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path, narrow):
     model, motion = random_model(kind), swaying(8)
     expected, offsets = by_torch(model, motion)

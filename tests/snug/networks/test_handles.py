@@ -10,8 +10,7 @@ import torch
 
 from snug.body.skeleton import rotation_matrices
 from snug.named_recipes import HANDLES
-from snug.networks.architectures import make_network
-from snug.networks.garment_network import perceptron
+from snug.networks.garment_network import make_network, perceptron
 from snug.networks.handles import WIDTHS, HandleError, farthest_points, shape_functions, span
 from snug.networks.roll_out import roll_out
 from snug.training.train_network import train_network, untrained_model

@@ -10,9 +10,10 @@ import pytest
 import torch
 
 from snug.garments.templates import find_template
-from snug.named_recipes import PAPER, RECIPE_OF_KIND
-from snug.networks.architectures import ARCHITECTURES, make_network
+from snug.kinds import KINDS
+from snug.named_recipes import PAPER
 from snug.networks.dressed_body import DressedBody
+from snug.networks.garment_network import make_network
 from snug.networks.ncs import DESCRIBED, POSE_NUMBERS, RATES
 from snug.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
@@ -55,9 +56,9 @@ def test_keras_rules_of_the_papers_network():
     assert not any(p.any() for name, p in network.named_parameters() if "bias" in name)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in ARCHITECTURES if kind != "nearest-poses"])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "nearest-poses"])
 def test_every_kind_follows_the_rules_of_its_recipe(kind, narrow):
-    recipe = replace(RECIPE_OF_KIND[kind], zero_last_layer=False, initialisation="keras")
+    recipe = replace(KINDS[kind].recipe, zero_last_layer=False, initialisation="keras")
     keras, again = (make_network(kind, 151, 5, recipe, seed=3) for _ in range(2))
     torchs = make_network(kind, 151, 5, replace(recipe, initialisation="torch"), seed=3)
     biases = [(name, p) for name, p in keras.named_parameters() if "bias" in name]
@@ -71,7 +72,7 @@ def test_every_kind_follows_the_rules_of_its_recipe(kind, narrow):
             assert fills(weight, np.sqrt(6 / sum(weight.shape))) or weight.numel() < 2000
 
 
-@pytest.mark.parametrize("kind", ARCHITECTURES)
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_last_layer_of_zero_starts_at_the_template(kind, narrow):
     inputs = POSE_NUMBERS + RATES * len(DESCRIBED)  # what ncs reads; the others read any number
     network = make_network(kind, inputs, 5, replace(DEFAULT, initialisation="keras"), seed=1)

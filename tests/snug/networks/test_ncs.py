@@ -8,7 +8,7 @@ import torch
 
 from snug.motion.motion import Motion
 from snug.named_recipes import NCS
-from snug.networks.architectures import make_network
+from snug.networks.garment_network import make_network
 from snug.networks.ncs import DESCRIBED, LEAD, POSE_NUMBERS, RATES, joint_motion
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel

@@ -10,7 +10,7 @@ from snug.garments.garment import smooth_weights
 from snug.kernels import gru as fast_network
 from snug.motion.motion import Motion
 from snug.named_recipes import PAPER, RECIPES, find_recipe
-from snug.networks.architectures import make_network
+from snug.networks.garment_network import make_network
 from snug.networks.pbns import PoseSpaceDeformation
 from snug.networks.regressor import MotionPerceptron, Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from snug.named_recipes import PAPER, RECIPE_OF_KIND
-from snug.networks.architectures import make_network
+from snug.kinds import KINDS
+from snug.named_recipes import PAPER
+from snug.networks.garment_network import make_network
 from snug.networks.roll_out import (
     RollOutError,
     collect_frames,
@@ -85,7 +86,7 @@ def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_com
 @pytest.mark.parametrize("kind", ["snug", "dynamic", "pbns", "santesteban2019", "ncs"])
 def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind, narrow):
     dressed, motion = tube_dress(), swaying()
-    model = untrained_model(kind, dressed, [motion], seed=0, recipe=RECIPE_OF_KIND[kind])
+    model = untrained_model(kind, dressed, [motion], seed=0, recipe=KINDS[kind].recipe)
     features = dressed.features(motion, model.recipe, feature_set=model.network.feature_set)
     transforms, pelvis = dressed.transforms(motion.poses), dressed.pelvis(motion)
     make = prepare_frame_inputs(model, dressed, motion)

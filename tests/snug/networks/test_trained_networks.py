@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from snug import trained
-from snug.networks.architectures import make_network
+from snug.networks.garment_network import make_network
 from snug.networks.tensor_file import read_header
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT

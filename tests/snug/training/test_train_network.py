@@ -11,9 +11,9 @@ import torch
 
 from reference_sim.energies import StretchStVK
 from snug.body.skinning import skin
-from snug.named_recipes import PAPER, RECIPE_OF_KIND, SUPERVISED
+from snug.kinds import KINDS
+from snug.named_recipes import PAPER, SUPERVISED
 from snug.networks import trained_model
-from snug.networks.architectures import ARCHITECTURES
 from snug.networks.roll_out import roll_out
 from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
@@ -128,7 +128,7 @@ def test_broken_model_files_are_named(tmp_path, trained, monkeypatch):
     with pytest.raises(ModelFileError, match="no model of this project"):
         TrainedModel.load(foreign)
     with monkeypatch.context() as version:  # one that knows more
-        version.setitem(ARCHITECTURES, "later-kind", ARCHITECTURES["snug"])
+        version.setitem(KINDS, "later-kind", KINDS["snug"])
         later = replace(trained, kind="later-kind").save(tmp_path / "later.safetensors")
     with pytest.raises(
         ModelFileError, match=r"later\.safetensors: broken model file \(unknown model 'later-kind'"
@@ -281,6 +281,6 @@ def test_mixed_motions_join_the_training_set():
 @pytest.mark.parametrize("kind", ["snug", "pbns", "ncs-static"])
 def test_without_a_recipe_the_kinds_own_is_taken(kind):
     model = train_network(kind, tube_dress(), [swaying(30)], steps=1, seed=0, progress=False)
-    assert model.recipe == RECIPE_OF_KIND[kind]
+    assert model.recipe == KINDS[kind].recipe
     untrained = untrained_model(kind, tube_dress(), [swaying(30)], seed=0)
-    assert untrained.recipe == replace(RECIPE_OF_KIND[kind], zero_last_layer=False)
+    assert untrained.recipe == replace(KINDS[kind].recipe, zero_last_layer=False)

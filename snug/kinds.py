@@ -1,0 +1,120 @@
+"""Kinds of networks: one record says what each is called, where it lies, and what teaches it.
+
+The tables of networks, recipes, trainings and commands all come from KINDS. Imports no network: a command
+lists them without torch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from snug.named_recipes import (
+    DYNAMIC,
+    HANDLES,
+    NCS,
+    NEAREST_POSES,
+    PBNS,
+    POSE_REGRESSION,
+    SANTESTEBAN2019,
+    SUPERVISED,
+    TAILORNET,
+)
+from snug.recipe import DEFAULT, Recipe
+
+if TYPE_CHECKING:
+    from snug.networks.garment_network import GarmentNetwork
+
+UNITS = {"energies": "J", "vertices": "cm²", "bands": "cm"}  # of a loss: a frame's energy, or a distance
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """One kind of network and its training.
+
+    Attributes:
+        name: as a model file and `snug.train --model` have it.
+        label: its name for people.
+        architecture: module in snug.networks and class of its network.
+        recipe: options of network and training, unless others are named.
+        targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed offsets
+            (snug.training.vertex_targets).
+        past: whether its inertia is that of a simulation's previous frames (snug.training.simulated_data).
+        fitted: whether it is fitted in one go, in place of training steps (snug.networks.fitted).
+        closed_form: whether it trains faster by snug.kernels.gru.
+        cost: time of a step, where one of SNUG's takes 1.
+    """
+
+    name: str
+    label: str
+    architecture: str
+    recipe: Recipe = DEFAULT
+    targets: str = "energies"
+    past: bool = False
+    fitted: bool = False
+    closed_form: bool = False
+    cost: float = 1.0
+
+    @property
+    def network(self) -> type[GarmentNetwork]:
+        """Class of its network."""
+        module, name = self.architecture.split(".")
+        network: type[GarmentNetwork] = getattr(import_module(f"snug.networks.{module}"), name)
+        return network
+
+    @property
+    def physics(self) -> bool:
+        """True if it learns from the energies."""
+        return self.targets == "energies"
+
+    @property
+    def unit(self) -> str:
+        """Unit of its loss."""
+        return UNITS[self.targets]
+
+
+def _handles(count: int, cost: float) -> Kind:
+    name, network = f"handles-{count}", f"handles.Handles{count}"
+    return Kind(name=name, label=f"{count} handles", architecture=network, recipe=HANDLES, cost=cost)
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind(name="snug", label="SNUG", architecture="regressor.Regressor", closed_form=True),
+        Kind(name="pbns", label="PBNS", architecture="pbns.PoseSpaceDeformation", recipe=PBNS, cost=0.4),
+        Kind(name="supervised", label="Supervised", architecture="regressor.Regressor", recipe=SUPERVISED,
+             targets="vertices", closed_form=True),
+        Kind(name="santesteban2019", label="Santesteban 2019", architecture="santesteban2019.FitAndWrinkles",
+             recipe=SANTESTEBAN2019, targets="vertices", closed_form=True),
+        Kind(name="tailornet", label="TailorNet", architecture="tailornet.FrequencyMixture",
+             recipe=TAILORNET, targets="bands"),
+        Kind(name="nearest-poses", label="Nearest poses", architecture="fitted.NearestPoses",
+             recipe=NEAREST_POSES, targets="vertices", fitted=True),
+        Kind(name="pose-regression", label="Ridge on principal components",
+             architecture="fitted.PoseRegression", recipe=POSE_REGRESSION, targets="vertices", fitted=True),
+        Kind(name="dynamic", label="SNUG, dynamic", architecture="regressor.MotionPerceptron", recipe=DYNAMIC,
+             past=True, closed_form=True),
+        _handles(20, 0.4),
+        _handles(40, 0.4),
+        _handles(80, 0.5),
+        Kind(name="handles-80-dynamic", label="80 handles, dynamic", architecture="handles.DynamicHandles80",
+             recipe=HANDLES, closed_form=True),
+        Kind(name="ncs", label="Neural Cloth Simulation", architecture="ncs.TwoBranches", recipe=NCS,
+             cost=2.5),
+        Kind(name="ncs-static", label="Neural Cloth Simulation, static branch",
+             architecture="ncs.StaticBranch", recipe=NCS, cost=2.5),
+    )
+}  # fmt: skip
+
+
+def find_kind(name: str) -> Kind:
+    """Return the kind of that name. Raises ValueError naming the known ones.
+
+    >>> find_kind("pbns").recipe.learning_rate
+    0.002
+    """
+    if name not in KINDS:
+        raise ValueError(f"unknown model {name!r}: use one of {', '.join(KINDS)}")
+    return KINDS[name]
