@@ -183,8 +183,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.resume and out.is_file() and not checkpoint.path.is_file():
         print(f"{out}: is there, and no checkpoint beside it; nothing to resume")
         return 0
-    frames = sum(motion.frames for motion in motions)
-    print(f"{dressed.garment.name}: {dressed.vertices} vertices, {len(motions)} motions, {frames} frames")
     validation = None
     if held_out:
         validation = Validation(motions=held_out, patience=options.patience, trajectories=trajectories)
@@ -194,6 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         recipe=RECIPES.get(options.recipe), trajectories=trajectories, device=options.device,
         checkpoint=checkpoint, validation=validation,
     )  # fmt: skip
+    print(f"{dressed.garment.name}: {dressed.vertices} vertices, {len(motions)} motions")
     print_summary(model)
     print(model.save(out))
     checkpoint.delete()
@@ -204,7 +203,8 @@ def print_summary(model: TrainedModel) -> None:
     """Print the last losses, high windows, the best validation and the size of a model."""
     terms = [f"{name} {value:.4g}" for name, value in model.history[-1].items()
              if "/" not in name and name not in ("step", "seconds")]  # fmt: skip
-    print(f"recipe {model.recipe.name}, last steps, {model.unit}, mean over frames: " + "  ".join(terms))
+    print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
+    print(f"last steps, {model.unit}, mean over frames: " + "  ".join(terms))
     for window in model.summary["named_windows"][:5]:
         print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     if validation := model.summary.get("validation"):

@@ -72,7 +72,7 @@ def test_the_command_learns_from_the_file(built, tmp_path, capsys, refused, monk
     monkeypatch.setattr(train, "choose_garment", lambda options, body: tube_dress().garment)
     assert train.main(given) == 0
     shown = capsys.readouterr().out
-    assert out.is_file() and "3 motions, 54 frames" in shown and "recipe supervised" in shown
+    assert out.is_file() and "3 motions" in shown and "recipe supervised, 54 frames" in shown
     text = tmp_path / "text.h5"
     text.write_text("no HDF5")
     for options, message in (
