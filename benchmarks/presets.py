@@ -1,8 +1,10 @@
-"""The sizes of a run: three frozen presets, from a smoke test to the paper's scale."""
+"""Sizes of a run, from a smoke test to the paper's scale: presets.toml, a table each."""
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,8 @@ class Preset:
     name: str
     description: str
     garment_vertices: int
-    train_motions: int | None
-    test_motions: int | None
+    train_motions: int | None = None
+    test_motions: int | None = None
     frames: int
     train_frames: int
     clip_frames: int
@@ -61,99 +63,16 @@ class Preset:
         return self.steps.get(training, self.steps.get(kind, 0))
 
 
-def _steps(*, snug: int, ncs: int, **others: int) -> dict[str, int]:
-    """Return the optimiser steps per kind: handles are trained as long as snug, ncs-static as ncs."""
-    handles = dict.fromkeys(("handles-20", "handles-40", "handles-80", "handles-80-dynamic"), snug)
-    once = {"nearest-poses": 1, "pose-regression": 1}
-    return {"snug": snug, "ncs": ncs, "ncs-static": ncs, **handles, **once, **others}
+def _read_presets() -> tuple[Preset, ...]:
+    tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    for table in tables.values():
+        table["dependence"] = Dependence(
+            **{name: tuple(v) if isinstance(v, list) else v for name, v in table["dependence"].items()}
+        )
+    return tuple(Preset(name=name, **table) for name, table in tables.items())
 
 
-PRESETS = (
-    Preset(
-        name="smoke",
-        description="garments of 350 vertices, seconds of training; its numbers mean nothing",
-        garment_vertices=350,
-        train_motions=1,
-        test_motions=1,
-        frames=20,
-        train_frames=20,
-        clip_frames=10,
-        warm_up_frames=3,
-        loop_frames=390,
-        settle_frames=12,
-        steps=_steps(snug=60, ncs=30, dynamic=60, supervised=60, pbns=60, santesteban2019=10, tailornet=60),
-        sheet_cells=6,
-        sheet_frames=10,
-        gap_samples=10,
-        least_seconds=0.1,
-        repeats=2,
-        repeat_seconds=0.5,
-        cell_seconds=120.0,
-        dependence=Dependence((200, 300), 200, (1, 2), 5, 6),
-    ),
-    Preset(
-        name="quick",
-        description="garments of 1000 vertices, all training clips, eight motions to measure",
-        garment_vertices=1000,
-        train_motions=None,
-        test_motions=8,
-        frames=150,
-        train_frames=100_000,
-        clip_frames=36,
-        warm_up_frames=10,
-        loop_frames=10_000,
-        settle_frames=30,
-        steps=_steps(
-            snug=5300,
-            ncs=2650,
-            dynamic=8000,
-            supervised=4000,
-            pbns=6000,
-            santesteban2019=1000,
-            tailornet=4000,
-        ),
-        sheet_cells=14,
-        sheet_frames=45,
-        gap_samples=12,
-        least_seconds=0.5,
-        repeats=3,
-        repeat_seconds=1.5,
-        cell_seconds=600.0,
-        dependence=Dependence((500, 1000, 2000), 1000, (1, 2, 4), 30, 20),
-    ),
-    Preset(
-        name="paper",
-        description="garments of 4400 vertices, all frames of all motions, 30,000 steps of SNUG, 136,000 by "
-        "the paper's text: hours",
-        garment_vertices=4400,
-        train_motions=None,
-        test_motions=None,
-        frames=100_000,
-        train_frames=100_000,
-        clip_frames=100_000,
-        warm_up_frames=10,
-        loop_frames=10_000,
-        settle_frames=60,
-        steps={"snug-paper": 136_000, "pbns-paper": 136_000}
-        | _steps(
-            snug=30_000,
-            ncs=15_000,
-            dynamic=30_000,
-            supervised=10_000,
-            pbns=12_000,
-            santesteban2019=10_000,
-            tailornet=10_000,
-        ),
-        sheet_cells=30,
-        sheet_frames=90,
-        gap_samples=40,
-        least_seconds=1.0,
-        repeats=3,
-        repeat_seconds=120.0,
-        cell_seconds=86_400.0,
-        dependence=Dependence((500, 1000, 2000, 4400), 1000, (1, 2, 4, 8), 90, 30),
-    ),
-)
+PRESETS = _read_presets()
 
 
 def find_preset(name: str) -> Preset:
