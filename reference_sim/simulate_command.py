@@ -63,7 +63,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("garment", help="triangle mesh at rest: OBJ, PLY, VTK, STL or OFF")
-    add("-o", "--output", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
+    add("-o", "--out", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
     add("--units", choices=("m", "cm", "mm", "in"), default="m", help="of all meshes (default m)")
     add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
     add("--pins", metavar="WHICH",
@@ -129,17 +129,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else DEFAULT_FRAMES
     dt = options.dt if options.dt is not None else obstacle_dt or DEFAULT_DT
     trajectory = simulate(
-        cloth, make_terms(cloth, options), dt=dt, frames=frames, obstacle=obstacle, path=options.output,
-        progress=options.output.name,
+        cloth, make_terms(cloth, options), dt=dt, frames=frames, obstacle=obstacle, path=options.out,
+        progress=options.out.name,
     )  # fmt: skip
-    print(f"{summarise(trajectory, frames)}\nwrote      {options.output}", flush=True)
+    print(f"{summarise(trajectory, frames)}\nwrote      {options.out}", flush=True)
     whole = trajectory.frames == frames and trajectory.status == "converged"
     return DONE if whole else NOT_CONVERGED
 
 
 def _check_options(options: argparse.Namespace) -> None:
     """Refuse what could not be written, or has no meaning, before any work."""
-    path = options.output
+    path = options.out
     if path.suffix.lower() not in (".vtkhdf", ".hdf"):
         raise ValueError(f"{path}: the trajectory ends in .vtkhdf")
     if path.exists():

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from reference_sim.command_line import Parser, command
-from snug.file_options import add_garment_options, make_garment_file
+from snug.file_options import GARMENT_WORDS, parse_garment_file
 
 PROGRAM = "snug.check"
 USABLE, UNUSABLE, UNREADABLE = 0, 1, 2
@@ -15,8 +15,8 @@ LEVEL_MARKS = {"ok": "", "note": "note", "unusable": "NO"}
 EXAMPLES = """examples:
   python -m snug.check shirt.obj                              on the body of the package
   python -m snug.check shirt.obj dress.ply --body mine.npz    on your own
-  python -m snug.check shirt.obj --garment-units cm --garment-up z
-  python -m snug.check shirt.obj --garment-rest uv            its UV chart as rest shape
+  python -m snug.check shirt.obj,units=cm,up=z
+  python -m snug.check shirt.obj,rest=uv                      its UV chart as rest shape
 
 beside a mesh: <name>.weights.npz with an array "weights" (V, 24), or the vertex properties weight_0 to
 weight_23 of a PLY, are skinning weights that are kept as they are.
@@ -30,11 +30,10 @@ def make_parser() -> argparse.ArgumentParser:
         prog=f"python -m {PROGRAM}",
         description="Read garments as benchmarks.run and snug.train do, and print a short table: size, "
         "place on the body, rest shape, winding, openings, weights, and what mends them.",
-        epilog=EXAMPLES,
+        epilog=f"{EXAMPLES}\n\n{GARMENT_WORDS}",
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, VTK, STL or OFF")
     parser.add_argument("--body", metavar="FILE", help="a body of your own (default: that of the package)")
-    add_garment_options(parser)
     return parser
 
 
@@ -42,7 +41,7 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
     options = make_parser().parse_args(arguments)
-    files = [make_garment_file(path, options) for path in options.files]
+    files = list(map(parse_garment_file, options.files))
     # NumPy and more, which --help does not need.
     from snug.body.smpl_files import read_body
     from snug.garments.fit import DressForm

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder
 from snug.file_options import (
-    add_garment_options,
-    add_motion_options,
-    demand_garment_file,
+    GARMENT_WORDS,
+    MOTION_WORDS,
     is_garment_file,
-    make_garment_file,
-    parse_motion_options,
+    parse_garment_file,
+    parse_motion_files,
 )
 from snug.kinds import KINDS
 from snug.named_recipes import RECIPES
@@ -37,7 +36,7 @@ GONE = {
 }
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
-  python -m snug.train --garment shirt.obj --body mine.npz    your own garment (see snug.check)
+  python -m snug.train --garment shirt.obj,units=cm --body mine.npz    your own garment (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
   python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
@@ -55,7 +54,7 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser = Parser(
         prog="python -m snug.train",
         description="Train a garment network on a dressed body and write it to one file.",
-        epilog=EXAMPLES,
+        epilog="\n\n".join((EXAMPLES, GARMENT_WORDS, MOTION_WORDS)),
         replaced=GONE,
     )
     add = parser.add_argument
@@ -79,8 +78,6 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--device", default="cpu", metavar="cpu|cuda", help="where the whole step runs (default: cpu)")
     add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
     add("-o", "--out", metavar="FILE", help="file to write (default: by --model)")
-    add_motion_options(parser.add_argument_group("motions in files").add_argument)
-    add_garment_options(parser)
     options = parser.parse_args(arguments)
     options.out = Path(options.out or f"{options.model}.safetensors")
     return options
@@ -110,11 +107,10 @@ def choose_garment(options: argparse.Namespace, body: Body) -> Garment:
     if not is_garment_file(options.garment):
         from snug.garments.templates import find_template
 
-        demand_garment_file(options)
         return find_template(options.garment).tailor(body, vertices=options.vertices)
     from snug.garments.reading import read_garment  # a tailored garment needs no reader of meshes
 
-    return read_garment(make_garment_file(options.garment, options), body)
+    return read_garment(parse_garment_file(options.garment), body)
 
 
 def choose_motions(
@@ -129,10 +125,10 @@ def choose_motions(
     from snug.motion.files import load_motions
     from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion
 
-    reading = parse_motion_options(options)
     motions = list(simulated) or [make_motion(name) for name in TRAIN]
     if options.motions:
-        motions = load_motions(options.motions, options=reading)
+        path, reading = parse_motion_files(options.motions)
+        motions = load_motions(path, options=reading)
     names = [motion.name for motion in motions]
     # Of the library; they never train.
     others = [name for name in (*VALIDATION, *DYNAMIC_VALIDATION, *CONTROL) if name not in names]

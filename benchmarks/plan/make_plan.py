@@ -24,7 +24,7 @@ from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
-from snug.file_options import GarmentFile, demand_usable_name
+from snug.file_options import GarmentFile
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 
@@ -169,7 +169,6 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
 
 def check_garment_name(file: GarmentFile) -> None:
     """Raise ValueError unless scenes can be named after the file of a garment, and none are."""
-    demand_usable_name(file.path)
     taken = {scene.split("/")[0] for scene in all_scenes((), ())} | {
         scenes.garment for scenes in GARMENT_SCENES
     }

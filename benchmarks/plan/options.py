@@ -20,6 +20,7 @@ from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES
 from benchmarks.scenes.variations import shapes, there_and_back
 from benchmarks.validation.registry import CASES
 from reference_sim.command_line import Parser
+from snug.file_options import split_words
 
 PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
@@ -33,10 +34,10 @@ EXAMPLES = """examples:
   python -m benchmarks.run --methods ./mine.py,snug,simulation --set metrics=./my_metric.py
   python -m benchmarks.run --motions clips/ --test-motions 01_01
   python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
-  python -m benchmarks.run --motions mocap.bvh --set motion_files.up=z --set motion_files.repair=true
+  python -m benchmarks.run --motions mocap.bvh,up=z,repair
   python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
   python -m benchmarks.run --seeds 0,1,2 --scheduler tcp://10.0.0.1:8786
-  python -m benchmarks.run full:garments --garment shirt.obj --set garment.units=cm --body mine.npz
+  python -m benchmarks.run full:garments --garment shirt.obj,units=cm --body mine.npz
 
 a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
   as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
@@ -63,10 +64,10 @@ REPLACED = {  # former option -> field of a study
     "--device": "--set device=cuda",
     "--self-contact": "--set self_contact=true",
     "--validation-motions": "--set validation_motions=NAME,...",
-    "--motion-up": "--set motion_files.up=z",
-    "--motion-fps": "--set motion_files.fps=N",
-    "--joint-map": "--set motion_files.joint_map=FILE",
-    "--repair": "--set motion_files.repair=true",
+    "--motion-up": "--motions PATH,up=z",
+    "--motion-fps": "--motions PATH,fps=N",
+    "--joint-map": "--motions PATH,joint_map=FILE",
+    "--repair": "--motions PATH,repair",
     "--units": "ROLLOUT,units=cm",
     "--up": "ROLLOUT,up=z",
     "--fps": "ROLLOUT,fps=N",
@@ -74,7 +75,7 @@ REPLACED = {  # former option -> field of a study
     "--other-mesh": "ROLLOUT,other-mesh",
     "--declared-ms": "ROLLOUT,ms=N",
     "--name": "NAME=ROLLOUT",
-    **{f"--garment-{word}": f"--set garment.{word.replace('-', '_')}=..."
+    **{f"--garment-{word}": f"--garment FILE,{word.replace('-', '_')}=..."
        for word in ("units", "up", "shift", "rest", "uv-scale", "material")},
 }  # fmt: skip
 
@@ -137,6 +138,13 @@ def _layers(options: argparse.Namespace) -> Iterator[Layer]:
         value: Any = given if field in (*SINGLE, "motions") else split(given)
         if field == "seeds":
             value = [_whole_number(word) for word in value]
+        if field == "garment":
+            path, words = split_words(given)
+            value = {"path": path, **words}
+        if field == "motions":
+            value, words = zip(*map(split_words, given))
+            if any(words):
+                yield option(label, "motion_files", {n: v for one in words for n, v in one.items()})
         if field == "rollouts":
             label, value = "--rollout", dict(map(parse_roll_out, given))
         yield option(label, field, list(value) if isinstance(value, tuple) else value)

@@ -48,32 +48,31 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
     return joined, kept
 
 
-def rest_chart(surface: Surface, scale: float, *, prefix: str = "--") -> np.ndarray:
+def rest_chart(surface: Surface, scale: float) -> np.ndarray:
     """Return the chart (F, 3, 2) [m] of a surface in metres, as `Cloth` takes it for `rest_uv`.
 
     Args:
         surface: positions in metres.
         scale: metres per unit of the chart.
-        prefix: of the options that the messages name.
 
     Raises:
         MeshError: no chart, a corner or an area missing, a total area further than `AREA_FACTOR` from that of
             the mesh, or pieces so distorted that they are no pattern.
     """
-    instead = f"{prefix}rest mesh takes the mesh itself as rest shape"
+    instead = "rest=mesh takes the mesh itself as rest shape"
     if surface.uv is None:
         raise MeshError(f"has no UV: {instead}")
     bad = np.flatnonzero(~np.isfinite(surface.uv).all(axis=(1, 2)))
     if bad.size:
         raise MeshError(f"triangle {bad[0]} has a corner without UV: complete the chart, or {instead}")
     if not (np.isfinite(scale) and scale > 0):
-        raise MeshError(f"{prefix}uv-scale {scale}: give metres per unit of the chart, above 0")
+        raise MeshError(f"uv_scale={scale}: give metres per unit of the chart, above 0")
     chart = scale * surface.uv
     corners = surface.positions[surface.faces]
     flat, mesh = corner_areas(chart), corner_areas(corners)
     ratio = flat.sum() / mesh.sum()
     if not 1 / AREA_FACTOR <= ratio <= AREA_FACTOR:
-        equal = f"{prefix}uv-scale {scale / np.sqrt(ratio):.4g} makes them equal, " if ratio > 0 else ""
+        equal = f"uv_scale={scale / np.sqrt(ratio):.4g} makes them equal, " if ratio > 0 else ""
         raise MeshError(
             f"its UV chart measures {flat.sum():.4g} m^2 and the mesh {mesh.sum():.4g} m^2: give metres per "
             f"unit of the chart, {equal}or {instead}"

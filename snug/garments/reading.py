@@ -18,7 +18,7 @@ from reference_sim.files.uv_chart import flattened, join_seams, rest_chart, stre
 from reference_sim.geometry.topology import corner_angles
 from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
-from snug.file_options import OPTION, GarmentFile
+from snug.file_options import GarmentFile
 from snug.garments.fit import DressForm, find_placement, pose_in_file
 from snug.garments.garment import Garment, GarmentError, find_weights, read_authored_weights, smooth_weights
 from snug.garments.openings import name_openings, open_seam, piece_of_faces
@@ -145,11 +145,11 @@ def _check_place(examination: Examination, file: GarmentFile, form: DressForm, r
     remedy = "move it onto the unposed body, facing +z with y up"
     if placement := find_placement(form, raw.positions, file.units, file.up, np.asarray(file.shift)):
         units, up, shift = placement
-        changes = [f"{OPTION}units {units}"] * (units != file.units)
-        changes += [f"{OPTION}up {up}"] * (up != file.up)
-        numbers = ",".join(f"{value + 0.0:g}" for value in shift)
-        changes += [f"{OPTION}shift={numbers}"] * (tuple(shift) != file.shift)
-        remedy = " ".join(changes)
+        changes = [f"units={units}"] * (units != file.units)
+        changes += [f"up={up}"] * (up != file.up)
+        numbers = " ".join(f"{value + 0.0:g}" for value in shift)
+        changes += [f"shift={numbers}"] * (tuple(shift) != file.shift)
+        remedy = f"give '{','.join([file.path.name, *changes])}'"
     examination.add("place", f"does not lie on the body ({size} m, {problem})", remedy, UNUSABLE)
     return False
 
@@ -162,7 +162,7 @@ def _find_rest_shape(examination: Examination, file: GarmentFile, surface: Surfa
         return None
     try:
         scale = METRES[file.units] if file.uv_scale is None else file.uv_scale
-        chart = rest_chart(surface, scale, prefix=OPTION)
+        chart = rest_chart(surface, scale)
     except MeshError as error:
         problem, _, remedy = str(error).partition(": ")
         if asked:

@@ -111,11 +111,11 @@ def frame_rate(
     given = options.fps
     if stated is not None and given is not None and abs(stated - given) > 0.01 * stated:
         raise MotionError(
-            f"{path}: states {stated:g} frames per second, --motion-fps says {given:g}; leave it out"
+            f"{path}: states {stated:g} frames per second, fps={given:g} is given; leave it out"
         )
     fps = next((value for value in (stated, given, usual) if value is not None), None)
     if fps is None:
-        raise MotionError(f"{path}: states no frame rate; give --motion-fps N")
+        raise MotionError(f"{path}: states no frame rate; add ,fps=N behind the path")
     if not LOWEST_RATE <= fps <= HIGHEST_RATE:
         raise MotionError(f"{path}: {fps:g} frames per second; rates are {LOWEST_RATE:g} to {HIGHEST_RATE:g}")
     return fps
@@ -174,7 +174,7 @@ def remove_recording_errors(raw: RawMotion, *, repair: bool) -> RawMotion:
     if wrong.mean() > MAX_WRONG:
         raise MotionError(f"{raw.path}: {share} ({named}); check frame rate and units, export it again")
     if not repair:
-        raise MotionError(f"{raw.path}: {named}; give --repair to interpolate, or cut the clip")
+        raise MotionError(f"{raw.path}: {named}; add ,repair behind the path to interpolate, or cut the clip")
     if stays:
         raise MotionError(f"{raw.path}: {stays} and stays where it is then; cut the clip there")
     return replace(raw, poses=poses, translations=path, source=f"{raw.source}; repaired: {named}")
@@ -280,13 +280,13 @@ def turn_y_up(raw: RawMotion, up: str) -> RawMotion:
     if problem:
         remedy = "turn the root's rotation and path so that y or z is up, or give a clip that stands"
         if likely in TO_Y_UP:
-            remedy = f"give --motion-up {likely}, or a clip that stands"
+            remedy = f"add ,up={likely} behind the path, or give a clip that stands"
         raise MotionError(f"{raw.path}: {problem} along {likely} in {share}; {remedy}")
     rise = float(np.ptp(joints[..., _SIGNED_AXES.index(up or likely)].min(axis=1)))
     if not up and rise > MAX_RISE:
         raise MotionError(
             f"{raw.path}: the body points along {likely} in {share}, and its lowest joint moves by "
-            f"{rise:.3g} m along it; if {likely} is up and the path in metres give --motion-up {likely}"
+            f"{rise:.3g} m along it; if {likely} is up and the path in metres add ,up={likely}"
         )
     turn = TO_Y_UP[up or likely]
     note = f"{up} up as given" if up else f"{likely} up, as the body stands in {share}"

@@ -152,7 +152,7 @@ def match_joints(
         if ours not in matches:
             known = ", ".join(filter(None, names))
             raise MotionError(
-                f"{path}: no joint is known as '{ours}'; name it by --joint-map (there are {known[:300]})"
+                f"{path}: no joint is known as '{ours}'; name it in a joint_map (there are {known[:300]})"
             )
     matches = _trunk(path, names, parents, matches) | matches
     above = {
@@ -166,7 +166,7 @@ def match_joints(
         if upper in matches and ours != "pelvis" and matches[upper] not in way_up(parents, theirs)[1:]:
             raise MotionError(
                 f"{path}: '{names[theirs]}' taken for {ours} does not hang below '{names[matches[upper]]}' "
-                f"taken for {upper}; name them by --joint-map"
+                f"taken for {upper}; name them in a joint_map"
             )
     return matches
 
@@ -232,7 +232,7 @@ def _trunk(
     heads = [index for index, name in enumerate(names) if _side(name)[1].endswith("head")]
     head = matches.get("head", heads[0] if heads else None)
     if head is None:
-        raise MotionError(f"{path}: no joint is known as 'head'; name it by --joint-map")
+        raise MotionError(f"{path}: no joint is known as 'head'; name it in a joint_map")
     trunk = {"pelvis": pelvis, "head": head}
     spine = [joint for joint in reversed(way_up(parents, chest)) if pelvis in way_up(parents, joint)[1:]]
     if spine:

@@ -86,7 +86,7 @@ def test_principal_stretches_of_a_known_map():
 def test_a_chart_in_another_unit_is_refused_with_the_scale_that_mends_it():
     positions, faces = SHEET
     surface = Surface(positions, faces, uv=own_chart(positions, faces) / 0.25)
-    with pytest.raises(MeshError, match=r"--uv-scale 0\.25 makes them equal"):
+    with pytest.raises(MeshError, match=r"uv_scale=0\.25 makes them equal"):
         rest_chart(surface, 1.0)
     np.testing.assert_allclose(rest_chart(surface, 0.25), own_chart(positions, faces))
 
@@ -94,7 +94,7 @@ def test_a_chart_in_another_unit_is_refused_with_the_scale_that_mends_it():
 def test_a_texture_is_no_pattern():
     positions, faces = SHEET
     chart = own_chart(positions, faces) * [4.0, 0.25]  # each triangle along its own axes
-    with pytest.raises(MeshError, match=r"that is a texture and no pattern; --rest mesh"):
+    with pytest.raises(MeshError, match=r"that is a texture and no pattern; rest=mesh"):
         rest_chart(Surface(positions, faces, uv=chart), 1.0)
 
 

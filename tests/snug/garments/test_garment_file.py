@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
-from snug.file_options import GarmentFile, add_garment_options, demand_garment_file, make_garment_file
+from snug.file_options import GarmentFile, parse_garment_file
 from snug.garments.fit import DressForm, pose_in_file
 from snug.garments.garment import GarmentError
 from snug.garments.reading import examine_file, read_garment
@@ -197,9 +196,12 @@ def weights(columns, value):
 
 
 REFUSED = [
-    (lambda s: {"positions": 100 * s.rest_positions}, "does not lie on the body .*: --garment-units cm$"),
-    (lambda s: {"positions": z_up(s.rest_positions)}, "does not lie on the body .*: --garment-up z$"),
-    (lambda s: {"positions": z_up(s.rest_positions) / 0.0254}, ": --garment-units in --garment-up z$"),
+    (
+        lambda s: {"positions": 100 * s.rest_positions},
+        r"not lie on the body .*: give 'mine\.\w+,units=cm'$",
+    ),
+    (lambda s: {"positions": z_up(s.rest_positions)}, r"does not lie on the body .*: give 'mine\.\w+,up=z'$"),
+    (lambda s: {"positions": z_up(s.rest_positions) / 0.0254}, ",units=in,up=z'$"),
     (
         lambda s: {"faces": np.concatenate([s.faces, s.faces[5:6]])},
         r"triangles 5 and \d+ are the same: remove",
@@ -234,7 +236,7 @@ def test_the_shift_that_is_said_mends_a_displaced_garment(tmp_path, body, shirt,
     path = saved(tmp_path, shirt, positions=shirt.rest_positions + away)
     with pytest.raises(GarmentError, match=r"mm deep in the body|fits far better") as refused:
         read_garment(GarmentFile(path=path), body)
-    shift = tuple(map(float, str(refused.value).rpartition("--garment-shift=")[2].split(",")))
+    shift = tuple(map(float, str(refused.value).rpartition(",shift=")[2].strip("'").split()))
     np.testing.assert_allclose(np.add(shift, away), 0.0, atol=0.02)
     read_garment(GarmentFile(path=path, shift=shift), body)
 
@@ -254,19 +256,17 @@ def test_a_seam_that_a_program_left_open_is_refused(tmp_path, body, tube, gap):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "expected"),
+    ("words", "expected"),
     [
-        (["--garment-shift=-1,2"], "give three numbers"),
-        (["--garment-uv-scale", "2"], "add --garment-rest uv"),
+        ("shift=-1 2", "give three numbers"),
+        ("uv_scale=2", "add rest=uv"),
+        ("units=km", "units=km: choose from m, cm, mm, in"),
+        ("unit=cm", "no word is called 'unit'; there are path, units"),
     ],
 )
-def test_an_option_that_means_nothing_is_refused(arguments, expected):
-    parser = argparse.ArgumentParser()
-    add_garment_options(parser)
+def test_a_word_that_means_nothing_is_refused(words, expected):
     with pytest.raises(ValueError, match=expected):
-        make_garment_file("a.obj", parser.parse_args(arguments))
-    with pytest.raises(ValueError, match="add --garment FILE"):
-        demand_garment_file(parser.parse_args(arguments))
+        parse_garment_file(f"a.obj,{words}")
 
 
 # --- the command that says all of it -----------------------------------------------------------------------
@@ -281,7 +281,7 @@ def test_check_says_what_was_found_and_how_to_mend_it(tmp_path, capsys, tube):
 
     bad = saved(tmp_path, tube, positions=1000 * tube.rest_positions, name="bad.obj")
     assert check.main([str(good), str(bad)]) == check.UNUSABLE
-    assert "--garment-units mm" in capsys.readouterr().out
+    assert "bad.obj,units=mm" in capsys.readouterr().out
 
     assert check.main([str(tmp_path / "my shirt.obj")]) == check.UNREADABLE
     assert "'my shirt' cannot name scenes" in capsys.readouterr().err
@@ -301,10 +301,10 @@ def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_pa
         raise ValueError("seen enough")
 
     monkeypatch.setattr(train_network, "train_network", stop)
-    arguments = ["--garment", str(path), "--garment-rest", "uv", "--garment-uv-scale", "0.01"]
-    arguments += ["--garment-material", str(tmp_path / "silk.toml"), "-o", str(tmp_path / "a.safetensors")]
+    words = f"{path},rest=uv,uv-scale=0.01,material={tmp_path / 'silk.toml'}"
+    arguments = ["--garment", words, "-o", str(tmp_path / "a.safetensors")]
     assert train_command.main(arguments) == 2
     (dressed,) = seen
     assert dressed.cloth.material == Material(density=300.0) and dressed.vertices == 150
     np.testing.assert_allclose(dressed.cloth.rest_uv, own_chart(tube.rest_positions, tube.faces))
-    assert train_command.main(["--garment", "tshirt", "--garment-up", "z"]) == 2 and len(seen) == 1
+    assert train_command.main(["--garment", "tshirt,up=z"]) == 2 and len(seen) == 1

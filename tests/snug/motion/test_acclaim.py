@@ -187,7 +187,7 @@ def test_a_spike_of_a_bone_is_bridged_and_named(tmp_path):
     angles = np.linspace(0, 30, 61)
     angles[30] = 150
     clip = write_clip(tmp_path, [amc_frame(k + 1, rradius=(a,)) for k, a in enumerate(angles)])
-    with pytest.raises(MotionError, match="right_elbow jumps in frames 28-32; give --repair"):
+    with pytest.raises(MotionError, match="right_elbow jumps in frames 28-32; add ,repair"):
         read_motion(clip, MotionFileOptions())
     motion = read_motion(clip, MotionFileOptions(repair=True))
     assert "repaired: right_elbow jumps in frames 28-32" in motion.source

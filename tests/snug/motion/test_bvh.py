@@ -145,7 +145,7 @@ def test_a_map_names_joints_that_no_guess_finds(tmp_path):
     odd = {name: f"bone{index}" for index, name in enumerate(JOINT_NAMES)}
     path = written(tmp_path / "odd.bvh", names=odd)
     with pytest.raises(
-        MotionError, match=r"odd\.bvh: no joint is known as 'left_hip'; name it by --joint-map"
+        MotionError, match=r"odd\.bvh: no joint is known as 'left_hip'; name it in a joint_map"
     ):
         read_motion(path, MotionFileOptions())
     table = tmp_path / "map.toml"

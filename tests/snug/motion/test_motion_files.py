@@ -73,7 +73,7 @@ class TestForms:
 
     def test_a_file_of_poses_alone_needs_a_rate_and_stays_in_place(self, tmp_path):
         np.save(tmp_path / "poses.npy", KICK.poses.reshape(-1, 72))
-        assert refused(tmp_path / "poses.npy", "no frame rate; give --motion-fps N")
+        assert refused(tmp_path / "poses.npy", "no frame rate; add ,fps=N behind")
         motion = read_motion(tmp_path / "poses.npy", MotionFileOptions(fps=30.0))
         assert (motion.translations == 0).all() and "the root stays" in motion.source
 
@@ -118,7 +118,7 @@ class TestForms:
         assert refused(path, "frame 3, joint 2 is no unit quaternion")
 
     def test_a_rate_is_said_once(self, tmp_path):
-        assert refused(write(tmp_path / "clip.npz", KICK), "states 30 .* says 60", fps=60.0)
+        assert refused(write(tmp_path / "clip.npz", KICK), "states 30 .* fps=60 is given", fps=60.0)
         assert read_motion(write(tmp_path / "clip.npz", KICK), MotionFileOptions(fps=30.0)).fps == 30.0
         assert read_motion(write_clip(tmp_path, [amc_frame(1)]), MotionFileOptions(fps=60.0)).fps == 60.0
 
@@ -147,10 +147,10 @@ class TestUpAxis:
         walk = make_motion("walk")
         assert refused(
             write(tmp_path / "y.npz", walk),
-            "with z up the body lies .* along y in 100 %.*--motion-up y",
+            "with z up the body lies .* along y in 100 %.*,up=y behind",
             up="z",
         )
-        assert refused(write(tmp_path / "z.npz", walk, TO_Z_UP), "with y up .* --motion-up z", up="y")
+        assert refused(write(tmp_path / "z.npz", walk, TO_Z_UP), "with y up .* ,up=z", up="y")
         for up in ("y", "z"):
             path = write(tmp_path / "clip.npz", walk, TO_Z_UP if up == "z" else Y_UP)
             assert f"{up} up as given" in read_motion(path, MotionFileOptions(up=up)).source
@@ -194,7 +194,7 @@ class TestGlitches:
 
     def test_a_joint_that_jumps_is_named_or_mended(self, tmp_path):
         path = write(tmp_path / "clip.npz", self.spoiled())
-        assert refused(path, "right_elbow jumps in frames 18-22; give --repair")
+        assert refused(path, "right_elbow jumps in frames 18-22; add ,repair")
         motion = read_motion(path, MotionFileOptions(repair=True))
         assert "repaired: right_elbow jumps in frames 18-22" in motion.source
         error = angles(
@@ -214,7 +214,7 @@ class TestGlitches:
         trans[-1, 1] = np.inf
         np.savez(tmp_path / "clip.npz", trans=trans, fps=30.0, **{form: array})
         named = "left_knee is not finite in frames 5-6, the root's path is not finite in frames 39-39"
-        assert refused(tmp_path / "clip.npz", f"{named}; give --repair")
+        assert refused(tmp_path / "clip.npz", f"{named}; add ,repair")
         motion = read_motion(tmp_path / "clip.npz", MotionFileOptions(repair=True))
         assert f"repaired: {named}" in motion.source
         np.testing.assert_array_equal(motion.translations[-1], KICK.translations[-2])

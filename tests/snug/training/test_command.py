@@ -24,9 +24,8 @@ def test_motions_that_validate_do_not_train():
         ("--threads 2", "a training has one thread"),
         ("--patience 3", "--patience 3: add --validation NAME"),
         ("--motions {0}/nowhere", "nowhere"),
-        ("--repair", "say of which files by --motions"),
         ("--validation dance_turn", DANCE),
-        ("--motions {0} --motion-fps 30 --hold-out b", "--hold-out b: no such motion among a"),
+        ("--motions {0},fps=30 --hold-out b", "--hold-out b: no such motion among a"),
         ("--device tpu", "--device tpu"),
     ],
 )
