@@ -184,7 +184,7 @@ def plan_of(declared: Declarations, folder: Path, scene_plan: Plan | None) -> Pl
     )  # fmt: skip
 
 
-def outcomes_of(tasks: Sequence[Task], plan: Plan, assets: Assets | None) -> Mapping[TaskId, Outcome]:
+def outcomes_of(tasks: Sequence[Task], plan: Plan, assets: Assets | None) -> dict[TaskId, Outcome]:
     """Return the outcomes of tasks, all of them done now."""
     run = RunFolder(plan.folder)
     runner = Runner(tasks, Cache(run, only=STATES))

@@ -1,9 +1,9 @@
-"""Dead load: a constant force, the term that loads a structure in a check."""
+"""Solves that have to converge, the order of an error, and the dead load: what known answers share."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from reference_sim import energies
 
 if TYPE_CHECKING:
     from torch import Tensor
+
+Solved = TypeVar("Solved", "sim.Result", "sim.Trajectory")
 
 
 class DeadLoad(energies.Energy):
@@ -35,9 +37,6 @@ class DeadLoad(energies.Energy):
         return -float(np.vdot(self.forces, x)), -self.forces
 
 
-Solved = TypeVar("Solved", "sim.Result", "sim.Trajectory")
-
-
 def demand_converged(solved: Solved, name: str) -> Solved:
     """Return the result itself. Raises RuntimeError with `name`, status and reason unless it converged."""
     if solved.status != "converged":
@@ -45,12 +44,36 @@ def demand_converged(solved: Solved, name: str) -> Solved:
     return solved
 
 
-def fitted_order(errors: Sequence[float], sizes: Sequence[float]) -> float:
-    """Return the slope of log error over log size by least squares; nan for errors of zero or not finite.
+def minimum(terms: Sequence[energies.Energy], start: np.ndarray, **options: Any) -> np.ndarray:
+    """Return the minimum (V, 3) [m] of the sum of these terms that is found from `start` (V, 3) [m].
 
-    >>> round(fitted_order([4e-3, 1e-3, 2.5e-4], [1, 0.5, 0.25]), 6)
+    options: of `minimise`. Raises RuntimeError unless it converged.
+    """
+    result = sim.minimise(sim.Potential(list(terms)), start, **options)
+    return demand_converged(result, "the search for a minimum").positions
+
+
+def motion(cloth: sim.Cloth, terms: Sequence[energies.Energy], **options: Any) -> np.ndarray:
+    """Return the simulated positions (T, V, 3) [m]; options: of `simulate`. Raises RuntimeError likewise."""
+    return demand_converged(sim.simulate(cloth, terms, **options), "the simulation").positions
+
+
+def farthest(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the largest distance of two arrays of points (..., n)."""
+    return float(np.linalg.norm(one - other, axis=-1).max())
+
+
+def order(error: Callable[[int], float], counts: Sequence[int], whole: float = 1.0) -> float:
+    """Return the order of `error` in the size whole / n, over these counts n of equal parts.
+
+    >>> round(order(lambda n: 4.0 / n**2, (8, 16, 32)), 6)
     2.0
     """
+    return fitted_order([error(n) for n in counts], [whole / n for n in counts])
+
+
+def fitted_order(errors: Sequence[float], sizes: Sequence[float]) -> float:
+    """Return the slope of log error over log size by least squares; nan for errors of zero or not finite."""
     if not (np.isfinite(errors).all() and np.min(errors) > 0):
         return float("nan")
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])

@@ -49,7 +49,7 @@ import reference_sim as sim
 from benchmarks.meshes import lying, right_grid
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.contact import DRUM, RoundBody, box, strip_over_drum
-from benchmarks.validation.equilibrium import demand_converged, fitted_order
+from benchmarks.validation.equilibrium import motion, order
 from benchmarks.validation.large_bending import HANGING_MATERIAL, WEIGHT, string_stretch
 from reference_sim import energies
 
@@ -74,7 +74,7 @@ SUMMED_TWICE = "the residual gradient that the solver may leave, summed twice"
 )  # fmt: skip
 def creep_speed(ratio: float) -> float:
     """Return the speed of a patch on a slope of tan(a) = ratio mu, over that of u' = u in (1)."""
-    path, downhill = _slope(ratio, frames=31)
+    path, downhill = _slope(ratio)
     speed = float((path[-1] - path[-2]) @ downhill) / DT
     return speed / (SPEED * (1 - np.sqrt(1 - ratio)))
 
@@ -85,7 +85,7 @@ def creep_speed(ratio: float) -> float:
 )  # fmt: skip
 def slope_path(ratio: float) -> float:
     """Return the worst distance of a patch on a slope to its path by (1), over 30 steps."""
-    path, downhill = _slope(ratio, frames=31)
+    path, downhill = _slope(ratio)
     angle = np.arctan(ratio * MU)
     exact = _slip(0.0, ratio, DT * MU * sim.GRAVITY * np.cos(angle) / SPEED, steps=30)
     return float(np.abs((path - path[0]) @ downhill - exact).max())
@@ -96,7 +96,7 @@ def slope_path(ratio: float) -> float:
 )  # fmt: skip
 def slide_path(ratio: float) -> float:
     """Return the worst distance of a patch on a slope to the path of the constant g (sin a - mu cos a)."""
-    path, downhill = _slope(ratio, frames=31)
+    path, downhill = _slope(ratio)
     angle, n = np.arctan(ratio * MU), np.arange(31)
     exact = sim.GRAVITY * (np.sin(angle) - MU * np.cos(angle)) * DT**2 * n * (n + 1) / 2
     return float(np.abs((path - path[0]) @ downhill - exact).max())
@@ -109,7 +109,7 @@ def slide_path(ratio: float) -> float:
 def belt_path(substeps: int = 1) -> float:
     """Return the worst distance of a patch put on a belt to its path by (1); u: how fast it lags."""
     along = np.array([BELT * DT, 0.0, 0.0]) * np.arange(16)[:, None, None]
-    path = _patch(LEVEL, along, frames=16, substeps=substeps)[:, 0]
+    path = _patch(carried=along, frames=16, substeps=substeps)[:, 0]
     dt = DT / substeps
     behind = _slip(BELT / SPEED, 0.0, dt * MU * sim.GRAVITY / SPEED, steps=15 * substeps, dt=dt)[::substeps]
     return float(np.abs(path - path[0] - (along[:, 0, 0] - behind)).max())
@@ -122,7 +122,7 @@ def friction_landing() -> float:
     The table gives it the momentum m (v_n + g t) upwards, and takes mu times that of its sliding. Friction
     is a step late, but loses nothing: the force before the first step is that of the last, its weight.
     """
-    path = _patch(LEVEL, STILL, frames=16, velocity=np.array([THROWN, -FALLING, 0.0]))
+    path = _patch(frames=16, velocity=np.array([THROWN, -FALLING, 0.0]))
     kept = THROWN - MU * (FALLING + sim.GRAVITY * 15 * DT)
     return float((path[-1, 0] - path[-2, 0]) / DT / kept)
 
@@ -140,30 +140,19 @@ def _slip(u: float, drive: float, c: float, *, steps: int, dt: float = DT) -> np
     return np.array(slipped)
 
 
-def _slope(ratio: float, *, frames: int) -> tuple[np.ndarray, np.ndarray]:
+def _slope(ratio: float) -> tuple[np.ndarray, np.ndarray]:
     angle = np.arctan(ratio * MU)
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    return _patch(turn, STILL, frames=frames), -turn[:, 0]
+    return _patch(turn=turn, frames=31), -turn[:, 0]
 
 
-def _patch(
-    turn: np.ndarray,
-    motion: np.ndarray,
-    *,
-    frames: int,
-    velocity: np.ndarray = STILL[0, 0],
-    substeps: int = 1,
-) -> np.ndarray:
-    """Return the path (T, 3) [m] of the middle of a patch on a turned plane moved by motion (T, 1, 3)."""
+def _patch(**options: Any) -> np.ndarray:
+    """Return the path (T, 3) [m] of the middle of a patch; options: of `slid`."""
     points, faces = right_grid(2, 2, 0.1, 0.1)
     flat = lying(points)
     cloth = sim.Cloth(flat, faces[:, ::-1], sim.Material())
-    x = slid(
-        cloth, flat, frames=frames, dt=DT, speed=SPEED, turn=turn, motion=motion, velocity=velocity,
-        substeps=substeps,
-    )  # fmt: skip
-    return x.mean(axis=1)
+    return slid(cloth, flat, dt=DT, speed=SPEED, **options).mean(axis=1)
 
 
 def slid(
@@ -174,7 +163,7 @@ def slid(
     dt: float,
     speed: float,
     turn: np.ndarray = LEVEL,
-    motion: np.ndarray = STILL,
+    carried: np.ndarray = STILL,
     pull: np.ndarray = STILL[0, 0],
     velocity: np.ndarray = STILL[0, 0],
     quasi_static: bool = False,
@@ -182,7 +171,7 @@ def slid(
 ) -> np.ndarray:
     """Simulate a cloth laid flat (V, 3) [m] on the plane y = 0, both turned by `turn`: (frames, V, 3) [m].
 
-    It starts as deep in the margin as its weight presses it. The plane moves by motion (T, 1, 3) [m], pins
+    It starts as deep in the margin as its weight presses it. The plane moves by carried (T, 1, 3) [m], pins
     by pull (3,) [m] a frame; velocity (3,) [m/s] is that of the start. `speed` [m/s] is that of the
     smoothing. Contact is on vertices.
     """
@@ -193,14 +182,13 @@ def slid(
     start = (flat + np.array([0.0, contact.margin - depth, 0.0])) @ turn.T
     friction = energies.ContactFriction(contact, coefficient=MU, speed=speed)
     corners, sides = box()
-    trajectory = sim.simulate(
+    return motion(
         cloth, [energies.StretchStVK(cloth), energies.Gravity(cloth), contact, friction], dt=dt,
-        frames=frames, obstacle=sim.Obstacle((corners + motion) @ turn.T, sides), start=start,
+        frames=frames, obstacle=sim.Obstacle((corners + carried) @ turn.T, sides), start=start,
         velocity=np.tile(velocity, (len(flat), 1)),
         pin_positions=lambda frame: start[cloth.pins] + frame * pull,
         quasi_static=quasi_static, substeps=substeps, tolerance=SOLVED,
     )  # fmt: skip
-    return demand_converged(trajectory, "the slide").positions
 
 
 SOFT = sim.Material(young_modulus=7e3)  # a tenth of cotton's: the point breaks loose after 14 steps
@@ -345,8 +333,7 @@ def ratio(mu: float) -> float:
 @known_answer(expected=2.0, tolerance=0.2, reason="the strip's depth in the margin over R is left")
 def friction_capstan_order() -> float:
     """Return the order in the length of a cell of the error of that ratio's logarithm, at mu = 0.5."""
-    columns = (30, 60, 120)
-    return fitted_order([abs(_excess(0.5, n)) for n in columns], [1 / n for n in columns])
+    return order(lambda columns: abs(_excess(0.5, columns)), (30, 60, 120))
 
 
 def _excess(mu: float, columns: int) -> float:
@@ -356,18 +343,10 @@ def _excess(mu: float, columns: int) -> float:
     contact = energies.ContactPenalty(cloth, samples="vertices", stiffness=HARD)
     friction = energies.ContactFriction(contact, coefficient=mu, speed=1e-3 * DRUM * TURN)
     body: Any = TurningDrum(DRUM, TURN)
-    trajectory = sim.simulate(
-        cloth,
-        [energies.StretchStVK(cloth), contact, friction],
-        dt=1.0,
-        frames=40,
-        obstacle=body,
-        start=start,
-        guess="previous",
-        quasi_static=True,
-        tolerance=1e-9,
-    )
-    x = demand_converged(trajectory, "the strip").positions[-1]
+    x = motion(
+        cloth, [energies.StretchStVK(cloth), contact, friction], dt=1.0, frames=40, obstacle=body,
+        start=start, guess="previous", quasi_static=True, tolerance=1e-9,
+    )[-1]  # fmt: skip
     strain = energies.StretchStVK(cloth).value_and_gradient(x)[1]
     pulls = [float(np.linalg.norm(strain[end].sum(axis=0))) for end in ends]
     line = x.reshape(3, columns + 1, 3).mean(axis=0)

@@ -41,8 +41,8 @@ import numpy as np
 import reference_sim as sim
 from benchmarks.meshes import ROW, in_space, lying, rectangle, right_grid
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.clamped_strip import Strip, clamped_strip, exact_elastica
-from benchmarks.validation.equilibrium import DeadLoad, demand_converged, fitted_order
+from benchmarks.validation.clamped_strip import clamped_strip, exact_elastica
+from benchmarks.validation.equilibrium import DeadLoad, minimum, order
 from benchmarks.validation.plates import NU, GaussianCurvature
 from reference_sim import energies
 
@@ -53,17 +53,11 @@ COLUMNS = 120
 SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
 
 
-@cache
-def strip(family: str, columns: int) -> Strip:
-    """Return a strip of 1 m, clamped at x = 0."""
-    return clamped_strip(family, columns, 1.0, ELASTICA_MATERIAL)
-
-
 def bent_strip(
     family: str, weight: float, load: float, columns: int = COLUMNS
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the chord of the strip and of the elastica, (width, height) each, over the length."""
-    made = strip(family, columns)
+    made = clamped_strip(family, columns, 1.0, ELASTICA_MATERIAL)
     cloth, length = made.cloth, made.length
     acceleration = weight * made.stiffness / length**3 / ELASTICA_MATERIAL.areal_density
     terms: list[energies.Energy] = [energies.StretchStVK(cloth), energies.BendHinge(cloth)]
@@ -81,9 +75,8 @@ def bent_strip(
     guess[free, 0] = np.interp(rest[free, 0], s, x)
     guess[free, 1] = -np.interp(rest[free, 0], s, drop)
     strength = (weight + load) * made.stiffness / ELASTICA_MATERIAL.areal_density / 9.81
-    result = sim.minimise(sim.Potential(terms), guess, tolerance=1e-6 * strength)
-    demand_converged(result, f"the strip of {family} triangles")
-    return made.chord(result.positions) / length, np.array([x[-1], drop[-1]])
+    bent = minimum(terms, guess, tolerance=1e-6 * strength)
+    return made.chord(bent) / length, np.array([x[-1], drop[-1]])
 
 
 @known_answer(
@@ -147,16 +140,15 @@ def hanging_strip_tip() -> tuple[float, float]:
 def hanging_strip_order() -> float:
     """Return the order in h of the tip of a hanging strip."""
     exact = exact_tip()
-    return fitted_order(
-        [abs(_hanging(rows) - exact) for rows in HANGING_ROWS], [1 / rows for rows in HANGING_ROWS]
-    )
+    return order(lambda rows: abs(_hanging(rows) - exact), HANGING_ROWS)
 
 
 def _hanging(rows: int) -> float:
     points, faces = right_grid(rows, 4, 1.0, 4.0 / rows)
     points[:, 1] -= 1.0  # the top edge at y = 0
     cloth = sim.Cloth(in_space(points), faces, HANGING_MATERIAL, pins=np.flatnonzero(points[:, 1] > -1e-9))
-    x = _at_rest(cloth, cloth.rest_positions * [1.0, 1.02, 1.0])[1]
+    start = cloth.rest_positions * [1.0, 1.02, 1.0]
+    x = minimum([energies.StretchStVK(cloth), energies.Gravity(cloth)], start, tolerance=1e-9)
     return float(-x[points[:, 1] < -1 + 1e-9, 1].mean())
 
 
@@ -192,9 +184,7 @@ def catenary() -> dict[str, tuple[float, float]]:
 def catenary_order() -> float:
     """Return the order in h of the sag of an elastic catenary."""
     exact = exact_catenary()["sag"]
-    return fitted_order(
-        [abs(_catenary(rows)["sag"] - exact) for rows in HANGING_ROWS], [1 / rows for rows in HANGING_ROWS]
-    )
+    return order(lambda columns: abs(_catenary(columns)["sag"] - exact), HANGING_ROWS)
 
 
 def _catenary(columns: int) -> dict[str, float]:
@@ -205,21 +195,15 @@ def _catenary(columns: int) -> dict[str, float]:
     cloth = sim.Cloth(rest, faces[:, ::-1], HANGING_MATERIAL, pins=ends)
     start = rest * [SPAN, 1.0, 1.0] - [0.5 * SPAN, 0.0, 0.0]
     start[:, 1] = -0.28 * (1 - (2 * start[:, 0] / SPAN) ** 2)  # near the answer, not it
-    potential, x = _at_rest(cloth, start)
+    terms = [energies.StretchStVK(cloth), energies.Gravity(cloth)]
+    x = minimum(terms, start, tolerance=1e-9)
     left = points[:, 0] < 1e-9
     middle = np.abs(points[:, 0] - 0.5) < 1e-9
-    force = -potential.gradient(x)[left, 0].sum() / width
+    force = -sim.Potential(terms).gradient(x)[left, 0].sum() / width
     return {"force": float(force), "sag": float(-x[middle, 1].mean())}
 
 
-def _at_rest(cloth: sim.Cloth, start: np.ndarray) -> tuple[sim.Potential, np.ndarray]:
-    potential = sim.Potential([energies.StretchStVK(cloth), energies.Gravity(cloth)])
-    return potential, demand_converged(sim.minimise(potential, start, tolerance=1e-9), "the strip").positions
-
-
-BUCKLING_STIFFNESS = (
-    1e-5  # [J] hinge stiffness: so small that the strip hardly sags in its own plane before it buckles
-)
+BUCKLING_STIFFNESS = 1e-5  # [J] so small that the strip hardly sags in its own plane before it buckles
 BUCKLING_MATERIAL = sim.Material(poisson_ratio=0.3, bending_stiffness=BUCKLING_STIFFNESS)
 CRITICAL = {"end": 4.0126, "weight": 12.85}  # total load, over (EI GJ)^0.5 / L^2
 BUCKLING_ROWS = (4, 8)
@@ -273,17 +257,14 @@ def buckling_factor(cloth: sim.Cloth, forces: np.ndarray) -> float:
 
     strain, stiff = energies.StretchStVK(cloth), energies.BendHinge(cloth)
     stiff.stiffness = 1e5 * stiff.stiffness  # keeps the loaded strip in its plane, where hinges do no work
-    in_plane = sim.Potential([strain, stiff, DeadLoad(cloth, forces)])
-    flat = demand_converged(
-        sim.minimise(in_plane, cloth.rest_positions, tolerance=1e-9), "the strip in its plane"
-    )
+    flat = minimum([strain, stiff, DeadLoad(cloth, forces)], cloth.rest_positions, tolerance=1e-9)
     free = np.flatnonzero(cloth.free)
 
     def out_of_plane(potential: sim.Potential, x: np.ndarray) -> sp.csc_matrix:
         return sp.csc_matrix(potential.hessian(x)[2::3][:, 2::3][free][:, free])
 
     bending = out_of_plane(sim.Potential([energies.BendHinge(cloth)]), cloth.rest_positions)
-    stress = out_of_plane(sim.Potential([strain]), flat.positions)
+    stress = out_of_plane(sim.Potential([strain]), flat)
     # (bending + factor stress) w = 0: 1/factor is the largest eigenvalue of -stress against bending.
     start = np.ones(len(free))
     values = spla.eigsh(-stress, k=1, M=bending, which="LA", v0=start, return_eigenvectors=False)
@@ -299,12 +280,9 @@ C11 = 1 / 4  # of scaled hinges on equilateral triangles, over k
 ANNULUS_ROWS = (8, 16)  # of triangles between the radii
 STAGES = 12
 ANNULUS_MATERIAL = sim.Material(
-    young_modulus=YOUNG,
-    poisson_ratio=0.0,
-    thickness=ANNULUS_THICKNESS,
-    density=1.0,
+    young_modulus=YOUNG, poisson_ratio=0.0, thickness=ANNULUS_THICKNESS, density=1.0,
     bending_stiffness=D / C11,
-)
+)  # fmt: skip
 
 
 @known_answer(
@@ -380,6 +358,5 @@ def lift(plate: Plate, terms: Sequence[energies.Energy]) -> np.ndarray:
     x[cloth.pins] = cloth.rest_positions[cloth.pins]
     for stage in range(1, STAGES + 1):
         forces[lip, 1] = LOAD * share * (stage / STAGES) ** 2
-        result = sim.minimise(sim.Potential([*terms, DeadLoad(cloth, forces)]), x, tolerance=1e-4)
-        x = demand_converged(result, f"the plate at stage {stage}").positions
+        x = minimum([*terms, DeadLoad(cloth, forces)], x, tolerance=1e-4)
     return x[lip[[0, -1]], 1]

@@ -7,7 +7,7 @@ import numpy as np
 import reference_sim as sim
 from benchmarks.meshes import in_space, jittered_patch, lying, right_grid
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import demand_converged, fitted_order
+from benchmarks.validation.equilibrium import demand_converged, farthest, fitted_order, minimum
 from reference_sim import energies
 
 LBFGS_STEPS = 60
@@ -30,7 +30,7 @@ def newton_quadratic() -> float:
 def newton_order() -> float:
     """Return the order of the last steps of Newton's method: slope of log error over log error before."""
     potential, start = _stretched()
-    end = demand_converged(sim.minimise(potential, start, tolerance=1e-13), "the minimiser").positions
+    end = minimum(potential.energies, start, tolerance=1e-13)
     errors = [
         float(np.abs(sim.minimise(potential, start, max_iterations=k, tolerance=1e-13).positions - end).max())
         for k in range(1, 12)
@@ -88,8 +88,7 @@ def newton_wants_small_steps() -> float:
     material = sim.Material(bending_stiffness=1e-5)
     cloth = sim.Cloth(flat, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.06))
     potential = _potential(cloth, energies.Gravity(cloth, acceleration=3e-6))
-    results = [sim.minimise(potential, flat, tolerance=tolerance) for tolerance in (1e-6, 1e-10)]
-    loose, tight = (demand_converged(result, "the minimiser").positions for result in results)
+    loose, tight = (minimum(potential.energies, flat, tolerance=small) for small in (1e-6, 1e-10))
     if np.abs(tight - flat).max() < 0.005:
         raise RuntimeError("the strip hardly sags: nothing is proved")
     return float(np.linalg.norm(loose - tight, axis=1).max() / cloth.edge_lengths.mean())
@@ -105,9 +104,9 @@ def newton_leaves_saddles() -> float:
     border = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
     cloth = sim.Cloth(0.3 * in_space(points), faces, sim.Material(), pins=np.flatnonzero(border))
     potential, flat = _potential(cloth), cloth.rest_positions * [0.9, 1.0, 1.0]
-    result = demand_converged(sim.minimise(potential, flat), "the minimiser")
     free = np.repeat(~border, 3)
-    values = np.linalg.eigvalsh(potential.hessian(result.positions).toarray()[np.ix_(free, free)])
+    hessian = potential.hessian(minimum(potential.energies, flat)).toarray()
+    values = np.linalg.eigvalsh(hessian[np.ix_(free, free)])
     return float((values < -1e-9 * values[-1]).sum())
 
 
@@ -115,11 +114,11 @@ def newton_leaves_saddles() -> float:
 def lbfgs_distance() -> float:
     """Return the distance of the end of 60 steps of L-BFGS to Newton's, where there is one minimiser."""
     potential, start = _stretched()
-    newton = demand_converged(sim.minimise(potential, start, tolerance=1e-12), "the minimiser").positions
+    newton = minimum(potential.energies, start, tolerance=1e-12)
     result = sim.minimise(
         potential, start, "lbfgs", finish=False, max_iterations=LBFGS_STEPS, tolerance=1e-12
     )
-    return float(np.linalg.norm(result.positions - newton, axis=1).max())
+    return farthest(result.positions, newton)
 
 
 def _patch(cells: int, pins: np.ndarray | tuple[int, ...] = ()) -> sim.Cloth:
