@@ -18,8 +18,8 @@ EXAMPLES = """examples:
   python -m snug.check shirt.obj,units=cm,up=z
   python -m snug.check shirt.obj,rest=uv                      its UV chart as rest shape
 
-beside a mesh: <name>.weights.npz with an array "weights" (V, 24), or the vertex properties weight_0 to
-weight_23 of a PLY, are skinning weights that are kept as they are.
+beside a mesh: <name>.weights.npz with an array "weights" (V, 24) has skinning weights, which are kept as
+they are.
 
 exit status: 0 all can be used, 1 one cannot, 2 one cannot be read"""
 

@@ -37,7 +37,6 @@ class CutPlane:
         point: (3,) [m] of the plane.
         reach: only |x| < reach [m] is cut.
         bend: [1/m] curves it in z: bend (z - z0)^2 [m] beyond the plane, up to BEND_SPAN.
-        twin: name of the mirrored opening, for an opening that the seam does not meet.
     """
 
     name: str
@@ -45,7 +44,6 @@ class CutPlane:
     point: tuple[float, float, float]
     reach: float = np.inf
     bend: float = 0.0
-    twin: str = ""
 
     def height(self, points: Array) -> Array:
         """Return how far (N,) [m] points (N,3) are beyond the bent plane along its normal, at any x."""
@@ -121,7 +119,7 @@ def armhole_cut(
     down = top - np.append(flank[:, 1], hem)
     grown = clearance + ease / (2 * np.pi) + flare * down / down[-1] + FLANK_ROOM
     lean = ((wide + grown - edge) / down).max()
-    return CutPlane("left_armhole", (1.0, lean, 0.0), (edge, top, 0.0), twin="right_armhole")
+    return CutPlane("left_armhole", (1.0, lean, 0.0), (edge, top, 0.0))
 
 
 def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, Index]:

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 
 from reference_sim.cloth import Cloth
-from reference_sim.files.array_file import ArrayFileError, read_arrays
 from reference_sim.geometry.closest_point import FaceSearch
 from reference_sim.geometry.topology import half_edges
 from reference_sim.material import Material
@@ -113,40 +111,27 @@ class Garment:
         if betas is None:
             return self.rest_positions.copy()
         displacement = (body.shaped(betas) - body.template)[self.body_vertices]
-        return self.rest_positions + _average(displacement, self.faces, SHAPE_SMOOTHING)
+        return self.rest_positions + smooth_weights(displacement, self.faces, SHAPE_SMOOTHING)
 
 
-def smooth_weights(weights: ArrayLike, faces: Index, iterations: int) -> Array:
-    """Average skinning weights (V,24) `iterations` times, each vertex with its neighbours' mean.
+def smooth_weights(values: ArrayLike, faces: Index, iterations: int) -> Array:
+    """Average values (V,K), as skinning weights, `iterations` times, each vertex with its neighbours' mean.
 
     Half the vertex, half the mean (uniform Laplacian): rows keep their sum and stay non-negative.
-
-    Raises:
-        GarmentError: fewer than 0 iterations.
 
     >>> smooth_weights([[1.0], [0.0], [0.0]], np.array([[0, 1, 2]]), 1).ravel().tolist()
     [0.5, 0.25, 0.25]
     """
-    if iterations < 0:
-        raise GarmentError(f"iterations={iterations}: smoothing needs 0 rounds or more")
-    return _average(np.asarray(weights, dtype=np.float64), faces, iterations)
-
-
-def _average(values: Array, faces: Index, rounds: int) -> Array:
-    neighbours = _adjacency(faces, len(values))
-    degree = np.asarray(neighbours.sum(axis=1)).reshape(-1, 1)
-    for _ in range(rounds):
-        values = 0.5 * values + 0.5 * (neighbours @ values) / degree
-    return values
-
-
-def _adjacency(faces: Index, count: int) -> csr_array:
+    smooth = np.asarray(values, dtype=np.float64)
     halves = half_edges(faces)
     both = np.unique(np.concatenate([halves, halves[:, ::-1]]), axis=0)
-    return coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count)).tocsr()
+    neighbours = coo_array((np.ones(len(both)), tuple(both.T)), shape=(len(smooth),) * 2).tocsr()
+    degree = np.asarray(neighbours.sum(axis=1)).reshape(-1, 1)
+    for _ in range(iterations):
+        smooth = 0.5 * smooth + 0.5 * (neighbours @ smooth) / degree
+    return smooth
 
 
-KEY = "weights"  # of the array in an .npz; of a PLY's properties weight_0 to weight_23
 NEVER = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_foot", "right_foot")
 INSIDE = 0.5  # winding number of the garment around what it encloses
 COVERED = 0.05  # share of a limb's skin within a garment, from which the garment follows that limb
@@ -205,43 +190,3 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
     limbs = {name: strongest == JOINT_NAMES.index(name) for name in allowed}
     limbs = {name: skin for name, skin in limbs.items() if skin.any()}
     return tuple(name for name, skin in limbs.items() if inside[skin].mean() > COVERED) or tuple(limbs)
-
-
-def read_authored_weights(path: Path, data: Mapping[str, Array], beside: Path, count: int) -> Array | None:
-    """Return weights (count, 24) of a file beside a mesh, or of the mesh's vertex data; None without either.
-
-    Raises:
-        GarmentError: weights of another shape, negative, or whose rows do not sum to one.
-    """
-    names = [f"{KEY.removesuffix('s')}_{number}" for number in range(len(JOINT_NAMES))]
-    if beside.is_file():
-        path = beside
-        try:
-            stored = read_arrays(beside, (KEY,))
-        except ArrayFileError as error:
-            raise GarmentError(str(error)) from None
-        if KEY not in stored:
-            raise GarmentError(
-                f"{beside}: no array {KEY!r}: save weights (V, {len(JOINT_NAMES)}) by this name"
-            )
-        weights = stored[KEY]
-    elif names[0] in data:
-        if missing := [name for name in names if name not in data]:
-            raise GarmentError(f"{path}: no vertex property {missing[0]!r} beside {names[0]!r}: give all 24")
-        weights = np.stack([data[name] for name in names], axis=1)
-    else:
-        return None
-    if weights.shape != (count, len(JOINT_NAMES)) or weights.dtype.kind not in "fiu":
-        raise GarmentError(
-            f"{path}: {KEY} are {weights.dtype} {weights.shape}: expected numbers ({count}, "
-            f"{len(JOINT_NAMES)}), a row for each vertex of the mesh file"
-        )
-    weights = weights.astype(np.float64)
-    sums = weights.sum(axis=1)
-    off = ~(np.isfinite(weights).all(axis=1) & (weights >= -1e-6).all(axis=1) & (np.abs(sums - 1) < 1e-3))
-    if off.any():
-        row = int(np.argmax(off))
-        raise GarmentError(
-            f"{path}: weights of vertex {row} are negative or sum to {sums[row]:.4g} instead of 1"
-        )
-    return np.maximum(weights, 0.0) / np.maximum(weights, 0.0).sum(axis=1, keepdims=True)

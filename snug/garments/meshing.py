@@ -1,7 +1,5 @@
 """Mesh of a garment from its surface and cuts: half remeshed, kept off the body, mirrored at the seam.
 
-Remesh half of a garment: cluster a dense sheet, put its rim on the exact cut lines, relax.
-
 pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are spread
 evenly along the cut lines of the dense sheet, and the inner ones move towards a weighted mean of the
 triangles around them, kept on the surface, between Delaunay flips.
@@ -10,8 +8,7 @@ triangles around them, kept on the surface, between Delaunay flips.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +18,7 @@ from reference_sim.geometry.surface import vertex_normals
 from reference_sim.geometry.topology import boundary_loops, corner_angles, half_edges, triangle_areas
 from snug.body.parametric_body import Body
 from snug.garments.cuts import SEAM, CutPlane, cut_sheet, outlines
-from snug.garments.garment import Garment, GarmentError, smooth_weights
-from snug.garments.implicit_surface import (
-    SHIRT_BONES,
-    ImplicitSurface,
-    build_surface,
-    joint_position,
-    skin_following,
-)
+from snug.garments.implicit_surface import SHIRT_BONES, ImplicitSurface, skin_following
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -39,13 +29,6 @@ Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
 EVENNESS = 3
 RELAXATION_STEP = 0.2
 RELAXATIONS = 40  # rounds of relax
-
-
-def along(curve: Array, shares: Array) -> Array:
-    """Return points at the given shares (N,) of the length of a polyline (P,3)."""
-    steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
-    length = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.stack([np.interp(shares * length[-1], length, curve[:, k]) for k in range(3)], axis=1)
 
 
 def interior_edges(faces: Index) -> tuple[Index, Index, Index]:
@@ -145,10 +128,12 @@ def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
     return coarse_points, coarse_faces
 
 
-def _spread(curve: Array, count: int, *, closed: bool) -> Array:
+def _spread(curve: Array, count: int) -> Array:
     """Return `count` points (count,3) evenly along a polyline (P,3), its first included, its last not."""
-    line = np.concatenate([curve, curve[:1]]) if closed else curve
-    return along(line, np.arange(count) / count)
+    steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    shares = np.arange(count) / count
+    return np.stack([np.interp(shares * length[-1], length, curve[:, k]) for k in range(3)], axis=1)
 
 
 def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
@@ -156,7 +141,7 @@ def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
     if len(outline) == 1:
         curve = outline[0]
         start = int(np.argmin(np.linalg.norm(points[loop] - curve[0], axis=1)))
-        points[np.roll(loop, -start)] = _spread(curve, len(loop), closed=True)
+        points[np.roll(loop, -start)] = _spread(np.concatenate([curve, curve[:1]]), len(loop))
         return
     corners = [int(np.argmin(np.linalg.norm(points[loop] - curve[0], axis=1))) for curve in outline]
     loop = np.roll(loop, -corners[0])
@@ -164,7 +149,7 @@ def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
     if np.any(np.diff(stops) < 1):
         raise ValueError("the rim of the mesh does not follow its outline")
     for curve, begin, end in zip(outline, stops[:-1], stops[1:], strict=True):
-        points[loop[begin:end]] = _spread(curve, end - begin, closed=False)
+        points[loop[begin:end]] = _spread(curve, end - begin)
 
 
 def remesh(
@@ -309,67 +294,7 @@ def _check_even(points: Array, faces: Index, wanted: int) -> None:
         raise ValueError(f"{openings} openings instead of {wanted}")
 
 
-SMOOTHED_OVER = 0.1  # [m] about the hip joints: from borrowed weights to smoothed ones
-
-
 def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
     """Return the nearest template vertex (V,) that follows one of `bones` to each position (V,3) [m]."""
     allowed = np.flatnonzero(skin_following(body, bones))
     return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
-
-
-def assemble_garment(
-    name: str, body: Body, vertices: int, cut: Mapping[str, float], surface: Mapping[str, Any],
-    cuts: list[CutPlane], bones: Sequence[str], smoothing: int = 0,
-) -> Garment:  # fmt: skip
-    """Make the garment of a surface and its cuts.
-
-    Args:
-        name: of the garment.
-        body: that it is made for.
-        vertices: number of vertices, met within 1 %.
-        cut: parameters of the tailoring, stored with the garment.
-        surface: arguments of build_surface.
-        cuts: where the surface ends.
-        bones: whose skin the garment borrows weights from.
-        smoothing: rounds over them at 1000 vertices, below the hip joints or, with a waistband, everywhere.
-
-    Raises:
-        GarmentError: no sound mesh comes out.
-    """
-    try:
-        sheet = build_surface(body, **surface, clearance=cut["clearance"])
-        positions, faces = mesh_garment(body, sheet, cuts, vertices, cut["clearance"])
-    except ValueError as error:
-        raise GarmentError(f"{name}: {error}") from error
-    loops = _named_loops(positions, faces, cuts)
-    nearest = nearest_body_vertices(body, positions, bones)
-    borrowed = np.asarray(body.skinning_weights)[nearest]
-    weights = smooth_weights(borrowed, faces, round(smoothing * vertices / 1000))
-    if smoothing and "waist" not in loops:
-        above = positions[:, 1] - joint_position(body, "left_hip")[1]
-        share = np.clip(above / SMOOTHED_OVER + 0.5, 0.0, 1.0)[:, None]
-        weights = share * borrowed + (1 - share) * weights
-    return Garment(
-        name=name,
-        rest_positions=positions,
-        faces=faces,
-        body_vertices=nearest,
-        skinning_weights=weights,
-        loops=loops,
-        pins=np.sort(loops.get("waist", np.empty(0, dtype=np.int64))),
-        parameters=dict(cut),
-    )
-
-
-def _named_loops(points: Array, faces: Index, cuts: Sequence[CutPlane]) -> dict[str, Index]:
-    """Return the openings by the cuts that they lie on, each from its front-most vertex on."""
-    openings = [cut for cut in cuts if cut.name != SEAM]
-    named = {}
-    for loop in boundary_loops(faces):
-        left = points[loop] * [np.sign(points[loop, 0].mean()) or 1.0, 1.0, 1.0]
-        off = [np.abs(cut.beyond(left)).mean() for cut in openings]
-        cut = openings[int(np.argmin(off))]
-        mirrored = cut.twin and points[loop, 0].mean() < 0
-        named[cut.twin if mirrored else cut.name] = np.roll(loop, -int(np.argmax(points[loop, 2])))
-    return {name: named[name] for cut in reversed(openings) for name in (cut.name, cut.twin) if name}

@@ -18,10 +18,12 @@ Index = NDArray[np.int64]
 ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
 OPEN_SEAM = 0.05  # of the mean boundary edge: between boundary vertices that no edge joins, a seam left open
 MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
+ORDER = ("neck", "waist", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "left_leg",
+         "right_leg", "hem")  # fmt: skip
 
 
 def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
-    """Return the boundary vertices of each opening by its name, in order, front-most first.
+    """Return the boundary vertices of each opening by its name, along the winding, front-most first.
 
     The garment (V,3) [m], (F,3) lies on the unposed body. An opening beside the middle is a sleeve above the
     hips, or far out, and a leg else; a sleeve that ends near the shoulder's joint is an armhole. In the
@@ -36,21 +38,28 @@ def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index
     if not loops:
         return {}
     centres = [positions[loop].mean(axis=0) for loop in loops]
-    openings: dict[str, Index] = {}
-    # The longest loop comes first: of two with one claim it has the name, a slit or a buttonhole has not.
+    heights = [float(centre[1]) for centre in centres]
+    openings: dict[str, int] = {}
     middle = []
-    for loop, centre in zip(loops, centres):
-        side = _name_beside(body, centre)
-        if not side:
-            middle.append((loop, centre))
-        elif side not in openings:
-            openings[side] = loop
-    openings |= _name_in_the_middle(body, middle, legs="left_leg" in openings or "right_leg" in openings)
+    # The longest loop comes first: of two with one claim it has the name, a slit or a buttonhole has not.
+    for number, centre in enumerate(centres):
+        if side := _name_beside(body, centre):
+            openings.setdefault(side, number)
+        else:
+            middle.append(number)
+    if middle:
+        middle.sort(key=lambda number: -heights[number])
+        half_way = 0.5 * (joint_position(body, "pelvis")[1] + joint_position(body, "neck")[1])
+        top = "neck" if heights[middle[0]] > half_way else "waist"
+        if len(middle) > 1:
+            openings |= {top: middle[0], "hem": middle[-1]}
+        else:
+            openings[top if openings.keys() & {"left_leg", "right_leg"} else "hem"] = middle[0]
     if not {"left_leg", "right_leg"} <= openings.keys():
-        openings.setdefault("hem", loops[int(np.argmin([centre[1] for centre in centres]))])
-    firsts = {int(loop[0]) for loop in openings.values()}
-    rest = (loop for loop in loops if int(loop[0]) not in firsts)
-    return openings | {f"opening_{number}": loop for number, loop in enumerate(rest, start=1)}
+        openings.setdefault("hem", int(np.argmin(heights)))
+    rest = (number for number in range(len(loops)) if number not in openings.values())
+    named = {name: loops[openings[name]] for name in ORDER if name in openings}
+    return named | {f"opening_{count}": loops[number] for count, number in enumerate(rest, start=1)}
 
 
 def _name_beside(body: Body, centre: Array) -> str:
@@ -64,19 +73,6 @@ def _name_beside(body: Body, centre: Array) -> str:
     beyond = out > shoulder[0] - middle + ARMHOLE * arm
     limb = "sleeve" if beyond else "armhole" if centre[1] > hip[1] else "leg"
     return f"{'left' if centre[0] > middle else 'right'}_{limb}"
-
-
-def _name_in_the_middle(body: Body, loops: list[tuple[Index, Array]], legs: bool) -> dict[str, Index]:
-    """Return the loops in the middle by their names."""
-    if not loops:
-        return {}
-    by_height = sorted(loops, key=lambda pair: -pair[1][1])
-    (top, centre), (bottom, _) = by_height[0], by_height[-1]
-    half_way = 0.5 * (joint_position(body, "pelvis")[1] + joint_position(body, "neck")[1])
-    name = "neck" if centre[1] > half_way else "waist"
-    if len(loops) == 1:
-        return {name if legs else "hem": top}
-    return {name: top, "hem": bottom}
 
 
 def piece_of_faces(faces: Index) -> Index:

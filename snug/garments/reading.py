@@ -1,18 +1,19 @@
 """Read a garment from a mesh file: every finding on the way, and the garment itself.
 
-Each finding is stated once, here: `python -m snug.check` lists all, `read_garment` raises the first that
-makes the file unusable.
+`python -m snug.check` lists all findings, `read_garment` raises the first that makes the file unusable.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference_sim.cloth import Cloth, MeshError
+from reference_sim.files.array_file import ArrayFileError, read_arrays
 from reference_sim.files.mesh_files import METRES, Surface, read_mesh, to_metres_y_up
 from reference_sim.files.uv_chart import flattened, join_seams, rest_chart, stretches
 from reference_sim.geometry.topology import corner_angles
@@ -20,7 +21,7 @@ from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
 from snug.file_options import GarmentFile
 from snug.garments.fit import DressForm, find_placement, pose_in_file
-from snug.garments.garment import Garment, GarmentError, find_weights, read_authored_weights, smooth_weights
+from snug.garments.garment import Garment, GarmentError, find_weights, smooth_weights
 from snug.garments.openings import name_openings, open_seam, piece_of_faces
 
 Array = NDArray[np.float64]
@@ -35,8 +36,7 @@ UNPOSED_SMOOTHING = 20  # rounds over borrowed weights at 1000 vertices, as reci
 AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2], lightest and heaviest cloth: beyond them a unit is mistaken
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """A fact about one matter of a file. level: OK, NOTE or UNUSABLE; a remedy where there is one."""
 
     matter: str
@@ -49,16 +49,10 @@ class Finding:
 class Examination:
     """Findings about a file, and its garment as far as it could be read.
 
-    Attributes:
-        findings: in the order of reading.
-        surface: joined, in metres, y up, wound outward.
-        distances: (V,) [m] of its vertices to the skin, negative below it.
-        garment: None where something cannot be used.
+    findings: in the order of reading. garment: None where something cannot be used.
     """
 
     findings: list[Finding] = field(default_factory=list)
-    surface: Surface | None = None
-    distances: Array | None = None
     garment: Garment | None = None
 
     def add(self, matter: str, text: str, remedy: str = "", level: str = OK) -> None:
@@ -107,19 +101,18 @@ def examine_file(file: GarmentFile, form: DressForm) -> Examination:
         material = Material.from_file(file.material) if file.material else Material()
     except (MeshError, MaterialError) as error:
         raise GarmentError(str(error)) from None
-    authored = read_authored_weights(file.path, raw.vertex_data, file.weights, len(raw.positions))
+    authored = read_weights(file.weights, len(raw.positions)) if file.weights.is_file() else None
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
     surface, kept = join_seams(replace(raw, positions=positions))
-    examination = Examination(surface=surface)
+    examination = Examination()
     quads = f", {raw.quads} quads cut in two" if raw.quads else ""
     examination.add("mesh", f"{len(surface.positions)} vertices, {len(surface.faces)} triangles{quads}")
     if doubled := len(raw.positions) - len(kept):
         examination.add("doubled vertices", f"{doubled} joined with another at the same place", level=NOTE)
-    fits = _check_place(examination, file, form, raw)
+    fits = _check_place(examination, file, form, raw, surface.positions)
     chart = _find_rest_shape(examination, file, surface)
     if fits:
         surface, chart = _wind_outward(examination, surface, chart, form)
-    examination.surface = surface
     if file.material:
         _check_material(examination, material)
     sound = _check_mesh(examination, surface, chart)
@@ -129,13 +122,38 @@ def examine_file(file: GarmentFile, form: DressForm) -> Examination:
     return examination
 
 
-def _check_place(examination: Examination, file: GarmentFile, form: DressForm, raw: Surface) -> bool:
-    """Return whether the garment lies on the body; where not, the finding says what mends it."""
-    assert examination.surface is not None
-    positions = examination.surface.positions
+def read_weights(path: Path, count: int) -> Array:
+    """Return the authored skinning weights (count, 24) of a file, a row for each vertex of the mesh file.
+
+    Raises:
+        GarmentError: no array "weights", another shape, negative, or rows that do not sum to one.
+    """
+    try:
+        weights = read_arrays(path, ("weights",)).get("weights", np.empty(0))
+    except ArrayFileError as error:
+        raise GarmentError(str(error)) from None
+    joints = len(Body.joint_names)
+    if weights.shape != (count, joints) or weights.dtype.kind not in "fiu":
+        raise GarmentError(
+            f"{path}: array 'weights' is {weights.dtype} {weights.shape}: expected numbers "
+            f"({count}, {joints}), a row for each vertex of the mesh file"
+        )
+    weights = weights.astype(np.float64)
+    sums = weights.sum(axis=1)
+    good = np.isfinite(sums) & (weights.min(axis=1) >= -1e-6) & (np.abs(sums - 1) < 1e-3)
+    for row in np.flatnonzero(~good)[:1]:
+        raise GarmentError(
+            f"{path}: weights of vertex {row} are negative or sum to {sums[row]:.4g} instead of 1"
+        )
+    return np.maximum(weights, 0.0) / np.maximum(weights, 0.0).sum(axis=1, keepdims=True)
+
+
+def _check_place(
+    examination: Examination, file: GarmentFile, form: DressForm, raw: Surface, positions: Array
+) -> bool:
+    """Return whether the garment (V,3) [m] lies on the body; where not, the finding says what mends it."""
     fit = form.fit(positions)
     problem = form.problem(positions, fit)
-    examination.distances = fit.distances
     size = " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0))
     if not problem:
         depth = f"{fit.below:.1%} of the vertices below the skin, the deepest by {1e3 * fit.depth:.1f} mm"
@@ -202,13 +220,6 @@ def _wind_outward(
 
 def _check_mesh(examination: Examination, surface: Surface, chart: Array | None) -> bool:
     """Return whether the mesh can be simulated: one or several sheets, consistently wound."""
-    same = np.sort(surface.faces, axis=1)
-    _, first, count = np.unique(same, axis=0, return_index=True, return_counts=True)
-    if (count > 1).any():
-        pair = np.flatnonzero((same == same[first[np.argmax(count > 1)]]).all(axis=1))
-        text = f"triangles {pair[0]} and {pair[1]} are the same"
-        examination.add("faces", text, "remove one of each", UNUSABLE)
-        return False
     try:
         Cloth(surface.positions, surface.faces, rest_uv=chart)
     except MeshError as error:

@@ -1,7 +1,7 @@
 """Kinds of garments that are tailored by code, each to any body: their cuts, measures and ranges."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -9,15 +9,17 @@ import numpy as np
 
 from snug.body.parametric_body import Body
 from snug.garments.cuts import SEAM_CUT, CutPlane, armhole_cut, level_cut, neck_cut
-from snug.garments.garment import SKIRT_SMOOTHING, Garment, GarmentError
-from snug.garments.implicit_surface import SHIRT_BONES, joint_position, legs_part
-from snug.garments.meshing import assemble_garment
+from snug.garments.garment import SKIRT_SMOOTHING, Garment, GarmentError, smooth_weights
+from snug.garments.implicit_surface import SHIRT_BONES, build_surface, joint_position, legs_part
+from snug.garments.meshing import mesh_garment, nearest_body_vertices
+from snug.garments.openings import name_openings
 
 TSHIRT = "tshirt"  # the garment that a command takes where none is named
 
 LONG_SLEEVE_BONES = (*SHIRT_BONES, "left_elbow", "right_elbow")
 SKIRT_BONES = ("pelvis", "spine1", "left_hip", "right_hip")
 TROUSER_BONES = (*SKIRT_BONES, "left_knee", "right_knee")
+SMOOTHED_OVER = 0.1  # [m] about the hip joints: from borrowed weights to smoothed ones
 TROUSER_SMOOTHING = 10  # at the crotch, borrowed weights jump from leg to leg
 # Least and largest value, and unit, of what has the same range in all kinds.
 RANGES = {
@@ -45,7 +47,8 @@ class GarmentTemplate:
         measures: each measure of its cut and the default, see `tailor`.
         outline: function of body and measures that returns the arguments of build_surface, and the cuts.
         bones: whose skin it borrows weights from.
-        smoothing: rounds over these weights, see assemble_garment.
+        smoothing: rounds over these weights at 1000 vertices, below the hip joints or, with a waistband,
+            everywhere.
         ranges: least and largest value and unit of a measure, where they are not those of RANGES.
 
     >>> find_template("shorts").measures["length"]
@@ -97,7 +100,22 @@ class GarmentTemplate:
                     f"{name}={value}: a {self.name} can be tailored from {low:g} to {high:g}{unit}"
                 )
         surface, cuts = self.outline(body, cut)
-        return assemble_garment(self.name, body, vertices, cut, surface, cuts, self.bones, self.smoothing)
+        try:
+            sheet = build_surface(body, **surface, clearance=cut["clearance"])
+            positions, faces = mesh_garment(body, sheet, cuts, vertices, cut["clearance"])
+        except ValueError as error:
+            raise GarmentError(f"{self.name}: {error}") from error
+        loops = name_openings(body, positions, faces)
+        nearest = nearest_body_vertices(body, positions, self.bones)
+        weights = borrowed = body.skinning_weights[nearest]
+        if self.smoothing:
+            weights = smooth_weights(borrowed, faces, round(self.smoothing * vertices / 1000))
+        if self.smoothing and "waist" not in loops:
+            above = positions[:, 1] - joint_position(body, "left_hip")[1]
+            share = np.clip(above / SMOOTHED_OVER + 0.5, 0.0, 1.0)[:, None]
+            weights = share * borrowed + (1 - share) * weights
+        pins = np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
+        return Garment(self.name, positions, faces, nearest, weights, loops, pins, parameters=cut)
 
 
 def _sleeves(body: Body, cut: Measures, end: str = "left_elbow") -> Outline:
@@ -106,7 +124,7 @@ def _sleeves(body: Body, cut: Measures, end: str = "left_elbow") -> Outline:
     hem = joint_position(body, "left_hip")[1] - cut["length"]
     cuff = shoulder[0] + cut["sleeve"] * (far[0] - shoulder[0])
     neck = neck_cut(body, cut["clearance"])
-    sleeve = CutPlane("left_sleeve", (1.0, 0.0, 0.0), (cuff, 0.0, 0.0), twin="right_sleeve")
+    sleeve = CutPlane("left_sleeve", (1.0, 0.0, 0.0), (cuff, 0.0, 0.0))
     surface = {"hem": hem, "cuff": cuff, "top": neck.point[1] + 0.04, "ease": cut["ease"],
                "flare": cut.get("flare", 0.0)}  # fmt: skip
     return surface, [SEAM_CUT, level_cut("hem", hem, down=True), sleeve, neck]
@@ -135,9 +153,8 @@ def _legs(body: Body, cut: Measures) -> Outline:
     crotch = legs_part(body, cut["clearance"] + cut["ease"] / (2 * np.pi))
     hem = crotch - cut["length"] * (crotch - joint_position(body, "left_ankle")[1])
     top = joint_position(body, "left_hip")[1] + cut["rise"]
-    leg = replace(level_cut("left_leg", hem, down=True), twin="right_leg")
     surface = {"hem": hem, "top": top, "ease": cut["ease"], "waistband": True, "legs": True}
-    return surface, [SEAM_CUT, leg, level_cut("waist", top)]
+    return surface, [SEAM_CUT, level_cut("left_leg", hem, down=True), level_cut("waist", top)]
 
 
 GARMENT_TEMPLATES = (
