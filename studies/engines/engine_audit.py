@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks import Measurement, known_answer
 from engine_runs import FRAME, SPEED, Engine, EngineDiverged, RollOut, Step, roll_out, specimen
-from engines import ENGINES, REFERENCE, find_engine
+from engines import ENGINES, REFERENCE
 from reference_sim import GRAVITY, Potential, minimise
 from reference_sim.energies import Gravity, Inertia
 from reference_sim.energies import Step as FrozenStep
@@ -107,15 +107,15 @@ def reaction_over_weight(run: RollOut) -> float:
     Without energies the force is not known, and the number is 1 + a / g, with the a between the ends of the
     last second; it is 1 at rest.
     """
-    cloth = run.specimen.cloth
+    cloth, energies = run.specimen.cloth, run.cloth.energies
     first = len(run.positions) // 3 * 2
-    if not run.energies:
+    if not energies:
         speeds = np.diff(centre(run)[first - 1 :, 1]) / FRAME
         return 1.0 + float(speeds[-1] - speeds[0]) / (FRAME * (len(speeds) - 1)) / GRAVITY
     pulls, inertias = [], []
     for step in run.last_steps[first:]:
-        x = step.x if run.explicit else step.after
-        pulls.append(sum(energy.value_and_gradient(x)[1][cloth.pins, 1].sum() for energy in run.energies))
+        x = step.x if run.cloth.explicit else step.after
+        pulls.append(sum(energy.value_and_gradient(x)[1][cloth.pins, 1].sum() for energy in energies))
         acceleration = (step.after - step.x - run.step * step.v)[:, 1] / run.step**2
         inertias.append(cloth.masses @ (GRAVITY + acceleration))
     pinned = GRAVITY * cloth.masses[cloth.pins].sum()
@@ -131,14 +131,14 @@ def energy_gap(run: RollOut) -> float | None:
     Raises:
         RuntimeError: Newton's method did not converge in one of these steps.
     """
-    if not run.energies:
+    if not run.cloth.energies:
         return None
     return float(np.mean([_gap(run.last_steps[frame], run) for frame in GAP_FRAMES]))
 
 
 def _gap(step: Step, run: RollOut) -> float:
     cloth = run.specimen.cloth
-    potential = Potential([*run.energies, Gravity(cloth), Inertia(cloth, run.step)])
+    potential = Potential([*run.cloth.energies, Gravity(cloth), Inertia(cloth, run.step)])
     guess = step.x + run.step * step.v
     guess[cloth.pins] = step.x[cloth.pins]
     potential.prepare(FrozenStep(step.x, step.v, guess, run.step))
@@ -162,7 +162,7 @@ def measured(measure: Callable[..., Answer]) -> Callable[..., Measurement]:
 
     @wraps(measure)
     def measurement(engine: str, **options: Any) -> Measurement:
-        declared = find_engine(engine)
+        declared = ENGINES[engine]
         if declared.absent:
             return Measurement(value=None, status="skipped", reason=declared.absent)
         try:
@@ -183,30 +183,21 @@ def law(engine: Engine, name: str, sample: str) -> Answer:
 
 
 @measured
-def limit_distance(engine: Engine, factor: int) -> Answer:
-    """Return the distance of a budget's roll-out from the engine's own limit [%]."""
+def budgeted(engine: Engine, factor: int, what: str) -> Answer:
+    """Return a budget's distance from the engine's own limit [%], or the time of a frame [ms]."""
     runs, remark = ladder(engine.name)
     if factor not in runs:
-        return None, _left_out(runs)
+        return None, f"nothing moved any more at {max(runs)} times the default"
+    if what == "time":
+        return runs[factor].milliseconds, ""
     return distance(runs[factor], runs[max(runs)]), remark
-
-
-@measured
-def milliseconds(engine: Engine, factor: int) -> Answer:
-    """Return the processor time of a frame of the hanging sheet at that budget [ms]."""
-    runs, _ = ladder(engine.name)
-    return (runs[factor].milliseconds, "") if factor in runs else (None, _left_out(runs))
-
-
-def _left_out(runs: dict[int, RollOut]) -> str:
-    return f"nothing moved any more at {max(runs)} times the default"
 
 
 @measured
 def converged_budget(engine: Engine) -> Answer:
     """Return the least multiple of the default budget that is within CONVERGED of the engine's limit."""
     runs, remark = ladder(engine.name)
-    factor = _within(runs, CONVERGED)
+    factor = _within(runs)
     if factor is not None:
         return factor, remark
     return None, "; ".join(filter(None, (f"no budget is within {CONVERGED:g} %", remark)))
@@ -228,7 +219,7 @@ def reference_milliseconds(engine: Engine) -> Answer:
     Newton's method. Of one that takes smaller steps: the reference takes smaller steps.
     """
     runs = reference_ladder(engine.substeps if engine.iterates else None)
-    count, of_budget = _within(runs, CONVERGED), "iterations a step" if engine.iterates else "steps a frame"
+    count, of_budget = _within(runs), "iterations a step" if engine.iterates else "steps a frame"
     if count is None:
         return None, f"the reference is not within {CONVERGED:g} % at {sorted(runs)[-2]} {of_budget}"
     return runs[count].milliseconds, f"{count} {of_budget}"
@@ -237,7 +228,7 @@ def reference_milliseconds(engine: Engine) -> Answer:
 @cache
 def cached_roll_out(engine: str, sample: str, factor: int = 1) -> RollOut:
     """Return the roll-out of a declared engine on a declared specimen, done once in this process."""
-    return roll_out(find_engine(engine), specimen(sample), factor)
+    return roll_out(ENGINES[engine], specimen(sample), factor)
 
 
 @cache
@@ -247,7 +238,7 @@ def ladder(engine: str) -> tuple[dict[int, RollOut], str]:
     Budgets that diverge are left out. Raises EngineDiverged where fewer than two are left.
     """
     runs: dict[int, RollOut] = {}
-    for factor in find_engine(engine).factors:
+    for factor in ENGINES[engine].factors:
         try:
             run = cached_roll_out(engine, "hanging", factor)
         except EngineDiverged:
@@ -277,15 +268,15 @@ def reference_ladder(substeps: int | None) -> dict[int, RollOut]:
     }
 
 
-def _within(runs: dict[int, RollOut], percent: float) -> int | None:
-    """Return the least budget from which on all are within that distance of the largest; it must not be it.
+def _within(runs: dict[int, RollOut]) -> int | None:
+    """Return the least budget from which on all are within CONVERGED of the largest; it must not be it.
 
     None where only the largest is.
     """
     limit = runs[max(runs)]
     least = None
     for budget in sorted(runs, reverse=True)[1:]:
-        if distance(runs[budget], limit) > percent:
+        if distance(runs[budget], limit) > CONVERGED:
             break
         least = budget
     return least
@@ -306,25 +297,25 @@ LAWS: dict[str, tuple[Callable[[RollOut], float | None], str, str, float | None,
 def declare(engine: Engine) -> None:
     """Declare the known answers of an engine, which share a process."""
 
-    def answer(name: str, metric: str, scene: str = "", options: Any = (), **declared: Any) -> Any:
-        return known_answer(
-            {f"{engine.name}.{name}": {"engine": engine.name, **dict(options)}},
-            scene=scene or engine.name, metric=f"engine/{metric}", method=engine.name, seconds=DEADLINE,
-            process=f"engine-{engine.name}", **declared,
-        )  # fmt: skip
+    def answer(function: Any, name: str, metric: str, place: str = "", **fields: Any) -> None:
+        options = {"engine": engine.name, **fields.pop("options", {})}
+        known_answer(
+            {f"{engine.name}.{name}": options}, scene=engine.name + place, metric=f"engine/{metric}",
+            method=engine.name, seconds=DEADLINE, process=f"engine-{engine.name}", **fields,
+        )(function)  # fmt: skip
 
     for name, (_, sample, unit, expected, tolerance) in LAWS.items():
         options = {"name": name, "sample": sample}
-        answer(name, name, options=options, unit=unit, expected=expected, tolerance=tolerance)(law)
+        answer(law, name, name, options=options, unit=unit, expected=expected, tolerance=tolerance)
     for factor in engine.factors:
-        budget: dict[str, Any] = {"scene": f"{engine.name}/x{factor}", "options": {"factor": factor}}
-        far = answer(f"x{factor}.distance", "distance", **budget, unit="%", expected=0.0, tolerance=1.0)
-        far(limit_distance)
-        answer(f"x{factor}.time", "time", **budget, unit="ms")(milliseconds)
-    answer("last_move", "last_move", unit="%")(last_move)
-    answer("budget", "budget")(converged_budget)
-    answer("reference_time", "reference_time", unit="ms")(reference_milliseconds)
+        place, budget = f"/x{factor}", {"factor": factor}
+        answer(budgeted, f"x{factor}.distance", "distance", place, options=budget | {"what": "distance"},
+               unit="%", expected=0.0, tolerance=1.0)  # fmt: skip
+        answer(budgeted, f"x{factor}.time", "time", place, options=budget | {"what": "time"}, unit="ms")
+    answer(last_move, "last_move", "last_move", unit="%")
+    answer(converged_budget, "budget", "budget")
+    answer(reference_milliseconds, "reference_time", "reference_time", unit="ms")
 
 
-for engine in ENGINES:
+for engine in ENGINES.values():
     declare(engine)

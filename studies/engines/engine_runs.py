@@ -101,7 +101,6 @@ class Engine:
         name: without a slash; first part of the names of its known answers.
         title: for people.
         module: that is imported, named as its distribution, whose version counts; empty for the project.
-        licence: SPDX identifier.
         substeps, iterations: of its default settings, per frame of 1/30 s and per time step.
         settings: where these defaults come from.
         iterates: whether a larger budget has more iterations; otherwise it has more sub-steps.
@@ -112,12 +111,11 @@ class Engine:
     name: str
     title: str
     module: str = ""
-    licence: str
     substeps: int
     iterations: int = 1
     settings: str
     iterates: bool = True
-    factors: tuple[int, ...]
+    factors: tuple[int, ...] = (1, 4, 16, 64)
     make: Callable[[Cloth, int], EngineCloth]
 
     @property
@@ -130,8 +128,9 @@ class Engine:
     @property
     def version(self) -> str:
         """Name, version and licence, for every row."""
-        version = metadata.version(self.module or "neural-garment-benchmark")
-        return f"{self.module or 'this project'} {version}, {self.licence}"
+        if self.module:
+            return f"{self.module} {metadata.version(self.module)}, Apache-2.0"
+        return f"this project {metadata.version('neural-garment-benchmark')}, MIT"
 
 
 class Step(NamedTuple):
@@ -153,7 +152,7 @@ class RollOut:
         seconds: processor time (T-1,) [s] of each frame.
         step: time step of the engine [s].
         last_steps: last time step of each frame.
-        energies, explicit: as those of EngineCloth.
+        cloth: of the engine.
     """
 
     specimen: Specimen
@@ -162,8 +161,7 @@ class RollOut:
     seconds: np.ndarray
     step: float
     last_steps: Sequence[Step]
-    energies: Sequence[Energy]
-    explicit: bool
+    cloth: EngineCloth
 
     @property
     def milliseconds(self) -> float:
@@ -183,28 +181,17 @@ def roll_out(engine: Engine, sample: Specimen, factor: int = 1) -> RollOut:
     """
     substeps = engine.substeps * (1 if engine.iterates else factor)
     cloth = engine.make(sample.cloth, engine.iterations * (factor if engine.iterates else 1))
-    _all_frames(cloth, sample, substeps)
-    steps, velocity, seconds = _all_frames(cloth, sample, substeps)
+    for _ in range(2):
+        x, v, dt = sample.start, sample.velocity, FRAME / substeps
+        steps, seconds = [], []
+        for number in range(1, sample.frames + 1):
+            clock = time.process_time()
+            for _ in range(substeps):
+                before = x, v
+                x, v = cloth.advance(x, v, dt)
+            seconds.append(time.process_time() - clock)
+            if not (np.isfinite(x).all() and np.abs(x).max() < FAR):
+                raise EngineDiverged(f"frame {number}: a vertex is nowhere, or {FAR:g} m away")
+            steps.append(Step(*before, x))
     positions = np.array([sample.start, *(step.after for step in steps)])
-    return RollOut(
-        sample, positions, velocity, np.array(seconds), FRAME / substeps, steps, cloth.energies,
-        cloth.explicit,
-    )  # fmt: skip
-
-
-def _all_frames(
-    cloth: EngineCloth, sample: Specimen, substeps: int
-) -> tuple[list[Step], np.ndarray, list[float]]:
-    """Return the last time step of each frame, the velocity (V, 3) [m/s] at the end, the time of each [s]."""
-    x, v, dt = sample.start, sample.velocity, FRAME / substeps
-    steps, seconds = [], []
-    for number in range(1, sample.frames + 1):
-        clock = time.process_time()
-        for _ in range(substeps):
-            before = x, v
-            x, v = cloth.advance(x, v, dt)
-        seconds.append(time.process_time() - clock)
-        if not (np.isfinite(x).all() and np.abs(x).max() < FAR):
-            raise EngineDiverged(f"frame {number}: a vertex is nowhere, or {FAR:g} m away")
-        steps.append(Step(*before, x))
-    return steps, v, seconds
+    return RollOut(sample, positions, v, np.array(seconds), dt, steps, cloth)

@@ -13,6 +13,7 @@ implicit step. Positions are read from `qpos`: those of `flexvert_xpos` are a st
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -92,49 +93,35 @@ def model_xml(cloth: Cloth, integrator: str) -> str:
 
 
 REFERENCE = Engine(
-    name="reference", title="Reference", licence="MIT", substeps=1, iterations=50,
+    name="reference", title="Reference", substeps=1, iterations=50,
     settings="one step a frame, minimised to 1e-6", factors=(1, 4), make=ReferenceCloth,
 )  # fmt: skip
 
-_EXAMPLE = "newton's example cloth_hanging"
-_of_newton = partial(Engine, module="newton", licence="Apache-2.0", iterations=10)
-_of_mujoco = partial(Engine, module="mujoco", licence="Apache-2.0", substeps=17, iterates=False)
 
-ENGINES: tuple[Engine, ...] = (
+def _newton(name: str, title: str, solver: str, substeps: int, **declared: Any) -> Engine:
+    settings = f"{substeps} sub-steps of 10 iterations: newton's example cloth_hanging"
+    return Engine(
+        name=f"newton.{name}", title=f"newton, {title}", module="newton", iterations=10,
+        substeps=substeps, make=partial(NewtonCloth, solver=solver), **{"settings": settings, **declared},
+    )  # fmt: skip
+
+
+def _mujoco(integrator: str, settings: str, **declared: Any) -> Engine:
+    return Engine(
+        name=f"mujoco.{integrator.lower()}", title=f"MuJoCo, {integrator}", module="mujoco", substeps=17,
+        iterates=False, settings=f"17 steps a frame, of 1.96 ms; {settings}",
+        make=partial(MujocoCloth, integrator=integrator), **declared,
+    )  # fmt: skip
+
+
+_DECLARED = (
     REFERENCE,
-    _of_newton(
-        name="newton.vbd", title="newton, VBD", substeps=20,
-        settings=f"20 sub-steps of 10 iterations: {_EXAMPLE}",
-        factors=(1, 4, 16, 64), make=partial(NewtonCloth, solver="VBD"),
-    ),
-    _of_newton(
-        name="newton.vbd_frame", title="newton, VBD, one step a frame", substeps=1,
-        settings="one step of 10 iterations: the solver's default",
-        factors=(1, 4, 16, 64, 256, 1024), make=partial(NewtonCloth, solver="VBD"),
-    ),
-    _of_newton(
-        name="newton.xpbd", title="newton, XPBD", substeps=20,
-        settings=f"20 sub-steps of 10 iterations: {_EXAMPLE}",
-        factors=(1, 4, 16, 64), make=partial(NewtonCloth, solver="XPBD"),
-    ),
-    _of_newton(
-        name="newton.style3d", title="newton, Style3D", substeps=4,
-        settings=f"4 sub-steps of 10 iterations: {_EXAMPLE}",
-        factors=(1, 4, 16, 64), make=partial(NewtonCloth, solver="Style3D"),
-    ),
-    _of_mujoco(
-        name="mujoco.euler", title="MuJoCo, Euler",
-        settings="17 steps a frame, of 1.96 ms; the default is 2 ms and integrator Euler",
-        factors=(1, 4, 16, 64, 256), make=partial(MujocoCloth, integrator="Euler"),
-    ),
-    _of_mujoco(
-        name="mujoco.discrete", title="MuJoCo, discrete",
-        settings="17 steps a frame, of 1.96 ms; integrator discrete, as its manual advises",
-        factors=(1, 4, 16, 64), make=partial(MujocoCloth, integrator="discrete"),
-    ),
+    _newton("vbd", "VBD", "VBD", 20),
+    _newton("vbd_frame", "VBD, one step a frame", "VBD", 1, factors=(1, 4, 16, 64, 256, 1024),
+            settings="one step of 10 iterations: the solver's default"),
+    _newton("xpbd", "XPBD", "XPBD", 20),
+    _newton("style3d", "Style3D", "Style3D", 4),
+    _mujoco("Euler", "the default is 2 ms and integrator Euler", factors=(1, 4, 16, 64, 256)),
+    _mujoco("discrete", "integrator discrete, as its manual advises"),
 )  # fmt: skip
-
-
-def find_engine(name: str) -> Engine:
-    """Return the declared engine of that name. Raises KeyError for a name that none has."""
-    return {engine.name: engine for engine in ENGINES}[name]
+ENGINES: dict[str, Engine] = {engine.name: engine for engine in _DECLARED}

@@ -72,8 +72,9 @@ class NewtonCloth(EngineCloth):
         warp.config.log_level = warp.LOG_ERROR
         import newton
 
-        if solver in MEMBRANES:
-            self.energies = (MEMBRANES[solver](cloth), BendHinge(cloth))
+        if solver != "Style3D":
+            membrane = StableNeoHookean(cloth) if solver == "VBD" else UnequalSprings(cloth)
+            self.energies = (membrane, BendHinge(cloth))
         self.model = build_model(cloth, solver)
         solvers = newton.solvers
         if solver == "Style3D":
@@ -223,11 +224,6 @@ class UnequalSprings(Energy):
         return 0.5 * torch.as_tensor(self.stiffness).to(u) * (length - rest) ** 2
 
 
-MEMBRANES: dict[str, type[StableNeoHookean] | type[UnequalSprings]] = {
-    "VBD": StableNeoHookean, "XPBD": UnequalSprings,
-}  # fmt: skip
-
-
 @dataclass
 class NewtonSolver(Method):
     """Method of one solver of newton on a scene without contact.
@@ -271,19 +267,12 @@ class NewtonSolver(Method):
             positions.append(x)
             before, clock = clock, time.perf_counter()
             seconds.append(clock - before)
+        made_by = {"method": f"newton {newton.__version__} {self.solver}", "iterations": self.iterations}
+        made_by["substeps"] = self.substeps
         return Trajectory(
-            positions=np.array(positions),
-            faces=scene.cloth.faces,
-            times=scene.dt * np.arange(len(positions)),
-            frame_seconds=np.array(seconds),
-            status=status,
-            reason=reason,
-            provenance={
-                "method": f"newton {newton.__version__} {self.solver}",
-                "iterations": self.iterations,
-                "substeps": self.substeps,
-            },
-        )
+            np.array(positions), scene.cloth.faces, scene.dt * np.arange(len(positions)), status=status,
+            reason=reason, frame_seconds=np.array(seconds), provenance=made_by,
+        )  # fmt: skip
 
 
 def make(*, models: Path, seed: int, solver: str, iterations: int, substeps: int) -> NewtonSolver:
