@@ -41,9 +41,6 @@ class NotebookParser(MystParser):
 
 
 def setup(app: Sphinx) -> None:
-    """Make the pages of the published runs before the sources are read; read notebooks too."""
-    from reports.text.run_page import write_run_pages
-
-    app.connect("builder-inited", lambda _: write_run_pages(DOCS.parent / "reports/published", DOCS / "runs"))
+    """Read notebooks too."""
     app.add_source_suffix(".ipynb", "notebook")
     app.add_source_parser(NotebookParser)

@@ -48,8 +48,7 @@ def build_report(run_dir: str | Path) -> Built:
     >>> print(build_report("reports/runs/first").answer)  # doctest: +SKIP
     """
     # Heavy: not needed for --help.
-    from reports.blocks import FIGURES
-    from reports.blocks.block import Report
+    from reports.blocks import FIGURES, Report
     from reports.figures.figure import draw_figures, remove_figures
     from reports.page.write_page import write_page
     from reports.pdf import write_pdf

@@ -19,12 +19,11 @@ import typst
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
-from reports.blocks import BLOCKS
-from reports.blocks.block import ROWS, Heading, Report, SentenceBlock, TableBlock
-from reports.blocks.printed_tables import shortened
+from reports.blocks import BLOCKS, ROWS, Heading, Report, TableBlock
 from reports.figures.figure import Figure, Picture
 from reports.figures.plotting import printable
 from reports.run.finished_run import Run
+from reports.sentences import headline
 from reports.tables.table import DASH, CellText, Column, Table, column_texts, duration, number, remarks_below
 
 # Declarations and files: not how the rows were made. run.json has it all.
@@ -90,17 +89,14 @@ FEW = 5  # up to so many columns, the columns of a table share its width evenly
 MOST = 9  # columns of numbers that fit on a page; a wider table goes on below
 
 
-def lay_out(report: Report, block: SentenceBlock | Figure | TableBlock) -> list[Values]:
+def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:
     """Return the values of a block, none where the report has no content for it."""
-    if isinstance(block, SentenceBlock):
-        sentences = [list(pair) for pair in block.make(report.run)]
-        return [{"kind": "sentences", "pairs": sentences, "small": block.small}] if sentences else []
     if isinstance(block, Figure):
         return [_figure(picture) for picture in report.pictures.get(block.name, ())]
     if block.name not in report.tables:
         return []
-    table = block.printed(report.run, report.tables[block.name])
-    return list(lay_out_table(report.run, shortened(table, block.most))) if table.rows else []
+    table = block.printed(report.tables[block.name])
+    return list(lay_out_table(report.run, table)) if table.rows else []
 
 
 def _figure(picture: Picture) -> Values:
@@ -175,6 +171,7 @@ def content(report: Report) -> dict[str, Any]:
         "subtitle": report.subtitle,
         "changed": changed_files(run),
         "size": _size(run.config),
+        "sentences": headline(run),
         "first": sections[0]["blocks"],
         "workers": _side_by_side(run.config),
         "configuration": configuration(run.config, run.frame),

@@ -158,7 +158,6 @@ def few(run: Run, methods: Iterable[str]) -> list[str]:
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
 PANEL = 1.6  # inches (4.06 cm) that panels are high at least, and at least wide
-LABELLED = 1.9  # inches that panels are high in which labels stand beside points
 GRID = "#E3E3E3"
 DOTS = 200  # of a picture in an inch
 _LOOK: dict[Any, Any] = {

@@ -16,17 +16,14 @@ import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
-from reports.blocks import BLOCKS
-from reports.blocks.block import Report, SentenceBlock, TableBlock
-from reports.blocks.sentences import endings
+from reports.blocks import BLOCKS, Report, TableBlock
 from reports.figures.plotting import style
 from reports.page.embedded_roll_outs import BUDGET, RULE, Embedded, deflated, embed
 from reports.run.finished_run import Run
+from reports.sentences import headline
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean, value_of
-from reports.statistics.outcomes import BAD
 from reports.statistics.pareto import ERRORS, error_points, indistinct, run_time, time_label
-from reports.tables.findings import merged
 from reports.tables.table import Cell, Column, Table, column_texts, remarks_below
 
 
@@ -79,12 +76,6 @@ def tables_of(report: Report) -> list[dict[str, Any]]:
     return [table_data(report.run, table) for table in tables if table.caption]
 
 
-def sentences_of(report: Report) -> list[tuple[str, str]]:
-    """Return (topic, sentence) of the report blocks."""
-    blocks = [block for block in BLOCKS if isinstance(block, SentenceBlock) and not block.small]
-    return [pair for block in blocks for pair in block.make(report.run)]
-
-
 def table_data(run: Run, table: Table) -> dict[str, Any]:
     """Return a table as the page's script shows it; the run declares its metrics and methods."""
     printed = [_printed(table, reference) for reference in table.references]
@@ -127,26 +118,8 @@ def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
     return [text["text"], None if number is None else float(f"{number:.12g}"), text["spread"], text["mark"]]
 
 
-def unfinished_cells(report: Report) -> tuple[str, bool, list[str]]:
-    """Say what did not run to its end: the counts of page one, whether anything went wrong, and each cell."""
-    if "unfinished" not in report.tables:
-        return "", False, []
-    table = merged(report.tables["unfinished"], ("suite", "scene"))
-    names = [column.name for column in table.columns]
-    cells = [{name: str(cell) for name, cell in zip(names, row)} for row in table.rows]
-    cells.sort(key=lambda cell: (*BAD, "skipped").index(cell["status"]))
-    lines = [
-        f"{cell['status']}: {report.run.label(cell['method'])}, seed {cell['seed']}, {cell['scene']}: "
-        f"{cell['reason']}"
-        for cell in cells
-    ]
-    wrong = cells[0]["status"] not in ("stalled", "skipped")
-    return f"Not every number could be had. {endings(report.run)}".strip(), wrong, lines
-
-
 HERE = Path(__file__).parent
 SCRIPTS = ("data", "draw", "view", "plots", "tables", "share", "page")  # in this order
-MOST_LINES = 60  # on cells that did not run; tables/unfinished.csv has all
 
 
 def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> Path:
@@ -178,7 +151,6 @@ def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
         SCRIPTS,
         subtitle=html.escape(report.subtitle),
         sentences=_sentences(report),
-        trouble=_trouble(report),
         left_out=html.escape(embedded.left_out(RULE)),
         blobs="\n".join(
             f'<script type="text/plain" id="{name}">{text}</script>' for name, text in blobs.items()
@@ -187,25 +159,8 @@ def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
 
 
 def _sentences(report: Report) -> str:
-    pairs = [(html.escape(topic), html.escape(text)) for topic, text in sentences_of(report)]
+    pairs = [(html.escape(topic), html.escape(text)) for topic, text in headline(report.run)]
     return "\n".join(f'<p class="sentence"><b>{topic}.</b> {text}</p>' for topic, text in pairs)
-
-
-def _trouble(report: Report) -> str:
-    """Return markup of cells that did not run and of files that could not be read; empty without any."""
-    text, wrong, lines = unfinished_cells(report)
-    more = [f"and {len(lines) - MOST_LINES} more"] if len(lines) > MOST_LINES else []
-    markup = _details(text, [*lines[:MOST_LINES], *more], "wrong" if wrong else "") if text else ""
-    if report.run.problems:
-        markup += _details("Files of this run could not be read.", report.run.problems, "wrong")
-    return markup
-
-
-def _details(summary: str, lines: Sequence[str], kind: str) -> str:
-    items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
-    return (
-        f'<details class="trouble {kind}"><summary>{html.escape(summary)}</summary><ul>{items}</ul></details>'
-    )
 
 
 def filled(name: str, scripts: Sequence[str], **values: str) -> str:

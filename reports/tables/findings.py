@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import pandas as pd
@@ -208,17 +206,6 @@ def unfinished(run: Run) -> list[Table]:
         Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
     cells = [(*line[:5], line[5] or "no reason given") for line in lines]
     return table("unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each.")
-
-
-def merged(table: Table, names: Iterable[str]) -> Table:
-    """Merge lines that differ in one of the columns alone into one with all that stands there."""
-    rows: Sequence[tuple[Cell, ...]] = table.rows
-    for place in [place for place, column in enumerate(table.columns) if column.name in set(names)]:
-        texts: dict[tuple[Cell, ...], list[str]] = {}
-        for row in rows:
-            texts.setdefault((*row[:place], *row[place + 1 :]), []).append(str(row[place]))
-        rows = [(*key[:place], ", ".join(every), *key[place:]) for key, every in texts.items()]
-    return replace(table, rows=tuple(rows), grouped_by=(), references=(), note="")
 
 
 # Table -> method -> metric -> as printed. A column that the paper does not report is a dash.

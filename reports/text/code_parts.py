@@ -12,6 +12,7 @@ from benchmarks.metrics import declared
 from benchmarks.plan.options import make_parser
 from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
+from snug.motion.library import source_rows
 from snug.named_recipes import RECIPES
 
 Rows = list[tuple[str, ...]]
@@ -36,24 +37,13 @@ def option_rows(parser: ArgumentParser) -> Rows:
 
 
 def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
-    """Return the heading and the rows that are asked for, in the order of their names.
-
-    Args:
-        rows: a heading, then rows whose first cells have the names.
-        names: as "--seed" or "dtype"; none for all rows.
-
-    Raises:
-        ValueError: a name that no row has.
+    """Return the heading and the rows whose first cells have these names, in their order; all without names.
 
     >>> chosen_rows([("Field", "Content"), ("`dt`", "[s]"), ("`frames`", "number")], ["frames"])
     [('Field', 'Content'), ('`frames`', 'number')]
     """
-    if not names:
-        return rows
     row_of_name = {name: row for row in rows[1:] for name in re.findall(r"[\w-]+", row[0])}
-    if unknown := [name for name in names if name not in row_of_name]:
-        raise ValueError(f"no row has the name '{unknown[0]}'")
-    return [rows[0], *(row_of_name[name] for name in names)]
+    return [rows[0], *(row_of_name[name] for name in names)] if names else rows
 
 
 def attribute_rows(path: str) -> Rows:
@@ -62,19 +52,11 @@ def attribute_rows(path: str) -> Rows:
     Args:
         path: module and class, as "reference_sim.material.Material".
 
-    Raises:
-        ValueError: no such class, or one that describes no attributes.
-
     >>> attribute_rows("benchmarks.method.Reporting")[2]
     ('`level`', 'place on that curve, as a number of iterations or a tolerance')
     """
     module, _, name = path.rpartition(".")
-    try:
-        entries = attributes_of(getattr(import_module(module), name))
-    except (ImportError, AttributeError, ValueError):
-        raise ValueError(f"no class '{path}'") from None
-    if not entries:
-        raise ValueError(f"class '{path}' has no attributes in its docstring")
+    entries = attributes_of(getattr(import_module(module), name))
     rows = [(f"`{names.replace(', ', '`, `')}`", content) for names, content in entries.items()]
     return [("Field", "Content"), *rows]
 
@@ -82,20 +64,12 @@ def attribute_rows(path: str) -> Rows:
 def docstring_rows(module: str) -> Rows:
     """Return the rows of the table in the docstring of a module.
 
-    Raises:
-        ValueError: no such module, or one without a table in its docstring.
-
     >>> docstring_rows("snug.body.smpl_files")[2]
     ('faces, closed and wound outwards', '`f`, `faces`', '(F, 3), (F, 4)')
     """
-    try:
-        text = import_module(module).__doc__ or ""
-    except ImportError:
-        raise ValueError(f"no module '{module}'") from None
+    text = import_module(module).__doc__ or ""
     lines = [line.strip("|") for line in text.splitlines() if line.startswith("|")]
     rows: Rows = [tuple(cell.strip() for cell in line.split("|")) for line in lines]
-    if not rows:
-        raise ValueError(f"module '{module}' has no table in its docstring")
     return [rows[0], *rows[2:]]
 
 
@@ -105,25 +79,17 @@ def recipe_rows(names: str) -> Rows:
     Args:
         names: of the recipes, as "default, paper".
 
-    Raises:
-        ValueError: no recipe of that name.
-
     >>> recipe_rows("default, paper")[4][:3]
     ('`zero_last_layer`', 'True', 'False')
     """
     chosen = names.split(", ")
-    if unknown := [name for name in chosen if name not in RECIPES]:
-        raise ValueError(f"no recipe '{unknown[0]}'; choose from {', '.join(RECIPES)}")
     rows: Rows = []
     for option, meaning in attribute_rows("snug.recipe.Recipe")[2:]:
         values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
         if len(set(values)) > 1:
-            rows.append((option, *(_setting(value) for value in values), meaning.partition(". ")[0]))
+            texts = (f"{value:g}" if isinstance(value, float) else str(value) for value in values)
+            rows.append((option, *texts, meaning.partition(". ")[0]))
     return [("Option", *(f"Recipe `{name}`" for name in chosen), "Meaning"), *rows]
-
-
-def _setting(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def metric_rows() -> Rows:
@@ -163,4 +129,5 @@ PARTS = {
     "studies": study_rows,
     "parts": part_rows,
     "options of benchmarks.run": lambda: option_rows(make_parser()),
+    "sources of the library": lambda: list(source_rows()),
 }

@@ -1,36 +1,38 @@
-"""Generated parts of a document: sentences of page one, a table of a run, the claims of the paper.
+"""Generated parts of a document: tables of published runs, claims of the paper, texts of the code.
 
-`front of RUN` (the answer of README), `table NAME of RUN; COLUMN, ...; METHOD, ...` (all where none is named;
-of table `overview`, METHODs of several runs), `claims primary of RUN, ...`, `claims exploratory of RUN, ...`,
-`counts of RUN, ...`, `runs of RUN, ...`; RUN is a folder of reports/published, and the first run that has
-both methods of a claim judges it. `attributes of MODULE.CLASS`, `docstring of MODULE` (its table),
-`recipes of NAME, ...`, `sources of the library` and the parts that `code_parts.PARTS` names come from the
-code, `evaluations of published runs` from the run.json of each run; `attributes` and `options of
-benchmarks.run` take names after a semicolon, whose rows alone are shown, in that order.
-
-Parts of a document that are generated: between two comments, the first of which says from what.
+Between two comments, the first of which says from what:
 
 <!-- generated: table overview of quick; method, relative_excess -->
 ...
 <!-- end of generated -->
+
+RUN is a folder of reports/published:
+
+front of RUN                                 the answer of README
+table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named; of `overview` METHODs of several runs
+claims primary of RUN, ...                   or exploratory: judged by the first run that has both methods
+counts of RUN, ...                           how many claims came out how
+runs of RUN, ...                             day, commit and processor
+evaluations of published runs                how often they evaluated test motions
+
+From the code come `attributes of MODULE.CLASS; NAME, ...`, `docstring of MODULE` (its table),
+`recipes of NAME, ...` and the parts that `code_parts.PARTS` names.
 """
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
-from io import StringIO
-from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks.sentences import ALIKE, GAP, SWING, secondary_motion
 from reports.run.finished_run import Run
+from reports.sentences import ALIKE, GAP, SWING, secondary_motion
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
@@ -43,82 +45,106 @@ from reports.tables.page_one_table import overview
 from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
 from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows
-from reports.text.run_page import origins
 from reports.text.text_table import markdown_table, remarks_on, text_rows
-from snug.motion.library import clip_rows, source_rows
 
-HEAD = ["Claim", "Tested", "Effect", "Interval", "p", "Verdict", "Run"]
-NOT_MEASURED = "not measured"
+TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
+FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
+NOT_MEASURED = "not measured"
+Rows = Sequence[Sequence[str]]
 
 
-@dataclass(frozen=True)
-class JudgedClaims:
-    """Claims as several runs judge them.
+def published_part(request: str) -> str:
+    """Return the Markdown of a generated part.
 
-    Attributes:
-        verdicts: claim -> name of the first run that has both of its methods, and the claim as it came out.
-        labels: method -> its name for people.
-        metrics: metric -> its title, with its unit.
+    Raises:
+        ValueError: words of no known form.
+        KeyError: a name that is not there.
     """
+    what, _, source = request.partition(" of ")
+    names, *lists = source.split(";")
+    wanted, methods = (_words(text, ",") for text in (*lists, "", "")[:2])
+    folders = [PUBLISHED / name for name in _words(names, ",")]
+    kind, _, name = what.partition(" ")
+    if (part := request.partition(";")[0]) in PARTS:
+        return markdown_table(chosen_rows(PARTS[part](), wanted))
+    if request == "evaluations of published runs":
+        return markdown_table(evaluation_rows(PUBLISHED))
+    if what == "table overview" and methods:
+        return markdown_table(_overview(folders, wanted, methods))
+    forms: dict[str, Callable[[], str | Rows]] = {
+        "docstring": lambda: docstring_rows(source),
+        "recipes": lambda: recipe_rows(source),
+        "attributes": lambda: chosen_rows(attribute_rows(names), wanted),
+        "front": lambda: front_sentences(read_published(folders[0])),
+        "table": lambda: _table(folders[0], name, wanted, methods),
+        "claims": lambda: claim_rows(name, folders),
+        "counts": lambda: claim_counts(folders),
+        "runs": lambda: run_rows(folders),
+    }
+    if kind not in forms:
+        raise ValueError(f"no part is generated from '{request}'; known: {', '.join((*forms, *PARTS))}")
+    made = forms[kind]()
+    return made if isinstance(made, str) else markdown_table(made)
 
-    verdicts: Mapping[Claim, tuple[str, Judged]]
-    labels: Mapping[str, str]
-    metrics: Mapping[str, str]
+
+def _words(text: str, separator: str) -> list[str]:
+    return [word.strip() for word in text.split(separator) if word.strip()]
 
 
-def judge_in_first(runs: Sequence[tuple[str, Run]], timed: Collection[str]) -> JudgedClaims:
-    """Judge each claim by the first of these (name, run) that has both of its methods.
+@cache
+def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, str], dict[str, str]]:
+    """Return claim -> first run that has both of its methods and its judgement; labels; headings of metrics.
 
-    timed: names of the runs that judge claims on times. A run that shared its machine with other work judges
-        none: its methods may have had different shares of the processors.
+    A run that shared its machine with other work judges no claim on times: its methods may have had different
+    shares of the processors.
     """
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
-    metrics = {BEFORE.name: BEFORE.heading}
-    for name, run in runs:
+    headings = {BEFORE.name: BEFORE.heading}
+    for folder in folders:
+        run = read_published(folder)
         for line in judged(run):
-            if name in timed or line.compared.metric.unit not in TIMES:
-                verdicts.setdefault(line.claim, (name, line))
+            if folder.name in TIMED or line.compared.metric.unit not in TIMES:
+                verdicts.setdefault(line.claim, (folder.name, line))
         labels = {method: run.label(method) for method in run.methods} | labels
-        metrics |= {metric.name: metric.heading for metric in run.metrics.values()}
-    return JudgedClaims(verdicts, labels, metrics)
+        headings |= {metric.name: metric.heading for metric in run.metrics.values()}
+    return verdicts, labels, headings
 
 
-def claim_rows(claims: JudgedClaims, *, primary: bool) -> list[list[str]]:
-    """Return a heading and a row of each claim, judged or not: of the primary family, or exploratory."""
-    return [HEAD, *(_row(claim, claims) for claim in (PRIMARY if primary else EXPLORATORY))]
+def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
+    """Return a heading and a row of each claim of a family, judged by these runs or not."""
+    verdicts, labels, headings = _judged(*folders)
+    rows = [["Claim", "Tested", "Effect", "Interval", "p", "Verdict", "Run"]]
+    for claim in FAMILIES[family]:
+        lower, higher = (labels.get(method, method) for method in (claim.lower, claim.higher))
+        relation = f"{lower} {claim.relation} {higher}"
+        if claim not in verdicts:
+            heading = headings.get(claim.metric, claim.metric)
+            rows.append([claim.says, f"{heading}: {relation}", DASH, DASH, DASH, NOT_MEASURED, DASH])
+            continue
+        name, line = verdicts[claim]
+        far = line.compared.effect
+        effect, interval = DASH, DASH
+        if far is not None:
+            effect = ("×" if far.scale == RATIO else "") + number(far.shown)
+            interval = " to ".join(number(end) for end in far.interval or ()) or DASH
+        p = DASH if line.p is None else number(line.p, 2)
+        tested = f"{measure_of(line.compared).heading}: {relation}"
+        rows.append([claim.says, tested, effect, interval, p, line.verdict + line.remark, name])
+    return rows
 
 
-def claim_counts(claims: JudgedClaims) -> str:
+def claim_counts(folders: Sequence[Path]) -> str:
     """Return how many tests of claims came out how, those of the primary ones first."""
+    verdicts, *_ = _judged(*folders)
     lines = []
-    for name, family in (("primary", PRIMARY), ("exploratory", EXPLORATORY)):
-        counts = Counter(claims.verdicts[claim][1].verdict for claim in family if claim in claims.verdicts)
+    for name, family in FAMILIES.items():
+        counts = Counter(verdicts[claim][1].verdict for claim in family if claim in verdicts)
         absent = len(family) - counts.total()
-        texts = [
-            in_words(counts),
-            f"{absent} {'is' if absent == 1 else 'are'} {NOT_MEASURED}" if absent else "",
-        ]
-        lines.append(f"Tests of {name} claims: {', '.join(filter(None, texts))}.")
+        missing = [f"{absent} {'is' if absent == 1 else 'are'} {NOT_MEASURED}"] if absent else []
+        lines.append(f"Tests of {name} claims: {', '.join([in_words(counts), *missing])}.")
     return "\n".join(lines)
-
-
-def _row(claim: Claim, claims: JudgedClaims) -> list[str]:
-    lower, higher = (claims.labels.get(method, method) for method in (claim.lower, claim.higher))
-    relation = f"{lower} {claim.relation} {higher}"
-    if claim not in claims.verdicts:
-        heading = claims.metrics.get(claim.metric, claim.metric)
-        return [claim.says, f"{heading}: {relation}", DASH, DASH, DASH, NOT_MEASURED, DASH]
-    name, line = claims.verdicts[claim]
-    far = line.compared.effect
-    effect, interval = DASH, DASH
-    if far is not None:
-        effect = ("×" if far.scale == RATIO else "") + number(far.shown)
-        interval = " to ".join(number(end) for end in far.interval or ()) or DASH
-    p = DASH if line.p is None else number(line.p, 2)
-    tested = f"{measure_of(line.compared).heading}: {relation}"
-    return [claim.says, tested, effect, interval, p, line.verdict + line.remark, name]
 
 
 def front_sentences(run: Run) -> str:
@@ -161,67 +187,21 @@ def front_sentences(run: Run) -> str:
     ])  # fmt: skip
 
 
-FORMS = (
-    "front of RUN; table NAME of RUN; COLUMN, ...; METHOD, ...; claims primary of RUN, ...; claims "
-    "exploratory of RUN, ...; counts of RUN, ...; runs of RUN, ...; attributes of MODULE.CLASS; NAME, ...; "
-    "docstring of MODULE; recipes of NAME, ...; sources of the library; evaluations of published runs; "
-    f"{'; '.join(PARTS)}"
-)
-
-LIBRARY_FILES = {"library_clips.csv": clip_rows}  # in docs/
-TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
-ORIGIN = ("Run", "Day", "Commit", "Processor")  # heads
+def run_rows(folders: Sequence[Path]) -> Rows:
+    """Return a heading, and day, commit and processor of each run, of each part of a merged one."""
+    parts = [
+        (folder.name, str(part.get("finished", ""))[:10], part["commit"], part["hardware"]["processor"])
+        for folder in folders
+        for part in _parts(RunFolder(folder).read_config())
+    ]
+    return [("Run", "Day", "Commit", "Processor"), *dict.fromkeys(parts)]
 
 
-def published_part(request: str) -> str:
-    """Return the Markdown of a generated part. Raises ValueError for words of no known form."""
-    what, _, source = request.partition(" of ")
-    runs, *lists = source.split(";")
-    wanted, methods = (
-        [word.strip() for word in text.split(",") if word.strip()] for text in (*lists, "", "")[:2]
-    )
-    folders = [PUBLISHED / name.strip() for name in runs.split(",")]
-    kind, _, name = what.partition(" ")
-    if (part := request.partition(";")[0]) in PARTS:
-        return markdown_table(chosen_rows(PARTS[part](), wanted))
-    if kind == "docstring":
-        return markdown_table(docstring_rows(source))
-    if kind == "recipes":
-        return markdown_table(recipe_rows(source))
-    if kind == "attributes":
-        return markdown_table(chosen_rows(attribute_rows(runs), wanted))
-    if request == "sources of the library":
-        return markdown_table(list(source_rows()))
-    if request == "evaluations of published runs":
-        return markdown_table(evaluation_rows(PUBLISHED))
-    if kind == "front":
-        return front_sentences(read_published(folders[0]))
-    if what == "table overview" and methods:
-        return _overview(folders, wanted, methods)
-    if kind == "table":
-        table = _of_methods(_table(folders[0], name), methods)
-        rows = text_rows(read_published(folders[0]), table, wanted)
-        return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
-    if kind == "claims":
-        return markdown_table(claim_rows(_claims(*folders), primary=name == "primary"))
-    if kind == "counts":
-        return claim_counts(_claims(*folders))
-    if kind == "runs":
-        parts = [(folder, part) for folder in folders for part in origins(RunFolder(folder).read_config())]
-        lines = dict.fromkeys((folder.name, *part[:3]) for folder, part in parts)
-        return markdown_table([ORIGIN, *lines])
-    raise ValueError(f"no part is generated from '{request}'; known: {FORMS}")
+def _parts(config: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    return config.get("merged", [config])
 
 
-def library_file(name: str) -> str:
-    """Return the text of a CSV file of LIBRARY_FILES."""
-    text = StringIO()
-    rows = ([cell.strip("`") for cell in row] for row in LIBRARY_FILES[name]())
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
-
-
-def evaluation_rows(published: Path) -> list[tuple[str, ...]]:
+def evaluation_rows(published: Path) -> Rows:
     """Return a heading and rows of the runs in a folder: how often each evaluated test motions.
 
     Runs of one protocol and split with the same number of test-set evaluations share a row.
@@ -235,53 +215,37 @@ def evaluation_rows(published: Path) -> list[tuple[str, ...]]:
     return [("Protocol", "Split", "Test-set evaluations", "Runs"), *lines]
 
 
-def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[str]) -> str:
+def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[str]) -> Rows:
     """Return the table of page one with these methods, each from the first run that has it."""
-    tables: list[list[list[str]]] = []
-    places: dict[str, list[str]] = {}
+    heads: list[str] = []
+    rows: dict[str, list[str]] = {}
     for run in map(read_published, folders):
-        own = [name for name in methods if name in run.methods and name not in places]
-        rows = text_rows(run, overview(run, own)[0], wanted)
-        tables.append(rows)
-        places |= dict(zip(run.ordered(own), rows[1:]))
-    if absent := [name for name in methods if name not in places]:
-        raise ValueError(f"no run of {', '.join(folder.name for folder in folders)} has {absent[0]}")
-    if any(rows[0] != tables[0][0] for rows in tables):
-        raise ValueError(f"runs {', '.join(folder.name for folder in folders)} have other columns")
-    return markdown_table([tables[0][0], *(places[name] for name in methods)])
+        own = [name for name in methods if name in run.methods and name not in rows]
+        heads, *lines = text_rows(run, overview(run, own)[0], wanted)
+        rows |= dict(zip(run.ordered(own), lines))
+    return [heads, *(rows[name] for name in methods)]
+
+
+def _table(folder: Path, name: str, wanted: Sequence[str], methods: Sequence[str]) -> str:
+    """Return a table of a run with its caption: these columns and methods, all where none is named."""
+    run, made = read_published(folder), _made(folder, name)
+    place = next((place for place, column in enumerate(made.columns) if column.method), 0)
+    lines = [row for row in made.rows if not methods or row[place] in methods]
+    if absent := set(methods) - {str(row[place]) for row in lines}:
+        raise KeyError(f"{name} of {folder.name}: {', '.join(sorted(absent))}")
+    rows = text_rows(run, replace(made, rows=tuple(lines)), wanted)
+    return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [made.caption, remarks_on(rows)]))}"
 
 
 @cache
-def _claims(*folders: Path) -> JudgedClaims:
-    return judge_in_first([(folder.name, read_published(folder)) for folder in folders], TIMED)
-
-
-def _of_methods(table: Table, methods: Sequence[str]) -> Table:
-    """Return the table with the rows of these methods alone, of all where none is named.
-
-    Raises:
-        ValueError: for a method that the table has not.
-    """
-    place = next((place for place, column in enumerate(table.columns) if column.method), 0)
-    known = {str(row[place]) for row in table.rows}
-    if absent := [name for name in methods if name not in known]:
-        raise ValueError(f"table {table.name} has no row of {absent[0]}; it has {', '.join(sorted(known))}")
-    return replace(table, rows=tuple(row for row in table.rows if not methods or row[place] in methods))
-
-
-@cache
-def _table(folder: Path, name: str) -> Table:
-    """Return a table of a run, having made no more tables than it takes to meet it."""
+def _made(folder: Path, name: str) -> Table:
+    """Return a table of a run: metrics declare many, others have the name of the function that makes them."""
     run = read_published(folder)
-    # Metrics declare many; most others have the name of the function that makes them.
-    makers = sorted(TABLES, key=lambda make: getattr(make, "__name__", "") != name)
-    of_others = chain.from_iterable(make(run) for make in makers)
-    names = []
-    for table in chain(metric_tables(run, name.removesuffix("_by_scene")), of_others):
-        if table.name == name:
-            return table
-        names.append(table.name)
-    raise ValueError(f"run {folder.name} has no table {name}; it has {', '.join(names)}")
+    makers = {make.__name__: make for make in TABLES}
+    made = makers[name](run) if name in makers else metric_tables(run, name)
+    if not made:
+        raise KeyError(f"table {name} of {folder.name}")
+    return made[0]
 
 
 BEGIN, END = "<!-- generated: {} -->", "<!-- end of generated -->"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from reports.blocks.sentences import topics
 from reports.run.finished_run import Run
+from reports.sentences import headline
 from reports.statistics.effects import Effect
 from reports.tables.table import DASH, REMARKS, CellText, Table, column_texts
 
@@ -25,11 +25,9 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
     which nothing stands are left out.
 
     Raises:
-        ValueError: for a column that the table has not.
+        KeyError: for a column that the table has not.
     """
     places = {column.name: place for place, column in enumerate(table.columns)}
-    if absent := [name for name in columns if name not in places]:
-        raise ValueError(f"table {table.name} has no column {absent[0]}; it has {', '.join(places)}")
     texts: list[list[str]] = []
     for place in (places[name] for name in columns or places):
         column, cells = table.columns[place], [row[place] for row in table.rows]
@@ -91,7 +89,7 @@ MOST_COLUMNS = 5  # of COLUMNS, without the intervals of effects
 
 
 def answer(run: Run, tables: Mapping[str, Table]) -> str:
-    """Return table and first sentence of page one, empty where the run has neither.
+    """Return table and chief sentences of page one, empty where the run has neither.
 
     At most eight lines: with the counts, the times and the path of the report that follow, ten.
     """
@@ -102,7 +100,7 @@ def answer(run: Run, tables: Mapping[str, Table]) -> str:
         rows = text_rows(run, table, [name for name in COLUMNS if name in names][:MOST_COLUMNS])
         lines.append(aligned_text(rows))
         notes = [remarks_on(rows), f"The report also has {', '.join(left_out)}." if left_out else ""]
-    chief = [sentences[0] for _, sentences in topics(run)[:1]]
+    chief = [text for topic, text in headline(run) if topic == "How near"]
     lines.append(" ".join(filter(None, [*chief, *notes])))
     return "\n".join(filter(None, lines)).replace("\u00a0", " ")
 

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
-from reports.blocks.block import Report
+from reports.blocks import Report
 from reports.run.finished_run import Run, make_run
 from reports.run.stored_files import RollOuts
 from reports.tables import make_tables

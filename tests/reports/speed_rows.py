@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from benchmarks.results.row import Row
-from reports.blocks.sentences import headline
 from tests.reports.report_folder import row as any_row
 
 WORN = {
@@ -24,11 +23,6 @@ SCENES = ("tshirt/walk", "tshirt/jump")
 
 def row(scene, method, metric, value, unit="1", **more) -> Row:
     return any_row(scene, method, metric, value, **{"suite": "speed", "unit": unit, **more})
-
-
-def cost_sentence(run) -> str:
-    """The sentence of page one on cost, without which nothing is said of rivals."""
-    return dict(headline(run)).get("At what cost", "").replace("\u00a0", " ")
 
 
 def all_rows() -> list[Row]:

@@ -106,7 +106,7 @@ def read_header(path: Path) -> None:
 
 def read_rows(path: Path, name: str = "results.csv") -> None:
     """Read a run whose file `name` is the one at `path`, the others intact, up to the report's tables."""
-    from reports.blocks.block import Report
+    from reports.blocks import Report
     from reports.pdf import content
     from reports.run.reading import read_run
     from reports.tables import make_tables

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from reports.blocks import FIGURES
-from reports.blocks.block import Report
+from reports.blocks import FIGURES, Report
 from reports.figures.figure import draw_figures
 from reports.pdf import write_pdf
 from reports.run.reading import read_run
@@ -149,5 +148,5 @@ def test_names_stand_as_they_are(request, texts):
 
 def test_what_failed_is_said_on_page_one(texts):
     first = " ".join(word for word, _ in texts[0])
-    assert "What went worst." in first
+    assert "How it ended." in first
     assert ("failed" in first and "skipped" in first) or "timeout" in first

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results.run_folder import RunFolder
-from reports.blocks.block import Report
+from reports.blocks import Report
 from reports.page.write_page import write_page
 from reports.run.reading import read_run
 from reports.tables import make_tables

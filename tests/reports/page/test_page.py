@@ -141,11 +141,11 @@ def test_names_with_markup_stay_text(folder):
     assert content_of(folder)["methods"][NASTY]["label"] == NASTY
 
 
-def test_what_did_not_run_stands_at_the_top(folder):
+def test_what_did_not_run_is_counted_at_the_top_and_listed_in_a_table(folder):
     page = folder.page_path.read_text(encoding="utf-8")
-    head = page[: page.index("<main>")]
-    assert "Not every number could be had. Of 18 cells 1 failed, 1 timeout, 1 skipped." in head
-    assert "over 30 s" in head and "no body here" in head and 'class="trouble wrong"' in head
+    assert "Of 18 cells 1 failed, 1 timeout, 1 skipped." in page[: page.index("<main>")]
+    table = next(t for t in content_of(folder)["tables"] if t["name"] == "unfinished")
+    assert {"over 30 s", "no body here"} < {line[-1] for line in table["rows"]}
 
 
 def test_tables_sort_by_numbers_and_define_their_columns(folder):
@@ -188,6 +188,5 @@ def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(t
     assert len(arrays["positions"]) == 3 and "area" not in arrays
     assert "pbns" not in content_of(run)["scenes"][WHOLE]["methods"]
     first = run.page_path.read_bytes()
-    assert first.decode().count(problem) == 1
     write(run, tables=False)
     assert run.page_path.read_bytes() == first

@@ -1,17 +1,12 @@
-"""Body shapes in the report: tables and the sentence of page one."""
+"""Table of body shapes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from reports.blocks.sentences import headline
 from reports.tables.pivots import shapes
 from tests.reports.report_folder import row, run_of
-
-
-def on_other_bodies(run) -> str:
-    return dict(headline(run)).get("On other bodies", "").replace("\u00a0", " ")
 
 
 def shaped(method, metric, values, **more):
@@ -42,12 +37,5 @@ def test_energies_are_listed_by_body_shape():
     assert lines["mean shape", "snug"][3] == pytest.approx(10.0)
     assert lines["mean shape", "simulation"][2:4] == lines["mean shape", "skinning"][2:4] == (None, None)
 
-    sentence = on_other_bodies(run_of(rows))
-    assert sentence.startswith("On 2 other bodies, in one motion, relative excesses are: SNUG 35 % (95 % int")
-    # A method that failed on a body is compared on the others, and the sentence says so.
-    last = [row("shapes/1", "snug", "cost/frame", None, suite="shapes", status="diverged", reason="no end")]
-    kept = [r for r in rows if (r.scene, r.method) != ("shapes/1", "snug")]
-    assert on_other_bodies(run_of(kept + last)).endswith(" are: SNUG 20 % (1 of 2 roll-outs).")
     one = [r for r in rows if r.scene == "shapes/0"]
-    assert on_other_bodies(run_of(one)) == ""
     assert shapes(run_of(one)) == []

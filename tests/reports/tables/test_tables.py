@@ -10,16 +10,15 @@ import pytest
 
 from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
-from reports.blocks.sentences import endings
 from reports.pdf import lay_out_table
 from reports.run.finished_run import make_run
+from reports.sentences import endings
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.tables import make_tables, table
-from reports.tables.findings import merged
 from reports.tables.pivots import ablation_effects, ablations
 from tests.benchmarks.runner.test_cell_tasks import plan_of
-from tests.reports.report_folder import SCENES, all_rows, row, run_of, skipped
+from tests.reports.report_folder import SCENES, all_rows, row, run_of
 
 
 def seeds_of(method, metric, values, **more):
@@ -105,11 +104,6 @@ def test_a_cell_of_two_suites_counts_once_in_its_own_table():
     ]
     table = make_tables(run_of(rows))["speed_by_scene"]
     assert [(*line[:3], line[3].value) for line in table.rows] == [("garments", "flag", "snug", 1.0)]
-
-
-def test_lines_that_differ_in_their_scene_alone_become_one():
-    table = make_tables(run_of([skipped(scene="a"), skipped(scene="b"), skipped(scene="c", reason="other")]))
-    assert [line[1] for line in merged(table["unfinished"], ("scene",)).rows] == ["a, b", "c"]
 
 
 def test_what_is_judged_outside_of_the_checks_stands_with_them():

@@ -28,9 +28,9 @@ def test_the_answer_is_a_table_of_few_methods_and_one_line_below():
     assert head.split()[:3] == ["Method", "Relative", "excess"] and len(lines) == MOST_METHODS
     assert not [line for line in lines if line.startswith("SNUG, cleaned up")]
     assert last.startswith(
-        "On 3 unseen motions SNUG has a relative excess of 12 % (pooled 12 %) and PBNS of 25 % (pooled "
+        "On 3 unseen motions the relative excess is: SNUG 12 % (pooled 12 %) and PBNS 25 %"
     )
-    assert last.endswith("has less is inconclusive. The report also has SNUG, cleaned up.")
+    assert last.endswith("The report also has SNUG, cleaned up.")
 
 
 def test_a_run_without_page_one_has_no_answer():

@@ -42,12 +42,6 @@ def test_the_table_of_a_class_has_each_of_its_fields_once(path, names):
     assert all(text and not text.endswith(".") for _, text in attribute_rows(path))
 
 
-@pytest.mark.parametrize("path", ["Row", "benchmarks.results.row.Line", "benchmarks.presets.Preset"])
-def test_a_class_that_is_not_there_or_describes_no_attributes_is_refused(path):
-    with pytest.raises(ValueError, match=path):
-        attribute_rows(path)
-
-
 def test_sizes_studies_and_options_have_a_row_each():
     assert [row[0] for row in PARTS["sizes"]()[1:]] == [f"`{preset.name}`" for preset in PRESETS]
     assert dict((row[0], row[1:]) for row in PARTS["sizes"]())["`quick`"][:3] == (
@@ -69,8 +63,6 @@ def test_recipes_are_compared_in_the_options_that_differ():
     assert rows["contact_margin"] == ("None", "0.002") and rows["schedule"] == ("cosine", "epochs")
     meanings = {row[0].strip("`"): row[3] for row in recipe_rows("default, paper")[1:]}
     assert meanings["remembered"].endswith("instead of to zero")  # the first of two sentences
-    with pytest.raises(ValueError, match="no recipe 'text'; choose from default, paper"):
-        recipe_rows("default, text")
 
 
 @pytest.mark.parametrize(
@@ -84,9 +76,3 @@ def test_recipes_are_compared_in_the_options_that_differ():
 def test_tables_of_files_have_every_array_that_is_read(module, names):
     table = " ".join(cell for row in docstring_rows(module) for cell in row)
     assert not [name for name in names if f"`{name}`" not in table]
-
-
-def test_a_module_without_a_table_is_refused():
-    for module in ("snug.body.plain_files", "snug.recipe"):
-        with pytest.raises(ValueError, match=module):
-            docstring_rows(module)

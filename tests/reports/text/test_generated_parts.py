@@ -13,16 +13,8 @@ from benchmarks.results.run_folder import RunFolder
 from reports.docs import ROOT, documents, main
 from reports.statistics.outcomes import PUBLISHED
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY
-from reports.text.published_parts import (
-    BEGIN,
-    END,
-    LIBRARY_FILES,
-    evaluation_rows,
-    fill,
-    library_file,
-    published_part,
-)
-from snug.motion.library import CLIPS, TEST, clip_of
+from reports.text.published_parts import BEGIN, END, evaluation_rows, fill, published_part
+from snug.motion.library import TEST, clip_of
 
 JUDGED = "quick, paper_text, ablations, equal_data"  # as in the documents: what has been judged is kept
 
@@ -35,7 +27,7 @@ def test_every_generated_part_is_what_the_published_runs_give():
         assert text == made, f"{path}: run python -m reports.docs"
     places = {path.relative_to(ROOT).parts[0] for path, *_ in made_anew}
     assert places == {"README.md", "docs", "submissions"}
-    assert {path.name for path, *_ in made_anew if path.suffix == ".csv"} == set(LIBRARY_FILES)
+    assert [path.name for path, *_ in made_anew if path.suffix == ".csv"] == ["library_clips.csv"]
 
 
 def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys):
@@ -52,16 +44,14 @@ def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys)
 def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
     with pytest.raises(ValueError, match="needs an"):
         fill(BEGIN.format("front of quick"), lambda request: "")
-    for request, message in (
-        ("everything of quick", "known: front"),
-        ("table nothing of quick", "no table nothing; it has"),
-        ("table overview of quick; colour", "no column colour; it has"),
-        (
-            "table overview of quick, paper_text; method; snug, nobody",
-            "no run of quick, paper_text has nobody",
-        ),
-    ):
-        with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match="known: docstring"):
+        published_part("everything of quick")
+    for request in (
+        "table nothing of quick", "table overview of quick; colour", "options of benchmarks.run; --seed",
+        "table overview of quick, paper_text; method; snug, nobody",
+        "table energies of quick; method; snugg", "table paper_table_1 of quick",
+    ):  # fmt: skip
+        with pytest.raises(KeyError):
             published_part(request)
 
 
@@ -88,8 +78,6 @@ def test_rows_of_options_and_attributes_can_be_chosen():
     assert [line.split(" | ")[0] for line in lines] == ["| `--seeds N,...`", "| `-o DIR, --out DIR`"]
     lines = published_part("attributes of benchmarks.method.Reporting; level").splitlines()[2:]
     assert [line.split(" | ")[0] for line in lines] == ["| `level`"]
-    with pytest.raises(ValueError, match="no row has the name '--seed'"):
-        published_part("options of benchmarks.run; --seed")
 
 
 def test_the_command_checks_and_says_so(monkeypatch, tmp_path, capsys):
@@ -121,12 +109,6 @@ def test_a_later_run_judges_what_those_before_it_cannot_and_nothing_else():
     assert {after[-1] for _, after in judged} == {"paper_text |", "ablations |", "equal_data |"}
 
 
-def test_the_file_of_the_library_has_every_clip():
-    lines = library_file("library_clips.csv").splitlines()
-    assert lines[0] == "Clip,Content,Frames,Role,Digest" and len(lines) == len(CLIPS) + 1
-    assert '07_02,"walk, 1.5 m/s",82,test,da604aa37de1' in lines
-
-
 def test_segments_of_a_recording_are_one_source_of_test_motions():
     lines = published_part("sources of the library").splitlines()[2:]
     assert len(lines) == len({clip_of(name) for name in TEST})
@@ -152,12 +134,10 @@ def test_runs_alike_in_protocol_split_and_test_set_evaluations_share_a_row(tmp_p
     ]
 
 
-def test_rows_of_a_table_can_be_chosen_by_method_and_an_unknown_one_is_refused():
+def test_rows_of_a_table_can_be_chosen_by_method():
     part = published_part("table energies of quick; method, energy/total; snug, simulation")
     assert [line.split(" | ")[0] for line in part.splitlines()[2:4]] == ["| Simulation", "| SNUG"]
     assert not part.splitlines()[4].startswith("|")
-    with pytest.raises(ValueError, match="no row of snugg; it has"):
-        published_part("table energies of quick; method; snugg")
 
 
 def test_table_1_of_the_paper_is_of_the_frames_of_its_own_clips():
@@ -173,5 +153,3 @@ def test_table_1_of_the_paper_is_of_the_frames_of_its_own_clips():
         assert here[:2] == pytest.approx(means.loc[["pbns-paper", "snug-paper"], term].to_numpy(), rel=2e-3)
         for pbns, snug, ratio in (here, paper):
             assert ratio == pytest.approx(snug / pbns, abs=6e-3)
-    with pytest.raises(ValueError, match="no table paper_table_1"):
-        published_part("table paper_table_1 of quick")

@@ -1,0 +1,115 @@
+"""The report as a list of blocks: headings, figures and tables in the order in which they are read.
+
+The PDF and the page walk the same BLOCKS, below the sentences of page one. A block without content is left
+out, and so is a heading with nothing below it. Blocks before the first heading make page one.
+A new figure is a function in a file of its own and a line here.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from reports.figures.costs import break_even, error_of_page_one
+from reports.figures.figure import Figure, Picture
+from reports.figures.over_time import energy_series, training_curves
+from reports.figures.values import dots, known_answers
+from reports.pictures import failures, lead_row, side_by_side
+from reports.run.finished_run import Run
+from reports.tables.table import Cell, Table
+
+ROWS = 12  # of a printed table; the CSV has all
+
+
+@dataclass(frozen=True)
+class Report:
+    """Material of a report: the run, its tables and its pictures, both by name."""
+
+    run: Run
+    tables: Mapping[str, Table]
+    pictures: Mapping[str, Sequence[Picture]]
+
+    @property
+    def subtitle(self) -> str:
+        """Preset, commit or version, and day of the run."""
+        config = self.run.config
+        parts = [f"preset {config['preset']}"] if config.get("preset") else []
+        if made_by := str(config.get("commit") or ""):  # an installed package knows its version alone
+            parts += [made_by if made_by.startswith("version ") else f"commit {made_by}"]
+        parts += [str(config["started"])[:10]] if config.get("started") else []
+        return " · ".join(parts)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading; it stands only where a block below it has content."""
+
+    title: str
+
+
+@dataclass(frozen=True)
+class TableBlock:
+    """A table, of which the PDF prints at most so many lines, without those that end in one of `left_out`."""
+
+    name: str
+    most: int = ROWS
+    left_out: tuple[str, ...] = ()
+
+    def printed(self, table: Table) -> Table:
+        """Return the first rows of each group, equally many; a note says where the others are."""
+        rows = [row for row in table.rows if not set(row) & set(self.left_out)]
+        heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
+        before: Counter[tuple[Cell, ...]] = Counter()
+        order = []
+        for line, row in enumerate(rows):
+            group = tuple(row[place] for place in heads)
+            order.append((before[group], line))
+            before[group] += 1
+        chosen = sorted(line for _, line in sorted(order)[: self.most])
+        more = len(table.rows) - len(chosen)
+        rest = f"{more} more rows are in tables/{table.name}.csv. " if more else ""
+        return replace(table, rows=tuple(rows[line] for line in chosen), note=(rest + table.note).strip())
+
+
+BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
+    Figure("lead", lead_row),
+    Figure("error_against_time", error_of_page_one),
+    TableBlock("overview"),
+    TableBlock("reference_uncertainty"),
+    Heading("The paper's tables"),
+    TableBlock("energies"),
+    TableBlock("paper_table_1"),
+    TableBlock("curvature"),
+    TableBlock("cost"),
+    Heading("Findings"),
+    TableBlock("relative_excess"),
+    TableBlock("errors_in_spreads"),
+    TableBlock("findings", most=40),
+    TableBlock("ablation_effects"),
+    Heading("Error against run time"),
+    TableBlock("error_rivals"),
+    Figure("break_even", break_even),
+    Heading("Garments in motion"),
+    Figure("frames", side_by_side, ("frames_*",)),
+    Figure("failures", failures),
+    Heading("Behind the means"),
+    Figure("dots", dots),
+    Heading("Dynamics"),
+    TableBlock("dynamics"),
+    Figure("energy_series", energy_series, ("energy_series_*",)),
+    Heading("Body shapes"),
+    TableBlock("shapes"),
+    Heading("Validation"),
+    Figure("known_answers", known_answers),
+    TableBlock("validation", left_out=("pass", "reported")),
+    Heading("Stress"),
+    TableBlock("extremes", left_out=("converged",)),
+    Heading("Training"),
+    Figure("training", training_curves, ("training.*", "training_*")),
+    Heading("How cells, checks and stress tests ended"),
+    TableBlock("endings"),
+    TableBlock("unfinished"),
+)
+
+FIGURES = tuple(block for block in BLOCKS if isinstance(block, Figure))

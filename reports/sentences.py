@@ -1,0 +1,166 @@
+"""Sentences of page one, each from one template: a run that lacks the numbers of one goes without it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from functools import lru_cache
+
+import pandas as pd
+
+from reports.run.finished_run import Run
+from reports.statistics.effects import Effect
+from reports.statistics.means_and_spreads import ensemble_spread, mean_of
+from reports.statistics.outcomes import (
+    BAD,
+    EXTERNAL,
+    LEARNED,
+    counted,
+    leads,
+    published_beside,
+    subjects,
+)
+from reports.statistics.paper_claims import counts, in_words, judged
+from reports.statistics.pareto import NETWORK, compared_scenes, indistinct, run_time
+from reports.statistics.relative_excess import (
+    RELATIVE_EXCESS,
+    TOTAL,
+    Excess,
+    excess_of,
+    with_relative_excess,
+)
+from reports.statistics.verdicts import compare_methods
+from reports.tables.table import in_scenes, listed, number
+
+CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
+SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
+
+
+def headline(run: Run) -> list[tuple[str, str]]:
+    """Return (topic, its sentences) for each topic of page one that the run can tell, the chief one first."""
+    texts = {**_measured(run), "How it ended": endings(run)}
+    return [(topic, unbroken(text)) for topic, text in texts.items() if text]
+
+
+@lru_cache(maxsize=4)
+def _measured(run: Run) -> dict[str, str]:
+    worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
+    return {
+        "How near": nearness(run, worn), "How it moves": _moves(run, worn), "At what cost": _cost(run, worn),
+        "How certain": _certainty(run, worn),
+    }  # fmt: skip
+
+
+def nearness(run: Run, worn: pd.DataFrame) -> str:
+    """Say which relative excess each network of page one has in these rows, and in its worst motion."""
+    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
+    rows = with_relative_excess(run, worn)
+    known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
+    if not known:
+        return ""
+    # Those in which skinning has an excess: a network that failed in one has a remark on it.
+    scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
+    shares = [f"{run.label(name)} {_share(excess)}" for name, excess in known.items()]
+    worst = [f"{run.label(name)} {number(of.worst[1], 2)} %{of.fewer}" for name, of in known.items()]
+    beside = published_beside(run, next(iter(known)))
+    return (
+        f"On {len(scenes)} {_kind(run, scenes)}motion{'' if len(scenes) == 1 else 's'} the relative excess "
+        f"is: {listed(shares)}, where the reference has 0 % and skinning alone 100 %"
+        f"{f' ({beside})' if beside else ''}. These are geometric means over independent sources of motion; "
+        f"pooled: ratios of sums over motions. Worst motions: {listed(worst)}."
+    )
+
+
+def _kind(run: Run, scenes: Collection[str]) -> str:
+    """Return what these scenes' motions are to the networks, before the word "motions"."""
+    if set(scenes) <= set(run.trained_on):
+        return ""
+    return "validation " if set(scenes) <= set(run.with_motion("validation")) else "unseen "
+
+
+def _share(excess: Excess) -> str:
+    """Return a relative excess as "6.1 % (95 % interval 2.3 to 14; pooled 12 %)", and of which roll-outs."""
+    remarks = "; ".join(filter(None, [_interval(excess.effect), f"pooled {number(excess.pooled, 2)} %"]))
+    return f"{number(excess.typical, 2)} % ({remarks}){excess.fewer}"
+
+
+def _interval(effect: Effect) -> str:
+    """Return "95 % interval 2.3 to 14", empty of an effect without one."""
+    ends = effect.interval
+    return f"95 % interval {' to '.join(number(end, 2) for end in ends)}" if ends else ""
+
+
+def _moves(run: Run, worn: pd.DataFrame) -> str:
+    """Say what each subject lacks of the simulation's motion, and how much of it lies inside the body."""
+    sentences = []
+    for method in subjects(run, set(worn[worn["usable"]]["method"])):
+        swing, alike, inside = (mean_of(worn, method, name) for name in (SWING, ALIKE, INSIDE))
+        if swing and alike and inside:
+            sentences.append(
+                f"{run.label(method)} has {secondary_motion(swing.value)} secondary motion: its hem "
+                f"amplitude is {number(100.0 * swing.value, 2)} % of the simulation's{swing.fewer}, with a "
+                f"correlation of {number(alike.value, 2)}{alike.fewer}; {number(inside.value, 2)} % of its "
+                f"surface lies inside the body{inside.fewer}."
+            )
+    return " ".join(sentences)
+
+
+def secondary_motion(amplitude: float) -> str:
+    """Return how much of the simulation's secondary motion there is, in words."""
+    if amplitude < 0.2:
+        return "almost no"
+    if amplitude < 0.8:
+        return "less"
+    return "about as much" if amplitude < 1.25 else "more"
+
+
+def _cost(run: Run, worn: pd.DataFrame) -> str:
+    """Say how long a frame takes, and how many times as long with the simulation."""
+    cells = run.cells("speed", "garments")
+    scenes = next(iter(compared_scenes(run, cells).values()), [])
+    timed = cells[cells["scene"].isin(scenes)] if scenes else worn
+    metric = run.metrics.get(run_time(timed))
+    network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
+    compared = compare_methods(run, timed, metric, run.reference, network) if metric else None
+    if compared is None or compared.effect is None or compared.other is None or not compared.other.value:
+        return ""
+    ends = compared.effect.interval or (compared.effect.shown,)
+    times = " to ".join(dict.fromkeys(number(end, 2) for end in ends))
+    whole = " from pose to vertices" if compared.metric.name == "cost/whole" else ""
+    return (
+        f"On one core {run.label(network)} takes {number(compared.other.value)} ms a frame{whole}, the "
+        f"simulation {times} times as long{f', {in_scenes(scenes)}' if scenes else ''}."
+    )
+
+
+def _certainty(run: Run, worn: pd.DataFrame) -> str:
+    """Say which primary claims hold, and how far equally valid simulations lie from the reference."""
+    sentences = []
+    if counted_claims := counts(judged(run)):
+        tests = f"{counted_claims.total()} test{'' if counted_claims.total() == 1 else 's'}"
+        sentences.append(f"Of {tests} of primary claims of the paper {in_words(counted_claims)}.")
+    distance, curvature = (indistinct(run, worn, metric) for metric in (DISTANCE, CURVATURE))
+    if distance and curvature:
+        sentences.append(
+            "Equally valid simulations (another start, contact search or tolerance) lie "
+            f"{number(distance, 2)} mm and {number(curvature, 2)} 1/m of mean curvature from the reference, "
+            f"{in_scenes(set(ensemble_spread(run, worn, DISTANCE).index))}: errors below that show no "
+            "difference."
+        )
+    return " ".join(sentences)
+
+
+def endings(run: Run) -> str:
+    """Say how many cells, checks and stress tests ended how, with every kind that is not ok."""
+    parts = []
+    for kind, statuses in counted(run).items():
+        bad = [f"{statuses[name]} {name}" for name in (*BAD, "skipped") if statuses[name]]
+        parts.append(f"of {sum(statuses.values()):,} {kind} {', '.join(bad) if bad else 'all ended well'}")
+    parts += [f"{len(run.problems)} files could not be read"] if run.problems else []
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def unbroken(text: str) -> str:
+    """Return the text with each number on the line of its unit."""
+    return re.sub(r"(?<=\d) (?=(J|ms|mm|1/m|%)\b|%)", "\u00a0", text)

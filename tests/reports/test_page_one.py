@@ -1,0 +1,188 @@
+"""Page one: its sentences, the methods that lead it, and what its tables print."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+
+from reports.blocks import TableBlock
+from reports.pdf import content
+from reports.sentences import endings, headline
+from reports.statistics.outcomes import leads
+from reports.tables import make_tables
+from reports.tables.page_one_table import ROWS
+from reports.tables.table import Column, Table
+from tests.reports.report_folder import SCENES, all_rows, report_of, row, run_of
+from tests.reports.tables.test_tables import on_two_scenes
+
+MEMBERS = ("simulation-perturbed-1e-4", "simulation-1e-8")  # of the reference's ensemble
+# Skinning has 10 J more than the simulation in either scene.
+BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.5, 17.0)]
+SNUG = on_two_scenes("snug", 1.0, 9.0)  # 5 and 20 % of skinning's excess
+PBNS = on_two_scenes("pbns", 1.5, 10.0)
+SENTENCES = """\
+How near: On 2 unseen motions the relative excess is: SNUG 10 % (95 % interval −157 to 63,332; pooled 12 %) and
+PBNS 17 % (95 % interval −15 to 18,371; pooled 20 %), where the reference has 0 % and skinning alone 100 %. These
+are geometric means over independent sources of motion; pooled: ratios of sums over motions. Worst motions: SNUG
+20 % and PBNS 30 %.
+How it moves: SNUG has less secondary motion: its hem amplitude is 50 % of the simulation's, with a correlation of
+0.25; 2.5 % of its surface lies inside the body.
+At what cost: On one core SNUG takes 0.250 ms a frame, the simulation 400 times as long.
+How certain: Of 2 tests of primary claims of the paper 2 are inconclusive. Equally valid simulations (another
+start, contact search or tolerance) lie 3.0 mm and 2.0 1/m of mean curvature from the reference, in 2 scenes:
+errors below that show no difference.
+How it ended: Of 12 cells all ended well."""
+
+
+def said(topic: str, rows, **config) -> str:
+    return dict(headline(run_of(rows, **config))).get(topic, "").replace("\u00a0", " ")
+
+
+def of_all(rows):
+    """Rows of all that page one has a sentence on."""
+    more = {"dynamics/amplitude": 0.5, "dynamics/correlation": 0.25, "penetration/surface": 2.5}
+    rows = [*rows, *(row(s, "snug", name, value) for s in SCENES for name, value in more.items())]
+    rows += [row(s, m, "cost/frame", t) for s in SCENES for m, t in (("snug", 0.25), ("simulation", 100.0))]
+    far = (("distance/rms", 3.0), ("curvature/error", 2.0))
+    return rows + [row(s, member, name, x) for s in SCENES for member in MEMBERS for name, x in far]
+
+
+def test_the_sentences_of_page_one():
+    made = headline(run_of(of_all([*SNUG, *BESIDE, *PBNS])))
+    assert " ".join(f"{topic}: {text}" for topic, text in made).split() == SENTENCES.split()
+    assert [topic for topic, _ in headline(run_of(BESIDE[:2]))] == ["How it ended"]
+    # A member of the reference's ensemble is no rival, however near it is.
+    more = on_two_scenes(MEMBERS[0], 0.5, 7.0)
+    assert said("How near", SNUG + BESIDE + more) == said("How near", SNUG + BESIDE)
+
+
+def test_page_one_says_how_many_roll_outs_its_numbers_are_over():
+    """A network that diverges in one of two motions has a remark at every number."""
+    gone = row(SCENES[1], "snug", "cost/frame", None, status="diverged", reason="frame 9")
+    rows = of_all([*SNUG, *BESIDE, *PBNS])
+    rows = [gone, *(r for r in rows if (r.scene, r.method) != (SCENES[1], "snug"))]
+    fewer = "(1 of 2 roll-outs)"
+    assert said("How near", rows).startswith("On 2 unseen motions the relative excess is: SNUG 5.0 % (")
+    assert said("How near", rows).count(fewer) == 2
+
+
+def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
+    rows = SNUG + BESIDE
+    more = [row("skirt/walk", name, "energy/total", 3.0) for name in ("snug", "simulation")]
+    assert said("How near", rows + more) == said("How near", rows)
+    for roles, words in {
+        ("test", "training"): "1 unseen motion", ("training", "training"): "2 motions",
+        ("validation", "validation"): "2 validation motions", ("validation", ""): "2 unseen motions",
+    }.items():  # fmt: skip
+        scenes = {name: {"role": role} for name, role in zip(SCENES, roles)}
+        assert said("How near", rows, scenes=scenes).startswith(f"On {words} the relative excess is: SNUG")
+
+
+def test_run_times_are_of_the_scenes_that_both_have():
+    times = [(SCENES[0], "snug", 9.0), (SCENES[1], "snug", 0.25), (SCENES[1], "simulation", 100.0)]
+    rows = [row(s, m, "cost/frame", t, unit="ms") for s, m, t in times]
+    assert "takes 0.250 ms a frame, the simulation 400 times as long" in said("At what cost", rows)
+
+
+def test_page_one_counts_every_kind_of_ending():
+    rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
+    late = {"status": "timeout", "reason": "over 600 s", "seed": 1}
+    rows.append(row("tshirt/jump", "pbns", "energy/strain", None, **late))
+    assert endings(run_of(rows)).endswith(
+        "cells 2 failed, 1 timeout, 1 stalled, 1 skipped; of 3 checks 1 failed; of 2 stress tests 1 timeout."
+    )
+    table = make_tables(run_of(rows))["endings"]
+    lines = {line[0]: dict(zip([c.name for c in table.columns], line)) for line in table.rows}
+    assert lines["checks"]["failed"] == 1 and lines["checks"]["all"] == 3 and lines["cells"]["timeout"] == 1
+    # A metric that is not finite, or off its tolerance, fails no cell that has others.
+    bad = row("tshirt/walk", "pbns", "gap/energy", None, status="failed", reason="no number")
+    assert "cells 2 failed, 1 timeout, 1 stalled, 1 skipped;" in endings(run_of([*rows, bad]))
+    run = run_of(rows[:3])
+    run.problems.append("a file")
+    assert endings(run) == "Of 1 cells all ended well; 1 files could not be read."
+
+
+def test_page_one_shows_the_network_the_papers_rival_or_the_best_of_others_and_a_baseline():
+    run = run_of(all_rows())
+    assert leads(run, run.garment_rows) == ["simulation", "snug", "pbns", "skinning"]
+    best = [row(s, "supervised", "curvature/error", 0.1, unit="1/m") for s in SCENES]
+    better = run_of([*all_rows(), *best])
+    assert leads(better, better.garment_rows)[2] == "pbns"
+    without = better.garment_rows[better.garment_rows["method"] != "pbns"]
+    assert leads(better, without)[2] == "supervised"
+    assert leads(run, run.garment_rows, ["pbns", "simulation"]) == ["simulation", "pbns"]
+
+
+def test_roll_outs_of_the_user_are_on_page_one_beside_snug_or_alone():
+    mine = [
+        dataclasses.replace(r, role="external", seeded=False, pairing_group="")
+        for r in on_two_scenes("mine", 3.0, 9.0)
+    ]
+    alone, beside = run_of([*BESIDE, *mine]), run_of([*all_rows(), *mine])
+    assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
+    assert leads(beside, beside.garment_rows)[:3] == ["simulation", "snug", "mine"]
+    assert "is: mine " in said("How near", [*BESIDE, *mine])
+    assert "mine" in {line[0] for line in make_tables(alone)["overview"].rows}
+
+
+def test_changed_networks_and_other_recipes_lead_where_a_run_has_no_plain_snug():
+    springs = on_two_scenes("snug-springs", 1.0, 9.0)
+    changed = [dataclasses.replace(r, role="ablation", base="snug") for r in springs]
+    run = run_of([*changed, *BESIDE])
+    assert leads(run, run.garment_rows)[:2] == ["simulation", "snug-springs"]
+    both = run_of([*changed, *BESIDE, *SNUG])
+    assert leads(both, both.garment_rows)[:2] == ["simulation", "snug"]
+    names = ("pbns-paper", "snug-paper", "simulation")
+    run = run_of([line for name in names for line in on_two_scenes(name, 1.0, 9.0)])
+    assert leads(run, run.garment_rows) == ["simulation", "snug-paper", "pbns-paper"]
+
+
+def test_the_table_of_page_one_stays_short_and_has_the_last_of_a_family_of_networks():
+    many = [row(scene, f"mine-{k}", "energy/total", 1.0 + k) for k in range(20) for scene in SCENES]
+    made = make_tables(run_of([*all_rows(), *many]))
+    methods = [line[0] for line in made["overview"].rows]
+    assert len(methods) <= ROWS and {"simulation", "snug", "skinning"} < set(methods)
+    handles = [
+        dataclasses.replace(r, family="handles", level=level)
+        for level, above in ((40.0, 3.0), (80.0, 2.0))
+        for r in on_two_scenes(f"handles-{level:.0f}", 0.5 + above, 7.0 + above)
+    ]
+    methods = [line[0] for line in make_tables(run_of([*SNUG, *BESIDE, *handles]))["overview"].rows]
+    assert "handles-80" in methods and "handles-40" not in methods
+
+
+def test_a_shortened_table_has_rows_of_each_garment_and_leaves_out_what_went_well():
+    columns = (Column("garment", "Garment", text=True), Column("method", "Method", text=True))
+    lines = tuple((garment, f"{garment}-{k}") for garment in ("shirt", "tunic") for k in range(8))
+    table = Table("energies", columns, lines, grouped_by=("garment",))
+    short = TableBlock("energies").printed(table)
+    assert short.rows == (*lines[:6], *lines[8:14])
+    assert short.note == "4 more rows are in tables/energies.csv."
+    assert TableBlock("energies", left_out=("shirt",)).printed(table).rows == lines[8:]
+
+
+def test_sections_exist_only_for_what_ran():
+    check = row("falls", "simulation", "check", 0.5, suite="validation", expected=0.0, tolerance=1.0)
+    failed = dataclasses.replace(check, scene="sag", status="failed", reason="off")
+    report = report_of([check, failed], workers=4)
+    made = content(report)
+    endings_title = "How cells, checks and stress tests ended"
+    assert [section["title"] for section in made["sections"]] == ["Validation", endings_title]
+    assert made["first"] == made["definitions"] == [] and set(report.tables) == {"validation", "endings"}
+    (block,) = made["sections"][0]["blocks"]
+    assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
+    assert made["workers"] == "up to 4 side by side, one thread each."
+
+
+def test_every_metric_of_a_printed_table_is_defined_and_no_number_is_infinite_or_nan():
+    made = content(report_of(all_rows(), preset="quick", commit="0123456789"))
+    assert made["subtitle"].startswith("preset quick · commit 0123456789")
+    definitions = dict(made["definitions"])
+    assert definitions["Strain [J]"] == "definition of energy/strain"
+    assert "Curvature error [1/m]" in definitions
+    assert not re.search(r"\b(nan|inf|NaN|None)\b", json.dumps(made, allow_nan=False))
+
+
+def test_a_method_without_a_family_is_its_own():
+    assert run_of([dataclasses.replace(row(), family="")]).methods["snug"].family == "snug"
