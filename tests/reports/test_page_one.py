@@ -22,16 +22,16 @@ BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.
 SNUG = on_two_scenes("snug", 1.0, 9.0)  # 5 and 20 % of skinning's excess
 PBNS = on_two_scenes("pbns", 1.5, 10.0)
 SENTENCES = """\
-How near: On 2 unseen motions the relative excess is: SNUG 10 % (95 % interval −157 to 63,332; pooled 12 %) and
-PBNS 17 % (95 % interval −15 to 18,371; pooled 20 %), where the reference has 0 % and skinning alone 100 %. These
-are geometric means over independent sources of motion; pooled: ratios of sums over motions. Worst motions: SNUG
-20 % and PBNS 30 %.
-How it moves: SNUG has less secondary motion: its hem amplitude is 50 % of the simulation's, with a correlation of
-0.25; 2.5 % of its surface lies inside the body.
+How near: On 2 unseen motions the relative excess is: SNUG 10 % (95 % interval −157 to 63,332; pooled 12
+%) and PBNS 17 % (95 % interval −15 to 18,371; pooled 20 %), where the reference has 0 % and skinning
+alone 100 %. These are geometric means over independent sources of motion; pooled: ratios of sums over
+motions. Worst motions: SNUG 20 % and PBNS 30 %.
+How it moves: SNUG has less secondary motion: its hem amplitude is 50 % of the simulation's, with a
+correlation of 0.25; 2.5 % of its surface lies inside the body.
 At what cost: On one core SNUG takes 0.250 ms a frame, the simulation 400 times as long.
-How certain: Of 2 tests of primary claims of the paper 2 are inconclusive. Equally valid simulations (another
-start, contact search or tolerance) lie 3.0 mm and 2.0 1/m of mean curvature from the reference, in 2 scenes:
-errors below that show no difference.
+How certain: Of 2 tests of primary claims of the paper 2 are inconclusive. Equally valid simulations
+(another start, contact search or tolerance) lie 3.0 mm and 2.0 1/m of mean curvature from the reference,
+in 2 scenes: errors below that show no difference.
 How it ended: Of 12 cells all ended well."""
 
 
