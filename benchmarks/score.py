@@ -31,7 +31,7 @@ from benchmarks.plan.study import Study, StudyError, read_study
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from benchmarks.timing import one_thread
-from reference_sim.command_line import INTERRUPTED, Parser
+from reference_sim.command_line import INTERRUPTED, Parser, command
 
 PROGRAM = "benchmarks.score"
 MEASURED_BESIDE = ("simulation", "skinning")  # relative excess is the share of skinning's
@@ -39,6 +39,11 @@ SOLVED_AGAIN = "speed"  # the part in which steps are solved again: gaps and one
 NO_REFERENCE = (
     "left out by --no-reference: curvature error and histogram, distances, dynamics, relative energy gap"
 )
+SUMMARY_METRICS = (
+    "energy/total", "energy/strain", "energy/bending", "energy/bending_printed", "gap/energy",
+    "curvature/mean", "curvature/error", "penetration/surface", "distance/rms", "surface/chamfer",
+    "surface/normals",
+)  # fmt: skip
 MISSING = "missing"  # status of a roll-out that a run ended before
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
@@ -91,24 +96,18 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+@command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     command_line = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
-    try:
-        options = make_parser().parse_args(command_line)
-        plan = plan_score(
-            study_of(options), options.roll_out, options.scene or "",
-            rest_mesh=options.rest_mesh, reference=False if options.no_reference else options.reference,
-            report=not options.no_report, folder=Path(options.out) if options.out else None,
-            command=shlex.join(["python", "-m", PROGRAM, *command_line]),
-        )  # fmt: skip
-    except (ValueError, OSError) as error:  # as in benchmarks.run
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)
-        return 130
+    options = make_parser().parse_args(command_line)
+    plan = plan_score(
+        study_of(options), options.roll_out, options.scene or "",
+        rest_mesh=options.rest_mesh, reference=False if options.no_reference else options.reference,
+        report=not options.no_report, folder=Path(options.out) if options.out else None,
+        command_line=shlex.join(["python", "-m", PROGRAM, *command_line]),
+    )  # fmt: skip
     with contextlib.redirect_stdout(sys.stderr):
         status = carry_out(plan, program=PROGRAM, report=not options.no_report)
     if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file():
@@ -155,7 +154,7 @@ def score(
 def plan_score(
     study: Study, roll_out: str, scene: str = "", *, rest_mesh: str | Path | None = None,
     reference: str | Path | Literal[False] | None = None, report: bool = True, folder: Path | None = None,
-    command: str = "benchmarks.score.score",
+    command_line: str = "benchmarks.score.score",
 ) -> Plan:  # fmt: skip
     """Return the plan of a roll-out, of the simulation and of skinning in one scene.
 
@@ -167,7 +166,7 @@ def plan_score(
         reference: a roll-out in place of the simulation; False for none.
         report: whether times and gaps of what the roll-out is compared with are measured.
         folder: of the run; None: a new one.
-        command: the command line, for run.json.
+        command_line: for run.json.
 
     Raises:
         ValueError: one line for the first thing that cannot be met.
@@ -186,23 +185,18 @@ def plan_score(
     parts = {name: replace(part, cases=()) for name, part in study.parts.items()}  # some have a scene's name
     plan = make_plan(
         replace(study, parts=parts, scenes=(scene,), methods=MEASURED_BESIDE, rollouts={option.name: option}),
-        folder=folder, command=command, scenes=scenes,
+        folder=folder, command=command_line, scenes=scenes,
     )  # fmt: skip
     if len(plan.scenes) != 1:
         raise StudyError(f"{scene}: name one scene; see python -m benchmarks.run --list")
-    cells = [_reference(cell, reference) for cell in plan.cells]
-    if not report:  # nobody looks at times and gaps of what the roll-out is compared with
-        cells = [replace(cell, entry=replace(cell.entry, timed=False)) for cell in cells]
-    looked_at = {cell.method for cell in cells} if report else {option.name}
-    again = {
-        cell.name: tuple(dict.fromkeys((*cell.suites, SOLVED_AGAIN)))
-        if cell.method in looked_at
-        else cell.suites
-        for cell in cells
-    }
-    suites = (SOLVED_AGAIN,) if rest_mesh else tuple(dict.fromkeys((*plan.suites, SOLVED_AGAIN)))
-    cells = [replace(cell, suites=again[cell.name]) for cell in cells]
-    return replace(plan, cells=tuple(cells), suites=suites)
+    cells = []
+    for cell in (_reference(cell, reference) for cell in plan.cells):
+        suites = (*cell.suites, SOLVED_AGAIN) if report or cell.method == option.name else cell.suites
+        # Without a report nobody looks at times and gaps of what the roll-out is compared with.
+        entry = replace(cell.entry, timed=cell.entry.timed and report)
+        cells.append(replace(cell, entry=entry, suites=tuple(dict.fromkeys(suites))))
+    suites = (*(() if rest_mesh else plan.suites), SOLVED_AGAIN)
+    return replace(plan, cells=tuple(cells), suites=tuple(dict.fromkeys(suites)))
 
 
 def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
@@ -241,35 +235,15 @@ def numbers(plan: Plan) -> dict[str, Any]:
     }
 
 
-SUMMARY_METRICS = (
-    ("energy/total", "total", "J"),
-    ("energy/strain", "strain", "J"),
-    ("energy/bending", "bending", "J"),
-    ("energy/bending_printed", "bending as printed", "J"),
-    ("gap/energy", "gap", "J"),
-    ("curvature/mean", "curvature", "1/m"),
-    ("curvature/error", "curvature error", "1/m"),
-    ("penetration/surface", "penetration", "%"),
-    ("distance/rms", "distance", "mm"),
-    ("surface/chamfer", "Chamfer distance", "mm"),
-    ("surface/normals", "angle of normals", "deg"),
-)
-
-
 def summary(plan: Plan) -> str:
     """Return one line of results, and where the rest is."""
     result = numbers(plan)
-    metrics = result["metrics"]
-    shown = [
-        f"{word} {metrics[metric]['value']:.4g} {unit}"
-        for metric, word, unit in SUMMARY_METRICS
-        if metric in metrics
-    ]
+    known = {name: result["metrics"][name] for name in SUMMARY_METRICS if name in result["metrics"]}
+    shown = [f"{name} {number['value']:.4g} {number['unit']}" for name, number in known.items()]
     bad = f"{result['status']}: {result['reason']}" if result["status"] != "ok" else ""
-    results = ", ".join(filter(None, (bad, *shown)))
     report = RunFolder(plan.folder).report_path
     where = report if report.is_file() else plan.folder
-    return f"{result['name']} in {result['scene']}: {results}; {where}"
+    return f"{result['name']} in {result['scene']}: {', '.join(filter(None, (bad, *shown)))}; {where}"
 
 
 if __name__ == "__main__":
