@@ -6,7 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.plan.study import read_study, study_names
@@ -58,14 +58,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})")
     add("--into", metavar="DIR", default=TARGET, type=Path, help=f"where they are kept (default {TARGET})")
     options = parser.parse_args(arguments)
-    names = options.studies or published_studies()
+    names, failed = options.studies or published_studies(), 0
     for name in names:
         if read_study(name).show is None:
             raise PublishError(
                 f"study {name}: has no [show]: the studies {', '.join(published_studies())} do"
             )
-    more = [word for name in ("workers", "scheduler") if (value := getattr(options, name))
-            for word in (f"--{name}", value)]  # fmt: skip
     if options.list:
         for name in names:
             print(f"{name}: {read_study(name).question}")
@@ -74,22 +72,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     head = commit()
     if head.endswith("+changes"):
         raise PublishError(f"{head}: commit the changes first, so that a commit says what was run")
-    return int(not all([_published(name, options.out, options.into, head, more) for name in names]))
+    more = [word for name in ("workers", "scheduler") if (value := getattr(options, name))
+            for word in (f"--{name}", value)]  # fmt: skip
+    for name in names:  # where one is not published, the next is done all the same
+        try:
+            publish(name, options.out, options.into, head, more)
+        except ValueError as error:  # of the run's command, of files of results
+            print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
+            failed = 1
+    return failed
 
 
 def published_studies() -> list[str]:
     """Return the names of the studies that have a table [show]."""
     return [name for name in study_names() if read_study(name).show is not None]
-
-
-def _published(name: str, out: Path, into: Path, head: str, more: Sequence[str]) -> bool:
-    """Return whether a run is published; where it is not, the next is done all the same."""
-    try:
-        publish(name, out, into, head, more)
-    except ValueError as error:  # of the run's command, of files of results
-        print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
-        return False
-    return True
 
 
 def command_of(name: str, out: Path, more: Sequence[str] = ()) -> list[str]:
@@ -149,7 +145,8 @@ def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:
     Raises:
         PublishError: a picture or film of these names is not there.
     """
-    kept = list(_kept(whole, shown))
+    kept = [whole / name for name in KEPT if name != "frame_energies.csv" or (whole / name).exists()]
+    kept += [whole / "tables", *(whole / "figures" / name for name in shown)]
     if missing := [path for path in kept if not path.exists()]:
         raise PublishError(f"{missing[0]}: not there, and the documents show it")
     fresh = target.with_name(f"{target.name}.new")
@@ -159,12 +156,6 @@ def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:
             shutil.copytree(path, part / path.name) if path.is_dir() else shutil.copy(path, part)
     shutil.rmtree(target, ignore_errors=True)
     fresh.rename(target)
-
-
-def _kept(whole: Path, shown: Sequence[str]) -> Iterator[Path]:
-    yield from (whole / name for name in KEPT if name != "frame_energies.csv" or (whole / name).exists())
-    yield whole / "tables"
-    yield from (whole / "figures" / name for name in shown)
 
 
 if __name__ == "__main__":

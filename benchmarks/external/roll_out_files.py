@@ -19,14 +19,15 @@ from __future__ import annotations
 import glob
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reference_sim.files.mesh_files import MESH_SUFFIXES, Surface, read_mesh, read_sequence
+from reference_sim.files.array_file import read_arrays, read_pickled_arrays
+from reference_sim.files.mesh_files import MESH_SUFFIXES, METRES, UP_AXES, Surface, read_mesh, read_sequence
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
 MODULE = "benchmarks.methods.outside:make_stored"
@@ -51,8 +52,6 @@ class FileConventions:
     other_mesh: bool = False
 
     def __post_init__(self) -> None:
-        from reference_sim.files.mesh_files import METRES, UP_AXES
-
         for what, value, known in (("units", self.units, tuple(METRES)), ("up", self.up, UP_AXES)):
             if value not in known:
                 raise RollOutFileError(f"{what}={value}: choose from {', '.join(known)}")
@@ -148,17 +147,8 @@ def _word(text: str) -> tuple[str, Any]:
         return key, value
 
 
-KEYS = {  # of an npz, and of a pickle
-    "positions": "positions",
-    "pred": "positions",
-    "faces": "faces",
-    "cloth_faces": "faces",
-    "fps": "fps",
-    "obstacle": "obstacle",
-    "obstacle_faces": "obstacle_faces",
-    "quasi_static": "quasi_static",
-}
-SUFFIXES = (".vtkhdf", ".hdf", ".npz", ".pkl", ".pickle", ".pc2", ".pc16", *MESH_SUFFIXES)
+ALIKE = ("positions", "faces", "fps", "obstacle", "obstacle_faces", "quasi_static")
+KEYS = {"pred": "positions", "cloth_faces": "faces", **dict(zip(ALIKE, ALIKE))}  # of an npz, and of a pickle
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +168,11 @@ class StoredRollOut:
     obstacle_faces: np.ndarray | None = None
     quasi_static: np.ndarray | None = None
     converged: np.ndarray | None = None
+
+    def mapped(self, change: Callable[[np.ndarray], np.ndarray], **others: Any) -> StoredRollOut:
+        """Return it with positions and quasi-static solutions changed alike; others: further fields."""
+        held = None if self.quasi_static is None else change(self.quasi_static)
+        return replace(self, positions=change(self.positions), quasi_static=held, **others)
 
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
@@ -238,9 +233,10 @@ def _read_mesh(path: str, state: object) -> Surface:
 @cache
 def _read(path: str, state: object) -> StoredRollOut:
     suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES and not (Path(path).is_dir() or "*" in path):
+    suffixes = (*_READERS, *MESH_SUFFIXES)
+    if suffix not in suffixes and not (Path(path).is_dir() or "*" in path):
         raise RollOutFileError(
-            f"{path}: unknown kind of roll-out: give one of {', '.join(SUFFIXES)}, or a folder"
+            f"{path}: unknown kind of roll-out: give one of {', '.join(suffixes)}, or a folder"
         )
     reader = _READERS.get(suffix, _meshes)
     try:
@@ -268,8 +264,9 @@ def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:
             known[name] = _floats(name, np.asarray(arrays[name]))
             if len(known[name]) != frames:
                 raise ValueError(f"{name} has {len(known[name])} frames, positions {frames}")
-    if "quasi_static" in known and known["quasi_static"].shape != known["positions"].shape:
-        raise ValueError(f"quasi_static is {known['quasi_static'].shape}, positions {(frames, vertices, 3)}")
+    shape = known.get("quasi_static", known["positions"]).shape
+    if shape != (frames, vertices, 3):
+        raise ValueError(f"quasi_static is {shape}, positions {(frames, vertices, 3)}")
     if "obstacle" in known and "obstacle_faces" in known:
         _triangles("obstacle_faces", known["obstacle_faces"], known["obstacle"].shape[1])
     fps = arrays.get("fps")
@@ -298,16 +295,9 @@ def _triangles(name: str, array: np.ndarray, vertices: int | None) -> np.ndarray
 # --- one reader for each kind of file: name -> value -------------------------------------------------------
 
 
-def _npz(path: str) -> dict[str, Any]:
-    from reference_sim.files.array_file import read_arrays
-
-    return {KEYS[name]: array for name, array in read_arrays(path, KEYS).items()}
-
-
-def _pickle(path: str) -> dict[str, Any]:
-    from reference_sim.files.array_file import read_pickled_arrays
-
-    return {KEYS[name]: array for name, array in read_pickled_arrays(path, KEYS).items()}
+def _arrays(path: str) -> dict[str, Any]:
+    read = read_arrays if path.lower().endswith(".npz") else read_pickled_arrays
+    return {KEYS[name]: array for name, array in read(path, KEYS).items()}
 
 
 def _point_cache(path: str) -> dict[str, Any]:
@@ -337,11 +327,6 @@ def _trajectory(path: str) -> dict[str, Any]:
 
 
 _READERS: dict[str, Callable[[str], dict[str, Any]]] = {
-    ".vtkhdf": _trajectory,
-    ".hdf": _trajectory,
-    ".npz": _npz,
-    ".pkl": _pickle,
-    ".pickle": _pickle,
-    ".pc2": _point_cache,
-    ".pc16": _point_cache,
-}
+    ".vtkhdf": _trajectory, ".hdf": _trajectory, ".npz": _arrays, ".pkl": _arrays, ".pickle": _arrays,
+    ".pc2": _point_cache, ".pc16": _point_cache,
+}  # fmt: skip

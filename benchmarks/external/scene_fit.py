@@ -6,8 +6,7 @@ numbers, and nobody would see that they mean nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,15 +19,11 @@ if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
     from reference_sim.cloth import Cloth
 
-FARTHEST = (
-    0.25  # of the cloth's diagonal: from where the scene's cloth is, a first frame lies nearer than that
-)
-BETTER_FIT = (
-    0.5  # another unit or axis fits better where its distance is less than so much of the stated one's
-)
+FARTHEST = 0.25  # of the cloth's diagonal: a first frame lies nearer than that to the scene's cloth
+BETTER_FIT = 0.5  # another unit or axis fits better where its distance is less than so much of the stated's
 SIZE_RATIO = 2.0  # times as large, or as small, as the cloth a first frame may be
 LONGEST_STRETCH = (
-    3.0  # times as long as at rest, edges in the mean: then they join vertices that are no neighbours
+    3.0  # times as long as at rest, edges in the mean: they join vertices that are no neighbours
 )
 RATE_TOLERANCE = 1e-4  # of a frame rate: people write it with some digits
 TURNED = 0.1  # of the cloth's diagonal: nearer than that it is not asked whether other axes fit better
@@ -61,9 +56,17 @@ def fit_to_scene(
     >>> stored, changes = fit_to_scene(read_roll_out("mine.npz"), scene, FileConventions())  # doctest: +SKIP
     """
     count, cloth = stored.positions.shape[1], scene.cloth
-    if stated.other_mesh:
-        _check_other_mesh(stored, scene)
-    elif count != cloth.vertex_count:
+    triangles = None if stored.faces is None else len(stored.faces)
+    if stated.other_mesh and triangles is None:
+        raise RollOutFileError(
+            "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"
+        )
+    if stated.other_mesh and (count, triangles) == (cloth.vertex_count, len(cloth.faces)):
+        raise RollOutFileError(
+            f"has {count} vertices and {triangles} triangles as the scene's mesh: leave out "
+            "other-mesh, or give match-vertices where they are in another order"
+        )
+    if not stated.other_mesh and count != cloth.vertex_count:
         raise RollOutFileError(
             f"has {count} vertices, the cloth of {scene.name} {cloth.vertex_count}: write one position for "
             "each vertex of the scene's mesh, of the same preset; corners split at seams are one vertex; or "
@@ -71,44 +74,23 @@ def fit_to_scene(
         )
     if not np.isfinite(stored.positions[0]).all():
         raise RollOutFileError("its first frame, the scene's start, is not finite")
-    expected, changes = expected_positions(scene), list[str]()
-    in_metres = replace(stored, positions=to_metres_y_up(stored.positions, units=stated.units, up=stated.up))
+    expected = expected_positions(scene)
     _check_axes(stored, expected[0], stated)
-    if stored.quasi_static is not None:
-        held = to_metres_y_up(stored.quasi_static, units=stated.units, up=stated.up)
-        in_metres = replace(in_metres, quasi_static=held)
-    order = None
-    if stated.other_mesh:
-        changes.append(f"another mesh of {count} vertices: surfaces are compared alone")
-    else:
-        order, change = _order(in_metres, scene, expected[0], stated)
-        if order is not None:
-            in_metres = _reordered(in_metres, order)
-            changes.append(change)
-    timed, change = _retimed(in_metres, scene, stated)
-    if change:
-        changes.append(change)
+    fitted = stored.mapped(partial(to_metres_y_up, units=stated.units, up=stated.up))
+    order, change = None, f"another mesh of {count} vertices: surfaces are compared alone"
+    if not stated.other_mesh:
+        order, change = _order(fitted, scene, expected[0], stated)
+    if order is not None:
+        fitted = fitted.mapped(lambda positions: positions[:, order])
+    timed, retimed = _retimed(fitted, scene, stated)
+    changes = tuple(filter(None, (change, retimed)))
     if order is None and not stated.other_mesh:
         _check_sides(timed.positions[0], expected[0], "its first frame")
     frames = min(len(timed.positions), len(expected))
     if frames > 1:
         _check_sides(timed.positions[:frames].mean(axis=1), expected[:frames].mean(axis=1), "its way")
     _check_place(timed.positions, expected)
-    return timed, tuple(changes)
-
-
-def _check_other_mesh(stored: StoredRollOut, scene: BuiltScene) -> None:
-    """Raise RollOutFileError for a roll-out without triangles, or with as many as the scene's own mesh."""
-    if stored.faces is None:
-        raise RollOutFileError(
-            "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"
-        )
-    count, triangles = stored.positions.shape[1], len(stored.faces)
-    if (count, triangles) == (scene.cloth.vertex_count, len(scene.cloth.faces)):
-        raise RollOutFileError(
-            f"has {count} vertices and {triangles} triangles as the scene's mesh: leave out "
-            "other-mesh, or give match-vertices where they are in another order"
-        )
+    return timed, changes
 
 
 def expected_positions(scene: BuiltScene) -> np.ndarray:
@@ -174,18 +156,15 @@ def _check_sides(points: np.ndarray, expected: np.ndarray, what: str) -> None:
     whole = np.isfinite(points).all(axis=1)
     points, expected = points[whole], expected[whole]
 
-    def apart(mended: np.ndarray) -> float:
-        return float(np.median(np.linalg.norm(mended - expected, axis=1)))
-
-    def mend(factors: tuple[tuple[int, int], tuple[int, int]]) -> np.ndarray:
+    def apart(factors: tuple[tuple[int, int], tuple[int, int]] = ((1, 0), (0, 1))) -> float:
         mended = points.copy()
         mended[:, [0, 2]] = points[:, [0, 2]] @ np.array(factors, dtype=float).T
-        return mended
+        return float(np.median(np.linalg.norm(mended - expected, axis=1)))
 
-    here = apart(points)
+    here = apart()
     if here < TURNED * _diagonal(expected):
         return
-    there, name = min((apart(mend(factors)), name) for name, factors in MIRRORS.items())
+    there, name = min((apart(factors), name) for name, factors in MIRRORS.items())
     if there < BETTER_FIT * here:
         raise RollOutFileError(
             f"{what} lies {here:.2g} m from where the scene has it, and {there:.2g} m if it is {name}: write "
@@ -257,20 +236,14 @@ def _order(
                 f"{remedy}"
             )
         return None, ""
-    order = nearest_order(
-        first, scene.start, reach=0.5 * float(np.median(_lengths(scene.start, scene.cloth)))
-    )
+    half = 0.5 * float(np.median(_lengths(scene.start, scene.cloth)))
+    order = nearest_order(first, scene.start, reach=half)
     if order is None:
         raise RollOutFileError(
             "has no triangles, and its first frame is not the scene's start to within half an edge: vertices "
             "cannot be matched one to one; add its triangles (faces of an npz, .obj beside a point cache)"
         )
     return order, "vertices matched by nearest position in the first frame"
-
-
-def _reordered(stored: StoredRollOut, order: np.ndarray) -> StoredRollOut:
-    held = None if stored.quasi_static is None else stored.quasi_static[:, order]
-    return replace(stored, positions=stored.positions[:, order], quasi_static=held)
 
 
 def _lengths(positions: np.ndarray, cloth: Cloth) -> np.ndarray:
@@ -316,14 +289,13 @@ def _retimed(stored: StoredRollOut, scene: BuiltScene, stated: FileConventions) 
     def at(positions: np.ndarray) -> np.ndarray:
         return np.where(share > 0.0, (1.0 - share) * positions[low] + share * positions[high], positions[low])
 
-    held = None if stored.quasi_static is None else at(stored.quasi_static)
     how = "every frame of the scene is one of the file" if not share.any() else "linear in between"
     change = f"re-timed from {file_rate:g} to {rate:g} frames a second, {how}"
-    return replace(stored, positions=at(stored.positions), quasi_static=held, converged=None), change
+    return stored.mapped(at, converged=None), change
 
 
 def _rate_hint(frames: int, expected: int, rate: float) -> str:
     ratio = (frames - 1) / max(expected - 1, 1)
-    near: Mapping[float, float] = {fps: abs(ratio - fps / rate) for fps in (15, 24, 25, 50, 60, 90, 100, 120)}
-    guess = min(near, key=lambda fps: near[fps])
-    return f": if it has {guess} a second, give fps={guess}" if near[guess] < 0.05 * guess / rate else ""
+    guess = min((15, 24, 25, 50, 60, 90, 100, 120), key=lambda fps: abs(ratio - fps / rate))
+    near = abs(ratio - guess / rate) < 0.05 * guess / rate
+    return f": if it has {guess} a second, give fps={guess}" if near else ""
