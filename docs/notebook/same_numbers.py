@@ -46,8 +46,8 @@ RUNS = {
 }
 PLACES = {
     "trainings": (
-        "benchmarks.methods.declared_networks:TRAININGS",
         "benchmarks.methods.catalogue.trainings:TRAININGS",
+        "benchmarks.methods.declared_networks:TRAININGS",
     ),
     "trajectory": ("reference_sim.trajectory:Trajectory",),
     "template": ("snug.garments.templates:find_template",),
@@ -169,7 +169,9 @@ def record_trainings() -> Record:
         )  # fmt: skip
         targets = targets or {m.name: snug.roll_out(model, dressed, m).positions for m in motions}
         weights = {n: digest(tensor.numpy()) for n, tensor in model.network.state_dict().items()}
-        losses = {f"last {n}": repr(value) for n, value in model.history[-1].items() if n != "seconds"}
+        losses = {
+            f"last {n}": repr(value) for n, value in model.history[-1].items() if not n.startswith("seconds")
+        }
         record[f"training {name}"] = weights | losses
         print(f"{name}: {len(weights)} tensors", file=sys.stderr, flush=True)
     return record
