@@ -95,6 +95,20 @@ class Metric:
         return f"{self.title} [{self.unit}]" if self.unit != "1" else self.title
 
 
+def metrics_of(*rows: tuple[Any, ...], **shared: Any) -> tuple[Metric, ...]:
+    """Declare metrics that share fields.
+
+    Args:
+        rows: name, unit, title and definition of each; a dict of other fields may follow.
+        shared: fields of all of them.
+
+    >>> metrics_of(("a/x", "m", "X", "a length"), ("a/y", "m", "Y", "a height"), table="a")[1].table
+    'a'
+    """
+    names = ("name", "unit", "title", "definition")
+    return tuple(Metric(**dict(zip(names, row)) | shared | dict(*row[4:])) for row in rows)
+
+
 @dataclass(frozen=True)
 class Measurements:
     """Metrics that are measured together.
@@ -158,7 +172,6 @@ class RollOut(Kept):
         positions: (T,V,3) [m] of it that are finite.
         quasi_static: (T,V,3) [m] the method's quasi-static solutions, or None.
         counterpart: (T',V,3) [m] roll-out of the same method in the scene's counterpart, or None.
-        training_poses: (N,24,3) [rad] that its network trained on, or None.
     """
 
     def __init__(
@@ -176,7 +189,6 @@ class RollOut(Kept):
         self.status, self.suites, self.trajectory = status, suites, trajectory
         self.quasi_static = quasi_static
         self.counterpart: np.ndarray | None = None
-        self.training_poses: np.ndarray | None = None
         self.positions = trajectory.finite().positions
 
     @property

@@ -13,23 +13,20 @@ from functools import cache
 from benchmarks.declarations import by_name
 from benchmarks.metric import Measurements, Metric, measurements_in
 from benchmarks.metrics.conservation import CONSERVATION
-from benchmarks.metrics.cost import COST, RELAXED, TRAINING_DISTANCE
+from benchmarks.metrics.cost import COST, RELAXED
 from benchmarks.metrics.curvature import CURVATURE
-from benchmarks.metrics.deformation import BODY_SHAPE, MESH, SHAPE, STRETCH
 from benchmarks.metrics.dynamics import DYNAMICS
-from benchmarks.metrics.energy import ENERGY, EXCESS, PRINTED_BENDING
+from benchmarks.metrics.energy import ENERGY, PRINTED_BENDING
 from benchmarks.metrics.energy_gap import GAP
-from benchmarks.metrics.intersections import BODY, SWEPT
-from benchmarks.metrics.penetration_and_distances import GEOMETRY
+from benchmarks.metrics.intersections import INTERSECTIONS
+from benchmarks.metrics.penetration_and_distances import EXACT, GEOMETRY
 from benchmarks.metrics.roll_out import EXTRAPOLATION, LONG_ROLL_OUT
+from benchmarks.metrics.scene_facts import BODY, BODY_SHAPE, MESH
 from benchmarks.metrics.surface_distance import SURFACE
-from benchmarks.metrics.time_errors import EXACT, TIME_ERROR, VELOCITY
-from benchmarks.metrics.wrinkle_spectrum import WRINKLES
 
 MEASUREMENTS = (
-    ENERGY, PRINTED_BENDING, EXCESS, CURVATURE, WRINKLES, SHAPE, SWEPT, STRETCH, GEOMETRY, SURFACE, BODY, GAP,
-    RELAXED, EXACT, VELOCITY, DYNAMICS, TRAINING_DISTANCE, CONSERVATION, TIME_ERROR, COST,
-    EXTRAPOLATION, LONG_ROLL_OUT, MESH, BODY_SHAPE,
+    ENERGY, PRINTED_BENDING, CURVATURE, INTERSECTIONS, GEOMETRY, SURFACE, BODY, GAP, RELAXED, EXACT, DYNAMICS,
+    CONSERVATION, COST, EXTRAPOLATION, LONG_ROLL_OUT, MESH, BODY_SHAPE,
 )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metric import Measurements, Metric
+from benchmarks.metric import Measurements, metrics_of
 from benchmarks.metrics.energy import FIRST_FULL_FRAME, copied_terms, step_to
 from reference_sim.material import GRAVITY
 
@@ -42,29 +42,6 @@ Floats = NDArray[np.float64]
 
 CLAIMED = "the worst frame that claims to have converged"
 RISE = 1e-9  # of the larger side: beyond it, a frame breaks an inequality
-
-
-def _law(name: str, unit: str, title: str, definition: str, tolerance: float | None = None) -> Metric:
-    table = "" if tolerance else "conservation"
-    return Metric(
-        name=f"conservation/{name}", unit=unit, title=title, definition=definition, table=table,
-        lower_is_better=True, reference_tolerance=tolerance,
-    )  # fmt: skip
-
-
-CONSERVATION_METRICS = (
-    _law("momentum", "% of weight", "Momentum", "what is missing from the balance of momentum, mean"),
-    _law("angular", "N m", "Angular", "the same of angular momentum about the pelvis"),
-    _law("energy_frames", "%", "Energy", "frames whose energy rises while contact planes stand still"),
-    _law("energy", "J", "Energy rise", "by how much it rises there, mean over all frames"),
-    _law("descent_frames", "%", "Descent", "frames that end above the step's first guess"),
-    _law("descent", "J", "Above guess", "by how much, mean over all frames"),
-    _law("residual", "vertex weights", "Residual", "largest component of the gradient left, mean"),
-    _law("residual_rms", "vertex weights", "Rms", "root mean square of the gradient left, mean"),
-    _law("momentum_worst", "weights", "Momentum, worst", CLAIMED, 2e-6),
-    _law("energy_worst", "J", "Energy rise, worst", CLAIMED, 1e-9),
-    _law("residual_worst", "vertex weights", "Residual, worst", CLAIMED, 1e-6),
-)  # fmt: skip
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
@@ -202,4 +179,29 @@ def _one_step(
     )
 
 
-CONSERVATION = Measurements("conservation", CONSERVATION_METRICS, measure=measure)
+def _worst(tolerance: float) -> dict[str, object]:
+    return {"table": "", "reference_tolerance": tolerance}
+
+
+CONSERVATION = Measurements(
+    "conservation",
+    metrics_of(
+        ("conservation/momentum", "% of weight", "Momentum",
+         "what is missing from the balance of momentum, mean"),
+        ("conservation/angular", "N m", "Angular", "the same of angular momentum about the pelvis"),
+        ("conservation/energy_frames", "%", "Energy",
+         "frames whose energy rises while contact planes stand still"),
+        ("conservation/energy", "J", "Energy rise", "by how much it rises there, mean over all frames"),
+        ("conservation/descent_frames", "%", "Descent", "frames that end above the step's first guess"),
+        ("conservation/descent", "J", "Above guess", "by how much, mean over all frames"),
+        ("conservation/residual", "vertex weights", "Residual",
+         "largest component of the gradient left, mean"),
+        ("conservation/residual_rms", "vertex weights", "Rms",
+         "root mean square of the gradient left, mean"),
+        ("conservation/momentum_worst", "weights", "Momentum, worst", CLAIMED, _worst(2e-6)),
+        ("conservation/energy_worst", "J", "Energy rise, worst", CLAIMED, _worst(1e-9)),
+        ("conservation/residual_worst", "vertex weights", "Residual, worst", CLAIMED, _worst(1e-6)),
+        table="conservation", lower_is_better=True,
+    ),
+    measure=measure,
+)  # fmt: skip

@@ -24,13 +24,12 @@ the joints make of wrinkles that stay, a simulation has swing and history too, a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metric import Measurements, Metric
+from benchmarks.metric import Measurements, metrics_of
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
@@ -38,24 +37,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 BLOCK_FRAMES = 32  # frames
 FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
-
-_metric_curvature = partial(Metric, unit="1/m", table="curvature")
-
-CURVATURE_METRICS = (
-    _metric_curvature(name="curvature/mean", title="Mean curvature",
-            definition="magnitude of the mean curvature, mean over interior vertices by area and over "
-            "frames"),
-    _metric_curvature(name="curvature/error", title="Mean-curvature error", lower_is_better=True,
-            definition="|H - H_ref| of the same vertices and frames, mean by the reference's areas"),
-    _metric_curvature(name="curvature/histogram", title="Histogram", lower_is_better=True,
-            definition="Wasserstein-1 distance between the area-weighted distributions of H at the same "
-            "frame"),
-    _metric_curvature(name="curvature/mean_difference", title="Difference of means",
-            definition="area-weighted mean of H less that of the reference"),
-    _metric_curvature(name="curvature/change", unit="1", title="Change of wrinkles",
-            definition="mean |H - median of the vertex over frames| over mean |H - mean of all|, by area: "
-            "the part of the spread of curvature that is in time; 0 where wrinkles stay the same, at most 1"),
-)  # fmt: skip
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
@@ -247,4 +228,23 @@ def _wasserstein(h: Floats, area: Floats, h_ref: Floats, area_ref: Floats) -> fl
     return float(np.abs(np.cumsum(steps[order])[:-1]) @ between)
 
 
-CURVATURE = Measurements("curvature", CURVATURE_METRICS, measure=measure, compare=compare, series=series)
+CURVATURE = Measurements(
+    "curvature",
+    metrics_of(
+        ("curvature/mean", "1/m", "Mean curvature",
+         "magnitude of the mean curvature, mean over interior vertices by area and over frames"),
+        ("curvature/error", "1/m", "Mean-curvature error",
+         "|H - H_ref| of the same vertices and frames, mean by the reference's areas",
+         {"lower_is_better": True}),
+        ("curvature/histogram", "1/m", "Histogram",
+         "Wasserstein-1 distance between the area-weighted distributions of H at the same frame",
+         {"lower_is_better": True}),
+        ("curvature/mean_difference", "1/m", "Difference of means",
+         "area-weighted mean of H less that of the reference"),
+        ("curvature/change", "1", "Change of wrinkles",
+         "mean |H - median of the vertex over frames| over mean |H - mean of all|, by area: the part of the "
+         "spread of curvature that is in time; 0 where wrinkles stay the same, at most 1"),
+        table="curvature",
+    ),
+    measure=measure, compare=compare, series=series,
+)  # fmt: skip

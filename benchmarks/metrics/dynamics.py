@@ -1,6 +1,4 @@
-"""Metrics dynamics/*: the hem of a method against the simulator's. Formulas stand in hem.py.
-
-Dynamics of a hem: does cloth move by itself, or only follow the pose? In the axes of the body's root.
+"""Metrics dynamics/*: does the hem move by itself, or only follow the pose? In the axes of the body's root.
 
 A method's dynamic part is what motion adds to its own static answer:
 
@@ -14,10 +12,6 @@ dresser without memory has a small gap from its own history.
     correlation  <D, D_sim> / (|D| |D_sim|)
     gain, lag    g and l of the least-squares fit  s(t) = g s_static(t - l),  s the hem's yaw, or its
                  displacement where the static hem does not turn
-    ringing      rms distance of the hem to where it ends, frames after the body has stopped
-    spectrum     sum |S - S_sim| / sum S_sim,  S(f) the rms over hem vertices of the acceleration's spectrum
-
-No import of ours: numpy alone.
 """
 
 from __future__ import annotations
@@ -27,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.metric import Measurements, Metric
+from benchmarks.metric import Measurements, metrics_of
 from benchmarks.metrics.penetration_and_distances import rms
 from snug.body.skeleton import rotation_matrices
 
@@ -37,8 +31,6 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-AFTER = (0, 1, 2, 4, 8, 16)  # frames after the stop at which ringing is measured
-HELD = 24  # frames a body must hold still at the end to count as stopped
 TURNING = np.deg2rad(5.0)  # rms static yaw from which on gain and lag are those of the yaw
 SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to be a gain of
 MAX_LAG = 12.0  # frames
@@ -128,49 +120,19 @@ def response(moving: Array, static: Array, axes: Array) -> tuple[float, float]:
     return gain_and_lag(moving.mean(axis=1) @ along, centre @ along)
 
 
-def stop_frame(poses: Array, translations: Array) -> int | None:
-    """Return the last frame of a body that then holds still for HELD frames, or None."""
-    still = np.all(poses == poses[-1], axis=tuple(range(1, poses.ndim)))
-    still &= np.all(translations == translations[-1], axis=1)
-    first = len(still) - int(np.argmin(still[::-1])) if not still.all() else 0
-    return first if first > 0 and len(still) - first > HELD else None
-
-
-def ringing(hem: Array, stop: int) -> Array:
-    """Return rms distances (6,) [m] of a hem (T,H,3), in the root frame, to its last, AFTER frames on."""
-    away = hem[[stop + after for after in AFTER]] - hem[-1]
-    return np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
-
-
-def acceleration_spectrum(hem: Array, dt: float) -> Array:
-    """Return S(f) of a hem (T,H,3): rms over vertices of its acceleration's amplitude, Hann window."""
-    acceleration = np.diff(hem, n=2, axis=0) / dt**2
-    window = np.hanning(len(acceleration) + 2)[1:-1, None, None]
-    amplitudes = np.abs(np.fft.rfft(window * acceleration, axis=0))
-    return np.sqrt((amplitudes**2).sum(axis=-1).mean(axis=-1))
-
-
-def spectrum_distance(hem: Array, reference: Array, dt: float) -> float:
-    """Return sum |S - S_ref| / sum S_ref of two hems (T,H,3) over the same frames."""
-    ours, theirs = acceleration_spectrum(hem, dt), acceleration_spectrum(reference, dt)
-    return float(np.abs(ours - theirs).sum() / theirs.sum()) if theirs.any() else float("nan")
-
-
 @dataclass(frozen=True)
 class HemMotion:
-    """Frame of reference of dynamics: the body's root, when it stops, and the simulator's two answers.
+    """Frame of reference of dynamics: the body's root, and the simulator's two answers.
 
-    axes: (T,3,3) root to world; origins: (T,3) [m]; stop: frame or None; hem: vertices (H,); simulated and
-    quasi_static: the simulator's positions (T,V,3) [m], world; dt [s]; first: frame that is judged.
+    axes: (T,3,3) root to world; origins: (T,3) [m]; hem: vertices (H,); simulated and quasi_static: the
+    simulator's positions (T,V,3) [m], world; first: frame that is judged.
     """
 
     axes: Array
     origins: Array
-    stop: int | None
     hem: Array
     simulated: Array
     quasi_static: Array
-    dt: float
     first: int = 0
 
     def of(self, positions: Array) -> Array:
@@ -187,7 +149,7 @@ class HemMotion:
         return {"hem/yaw": hem_yaw(hem, root), "hem/from_end": away}
 
     def measure(self, positions: Array, static: Array | None = None) -> dict[str, float]:
-        """Return every dynamic metric of positions (T,V,3), [1], [frames] or [mm]; undefined ones left out.
+        """Return dynamic metrics of positions (T,V,3), [1] or [frames]; undefined ones left out.
 
         static: (T,V,3), the method's own answer to poses held still; None takes the simulator's.
         """
@@ -205,40 +167,13 @@ class HemMotion:
             "dynamics/correlation": correlation(part, reference),
             "dynamics/gain": gain,
             "dynamics/lag": lag,
-            "dynamics/spectrum": spectrum_distance(moving, simulated, self.dt),
         }
-        if self.stop is not None and self.first <= self.stop < last - AFTER[-1]:
-            distances = 1e3 * ringing(moving, self.stop - self.first)
-            values["dynamics/ringing"] = float(distances.mean())
-            values |= {f"dynamics/ringing/{after}": float(d) for after, d in zip(AFTER, distances)}
         return {name: value for name, value in values.items() if np.isfinite(value)}
 
 
-def _dynamics(name: str, unit: str, title: str, definition: str, table: str = "dynamics") -> Metric:
-    return Metric(name=f"dynamics/{name}", unit=unit, title=title, definition=definition, table=table)
-
-
-COMMON = ("amplitude", "correlation", "gain", "lag")
-
-DYNAMICS_METRICS = (
-    _dynamics("quasi_static_difference", "mm", "From quasi-static",
-              "root mean square distance to the method's own answer to each pose held still"),
-    _dynamics("amplitude", "1", "Hem amplitude",
-              "amplitude of the hem's dynamic part over that of the simulation's; the "
-              "dynamic part is what motion adds to the own answer to poses held still"),
-    _dynamics("correlation", "1", "Correlation", "cosine between the two dynamic parts"),
-    _dynamics("gain", "1", "Gain", "factor by which the hem answers its own quasi-static turn or shift"),
-    _dynamics("lag", "frames", "Lag", "frames by which it comes later"),
-    *(_dynamics(f"common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
-                f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to "
-                "poses held still", table="dynamics" if name in COMMON[:2] else "")
-      for name, title in zip(COMMON, ("Hem amplitude", "Correlation", "Gain", "Lag"))),
-    _dynamics("ringing", "mm", "Ringing", "distance of the hem to where it ends, after the body has stopped"),
-    *(_dynamics(f"ringing/{after}", "mm", f"Ringing, {after} frames",
-                f"the same {after} frames after the stop", table="") for after in AFTER),
-    _dynamics("spectrum", "1", "Spectrum", "difference of the hem's acceleration spectrum from the "
-              "simulation's, as a share of the latter"),
-)  # fmt: skip
+COMMON = {
+    "amplitude": "Hem amplitude", "correlation": "Correlation", "gain": "Gain", "lag": "Lag"
+}  # fmt: skip
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
@@ -263,12 +198,10 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     values: dict[str, float] = {}
     common = hem.measure(x)
     if static is None:
-        shared = shares_quasi_static(roll_out.entry)
-        values |= {n: v for n, v in common.items() if shared or n.removeprefix("dynamics/") not in COMMON}
+        values = common if shares_quasi_static(roll_out.entry) else {}
     elif len(static) >= len(x) and np.isfinite(static).all():
-        values |= hem.measure(x, static)
-    return values | {f"dynamics/common_{name}": common[f"dynamics/{name}"] for name in COMMON
-                    if f"dynamics/{name}" in common}  # fmt: skip
+        values = hem.measure(x, static)
+    return values | {name.replace("/", "/common_"): value for name, value in common.items()}
 
 
 def shares_quasi_static(entry: MethodEntry) -> bool:
@@ -292,18 +225,34 @@ def hem_motion(reference: RollOut) -> HemMotion | None:
     group, dressed = reference.group, reference.scene.dressed
     if dressed is None or group.quasi_static is None:
         return None
-
     motion = dressed.motion
     return HemMotion(
         axes=rotation_matrices(motion.poses[:, 0]),
         origins=dressed.pelvis,
-        stop=stop_frame(motion.poses, motion.translations),
         hem=dressed.garment.hem,
         simulated=reference.positions,
         quasi_static=group.quasi_static,
-        dt=group.scene.dt,
         first=group.scene.warm_up,
     )
 
 
-DYNAMICS = Measurements("dynamics", DYNAMICS_METRICS, measure=measure, compare=compare, series=series)
+DYNAMICS = Measurements(
+    "dynamics",
+    metrics_of(
+        ("dynamics/quasi_static_difference", "mm", "From quasi-static",
+         "root mean square distance to the method's own answer to each pose held still"),
+        ("dynamics/amplitude", "1", "Hem amplitude",
+         "amplitude of the hem's dynamic part over that of the simulation's; the dynamic part is what motion "
+         "adds to the own answer to poses held still"),
+        ("dynamics/correlation", "1", "Correlation", "cosine between the two dynamic parts"),
+        ("dynamics/gain", "1", "Gain",
+         "factor by which the hem answers its own quasi-static turn or shift"),
+        ("dynamics/lag", "frames", "Lag", "frames by which it comes later"),
+        *((f"dynamics/common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
+           f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to poses "
+           "held still", {"table": "" if name in ("gain", "lag") else "dynamics"})
+          for name, title in COMMON.items()),
+        table="dynamics",
+    ),
+    measure=measure, compare=compare, series=series,
+)  # fmt: skip

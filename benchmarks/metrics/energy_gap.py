@@ -27,13 +27,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metric import Estimate, Measurements, Metric, skinned
+from benchmarks.metric import Estimate, Measurements, metrics_of, skinned
 from benchmarks.metrics.curvature import boundary_mask, mean_curvature
 from benchmarks.metrics.energy import copied_terms, freeze_step
 
@@ -44,49 +43,12 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-SUITES = ("speed",)  # each sampled frame is two minimisations or three
-
 ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
-FINDERS = {
-    "simulator": "by a solve as the simulator does it", "from_frame": "by descending from the frame",
-    "frame": "at the frame itself",
-}  # fmt: skip
-SAME_MINIMUM = 1e-9  # of the scale: minima this near are one
 PRECISION = 0.1  # standard error of the gap, as a share of it
 NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3
 MEANS = (
     "gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curvature", "gradient/norm",
-)  # fmt: skip
-
-_metric_gap = partial(Metric, lower_is_better=True)
-
-GAP_METRICS = (
-    _metric_gap(name="gap/energy", unit="J", title="Energy gap", table="speed",
-            definition="how far frames lie above the lowest minimum found of their own time step, mean over "
-            "frames"),
-    _metric_gap(name="gap/relative", unit="1", title="Relative energy gap", table="speed",
-            definition="the same over what skinning, or the first guess, lies above the steps of the "
-            "simulation: one scale a scene, the same for all methods"),
-    Metric(name="gap/scale", unit="J", title="Scale of the gap",
-           definition="that scale: what skinning, or the first guess, lies above the steps of the "
-           "simulation"),
-    _metric_gap(name="gap/local", unit="J", title="Local gap",
-            definition="how far frames lie above the minimum below the frame itself"),
-    _metric_gap(name="gap/refrozen", unit="J", title="Refrozen gap", table="speed",
-            definition="how far frames lie above the minimum below them where contact planes are searched at "
-            "the frame instead of the step's first guess"),
-    _metric_gap(name="step/distance", unit="mm", title="One-step distance", table="speed",
-            definition="root mean square distance of vertices between a frame and the minimum of its own "
-            "time step that lies below it, mean over frames"),
-    _metric_gap(name="step/curvature", unit="1/m", title="One-step curvature error", table="speed",
-            definition="|H - H_min| of the same vertices between a frame and that minimum, mean by its "
-            "areas"),
-    _metric_gap(name="gradient/norm", unit="1", title="Gradient", table="speed",
-            definition="largest component of the gradient left in a step, in mean vertex weights"),
-    *(Metric(name=f"gap/found_by_{finder}", unit="frames", title=f"Found by {finder.replace('_', ' ')}",
-             definition=f"sampled frames whose lowest minimum was found {how}")
-      for finder, how in FINDERS.items()),
 )  # fmt: skip
 
 
@@ -140,13 +102,12 @@ def gap_scale(group: SceneRollOuts) -> float | None:
 class Optimality:
     """Numbers of the sampled frames, of `judged` in all.
 
-    values: of each of MEANS, gap/refrozen at the first of these frames alone. found_by: number of frames
-    whose lowest minimum each found; of equals the first in FINDERS. away: frame -> (V,) [mm] from y_t.
+    values: of each of MEANS, gap/refrozen at the first of these frames alone. away: frame -> (V,) [mm] from
+    y_t.
     """
 
     judged: int = 0
     values: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in MEANS})
-    found_by: dict[str, int] = field(default_factory=lambda: dict.fromkeys(FINDERS, 0))
     away: dict[int, Floats] = field(default_factory=dict)
 
     def estimate(self, values: list[float]) -> Estimate:
@@ -162,8 +123,7 @@ class Optimality:
         """Return gap/*, step/* and gradient/norm; empty without a frame."""
         if not self.values["gap/energy"]:
             return {}
-        means: dict[str, float | Estimate] = {name: self.estimate(v) for name, v in self.values.items() if v}
-        return means | {f"gap/found_by_{finder}": float(count) for finder, count in self.found_by.items()}
+        return {name: self.estimate(v) for name, v in self.values.items() if v}
 
     def precise(self, scale: float) -> bool:
         """Return whether the standard error of the gap is small enough."""
@@ -204,11 +164,9 @@ def optimality(
             numbers.away = {}
             return numbers
         below = minimiser.minimise(x)
-        energies = {"simulator": minimiser.minimise(guess).energy, "from_frame": below.energy, "frame": here}
         # A guess that has no energy, as of a garment that collapsed a frame ago, leads nowhere.
-        best = min(energy for energy in energies.values() if np.isfinite(energy))
-        alike = SAME_MINIMUM * (scale or abs(here))
-        numbers.found_by[next(name for name in FINDERS if energies[name] <= best + alike)] += 1
+        found = (minimiser.minimise(guess).energy, below.energy, here)
+        best = min(energy for energy in found if np.isfinite(energy))
         values["gap/energy"].append(here - best)
         values["gap/local"].append(here - min(here, below.energy))
         largest = float(np.abs(gradient[scene.cloth.free]).max())
@@ -259,4 +217,31 @@ def _curvature_error(x: Floats, y: Floats, faces: NDArray[np.int64], inner: NDAr
     return float(np.average(np.abs(ours - theirs)[inner], weights=areas[inner]))
 
 
-GAP = Measurements("optimality", GAP_METRICS, measure=measure, series=series, suites=SUITES)
+GAP = Measurements(
+    "optimality",
+    metrics_of(
+        ("gap/energy", "J", "Energy gap",
+         "how far frames lie above the lowest minimum found of their own time step, mean over frames"),
+        ("gap/relative", "1", "Relative energy gap",
+         "the same over what skinning, or the first guess, lies above the steps of the simulation: one scale "
+         "a scene, the same for all methods"),
+        ("gap/scale", "J", "Scale of the gap",
+         "that scale: what skinning, or the first guess, lies above the steps of the simulation",
+         {"table": "", "lower_is_better": None}),
+        ("gap/local", "J", "Local gap", "how far frames lie above the minimum below the frame itself",
+         {"table": ""}),
+        ("gap/refrozen", "J", "Refrozen gap",
+         "how far frames lie above the minimum below them where contact planes are searched at the frame "
+         "instead of the step's first guess"),
+        ("step/distance", "mm", "One-step distance",
+         "root mean square distance of vertices between a frame and the minimum of its own time step that "
+         "lies below it, mean over frames"),
+        ("step/curvature", "1/m", "One-step curvature error",
+         "|H - H_min| of the same vertices between a frame and that minimum, mean by its areas"),
+        ("gradient/norm", "1", "Gradient",
+         "largest component of the gradient left in a step, in mean vertex weights"),
+        table="speed", lower_is_better=True,
+    ),
+    measure=measure, series=series,
+    suites=("speed",),  # each sampled frame is two minimisations or three
+)  # fmt: skip

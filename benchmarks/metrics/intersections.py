@@ -1,16 +1,10 @@
-"""Metrics intersections/swept, body/self_intersection*: cloth through itself, a body through itself.
-
-Metric intersections/swept: cloth that passes through itself between two frames.
+"""Metrics intersections/*: a cloth through itself, in a frame and between two frames.
 
 A frame without intersections may follow another one though a layer went through the other between them. On
 the straight way of every vertex from one frame to the next a vertex meets a triangle, or an edge an edge,
 where the four points are in one plane and their primitives touch (Provot 1997). Broad phase and test are
 those of the package ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
-Without the package nothing is measured, and nothing of a roll-out that has fallen apart.
-
-Metrics body/self_intersection*: does the body pass through itself? Cloth in such a fold has no place.
-
-Asked of the motion, so of the reference's rows alone.
+Without the package nothing is measured of that, and nothing of a roll-out that has fallen apart.
 """
 
 from __future__ import annotations
@@ -21,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metric import Measurements, Metric
+from benchmarks.metric import Measurements, metrics_of
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut
@@ -29,18 +23,19 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 SAMPLED_STEPS = 12  # pairs of consecutive frames that are looked at, evenly spread
-FARTHEST = (
-    1.0  # [m] beside the others that a vertex of a cloth moves in a frame: one that is lost moves further
-)
+FARTHEST = 1.0  # [m] beside the others that a vertex moves in a frame: one that is lost moves further
 MOST_PAIRS = 200_000  # to be tested one by one, in seconds: more have only lost cloths
 
-SWEPT_METRICS = (
-    Metric(
-        name="intersections/swept", unit="1", title="Swept", table="intersections", lower_is_better=True,
-        definition="pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each "
-        "other between two frames on straight ways; mean over 12 evaluated pairs of frames, needs ipctk",
-    ),
-)  # fmt: skip
+
+def measure_triangles(roll_out: RollOut) -> dict[str, float]:
+    """Return the share of triangles that intersect another [%] and the length of contours [m]."""
+    from benchmarks.metrics.self_intersections import share_and_contours  # loads numba
+
+    share, contours = share_and_contours(roll_out.positions[roll_out.judged], roll_out.scene.cloth.faces)
+    return {
+        "intersections/triangles": 100.0 * float(share.mean()),
+        "intersections/contours": float(contours.mean()),
+    }
 
 
 def measure_swept(roll_out: RollOut) -> dict[str, float]:
@@ -115,48 +110,17 @@ def coplanar_on_the_way(before: Floats, after: Floats) -> NDArray[np.bool_]:
     return (low <= 0.0) & (high >= 0.0)
 
 
-SAMPLED_FRAMES = 24  # frames that are looked at, evenly spaced
-OFFSET = 1e-3  # [m] off the skin, where a point is inside the body only if another part of it is there
-
-BODY_METRICS = (
-    Metric(
-        name="body/self_intersection", unit="%", title="Body in itself", lower_is_better=True,
-        definition="vertices of the body inside another part of it and not so at rest, in the worst of 24 "
-        "evaluated frames",
+INTERSECTIONS = Measurements(
+    "intersections",
+    metrics_of(
+        ("intersections/triangles", "%", "Self-cut",
+         "triangles that pass through another one of the same cloth, mean over frames"),
+        ("intersections/contours", "m", "Contours",
+         "length of the lines in which triangles of the cloth pass through others of it, mean over frames"),
+        ("intersections/swept", "1", "Swept",
+         "pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each other "
+         "between two frames on straight ways; mean over 12 evaluated pairs of frames, needs ipctk"),
+        table="intersections", lower_is_better=True,
     ),
-    Metric(
-        name="body/self_intersection_frame", unit="1", title="Worst frame",
-        definition="the frame of these in which most vertices of the body are inside another part of it",
-    ),
+    measure=lambda roll_out: measure_triangles(roll_out) | measure_swept(roll_out),
 )  # fmt: skip
-
-
-def measure_body(roll_out: RollOut) -> dict[str, float]:
-    """Return the share of vertices in the worst sampled frame [%], and that frame; of the reference alone."""
-    scene, frames = roll_out.scene, len(roll_out.positions)
-    if roll_out.entry.role != "reference" or scene.dressed is None or scene.obstacle is None:
-        return {}
-    faces, rest = scene.obstacle.faces, scene.dressed.body.shaped(scene.dressed.betas)
-    at_rest = inside_itself(rest, faces)  # eyes in their sockets
-    judged = np.unique(np.linspace(scene.warm_up, frames - 1, SAMPLED_FRAMES).round().astype(int))
-    share = [(inside_itself(scene.obstacle.at(frame), faces) & ~at_rest).mean() for frame in judged]
-    worst = int(np.argmax(share))
-    return {
-        "body/self_intersection": 100.0 * float(share[worst]),
-        "body/self_intersection_frame": float(judged[worst]),
-    }
-
-
-def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which vertices x (B,3) [m] of a closed surface, faces (F,3) outward, are inside another part.
-
-    There the winding number of the surface around a point a little off the vertex, along its normal, is one.
-    """
-    from reference_sim.geometry.surface import vertex_normals, winding_numbers  # loads numba
-
-    return winding_numbers(x, faces, x + OFFSET * vertex_normals(x, faces)) > 0
-
-
-SWEPT = Measurements("swept", SWEPT_METRICS, measure=measure_swept)
-
-BODY = Measurements("body", BODY_METRICS, measure=measure_body)

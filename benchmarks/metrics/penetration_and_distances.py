@@ -1,16 +1,15 @@
-"""Metrics distance/*, penetration/* and drift/hem: distances between surfaces and into the body."""
+"""Metrics distance/*, penetration/*, exact/distance: distances between cloths and into the body."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metric import Measurements, Metric
+from benchmarks.metric import Measurements, metrics_of
 
 if TYPE_CHECKING:
     from benchmarks.metric import RollOut, SceneRollOuts
@@ -20,30 +19,6 @@ Floats = NDArray[np.float64]
 
 MM = 1e3
 DEEP = 5e-3  # [m] below the skin: what an eye sees
-
-_metric_geometry = partial(Metric, table="penetration", lower_is_better=True)
-
-GEOMETRY_METRICS = (
-    _metric_geometry(name="distance/rms", unit="mm", title="Distance",
-            definition="root mean square distance between the same vertices of method and simulation"),
-    _metric_geometry(name="distance/p95", unit="mm", title="95 %",
-            definition="95 % of these distances are smaller"),
-    _metric_geometry(name="penetration/vertices", unit="%", title="Penetration",
-            definition="vertices inside the body, none left out, mean over frames"),
-    _metric_geometry(name="penetration/surface", unit="%", title="Surface inside",
-            definition="share of the cloth's area inside the body, at vertices, midpoints of edges and "
-            "centroids, mean over frames"),
-    _metric_geometry(name="penetration/deep", unit="%", title="Deep",
-            definition="vertices more than 5 mm inside the body"),
-    _metric_geometry(name="penetration/depth_p99", unit="mm", title="Depth, 99 %", table="",
-            definition="99 % of all vertices and frames are less deep; 0 outside"),
-    _metric_geometry(name="penetration/own_part_p999", unit="mm", title="Own part, 99.9 %",
-            definition="99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold "
-            "of a hip does not count"),
-    _metric_geometry(name="drift/hem", unit="mm", title="Hem drift", lower_is_better=None,
-            definition="how far the hem's mean height above the pelvis has risen from the first evaluated "
-            "frame to the last"),
-)  # fmt: skip
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
@@ -57,18 +32,14 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return penetration into the obstacle, and the drift of the hem on a body."""
+    """Return penetration into the obstacle."""
     scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
     if scene.obstacle is None:
         return {}
     part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
-    values = penetration_values(inside_of(roll_out), judged) | {
+    return penetration_values(inside_of(roll_out), judged) | {
         "penetration/own_part_p999": MM * float(np.percentile(part_depth, 99.9)),
     }
-    if scene.dressed is not None and scene.origin_heights is not None:
-        heights = scene.origin_heights[: len(x)][judged]
-        values["drift/hem"] = MM * hem_drift(x[judged], scene.dressed.garment.hem, heights)
-    return values
 
 
 def penetration_values(inside: Penetration, judged: slice) -> dict[str, float]:
@@ -206,18 +177,42 @@ def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats
     return depth
 
 
-def hem_drift(positions: Floats, hem: NDArray[np.int64], origin_heights: Floats) -> float:
-    """Return how far the hem's mean height above the pelvis rose from the first frame to the last [m].
-
-    A shirt that crept up stays up.
-
-    Args:
-        positions: (T,V,3) [m].
-        hem: (H,) vertices.
-        origin_heights: (T,) [m] of the pelvis.
-    """
-    heights = positions[:, hem, 1].mean(1) - origin_heights[: len(positions)]
-    return float(heights[-1] - heights[0])
+def measure_exact(roll_out: RollOut) -> dict[str, float]:
+    """Return the largest distance of any vertex at any frame [m]; empty without an exact answer."""
+    exact = roll_out.scene.exact
+    if exact is None:
+        return {}
+    apart = np.linalg.norm(roll_out.positions - exact[: len(roll_out.positions)], axis=2)
+    return {"exact/distance": float(apart.max())}
 
 
-GEOMETRY = Measurements("geometry", GEOMETRY_METRICS, measure=measure, compare=compare)
+GEOMETRY = Measurements(
+    "geometry",
+    metrics_of(
+        ("distance/rms", "mm", "Distance",
+         "root mean square distance between the same vertices of method and simulation"),
+        ("distance/p95", "mm", "95 %", "95 % of these distances are smaller"),
+        ("penetration/vertices", "%", "Penetration",
+         "vertices inside the body, none left out, mean over frames"),
+        ("penetration/surface", "%", "Surface inside",
+         "share of the cloth's area inside the body, at vertices, midpoints of edges and centroids, mean "
+         "over frames"),
+        ("penetration/deep", "%", "Deep", "vertices more than 5 mm inside the body"),
+        ("penetration/depth_p99", "mm", "Depth, 99 %",
+         "99 % of all vertices and frames are less deep; 0 outside", {"table": ""}),
+        ("penetration/own_part_p999", "mm", "Own part, 99.9 %",
+         "99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold of a hip does "
+         "not count"),
+        table="penetration", lower_is_better=True,
+    ),
+    measure=measure, compare=compare,
+)  # fmt: skip
+EXACT = Measurements(
+    "exact",
+    metrics_of(
+        ("exact/distance", "m", "From the exact answer",
+         "largest distance of any vertex at any frame from backward Euler's own exact answer"),
+        table="speed", lower_is_better=True,
+    ),
+    measure=measure_exact,
+)  # fmt: skip

@@ -1,27 +1,21 @@
 """Metrics motion/* and roll_out/*: a method on what it was not made for, and on a motion that comes again.
 
-Metrics motion/*: a method on what it was not made for: strain, distance from skinning, recovery.
+In motion/* a method is held against itself in the scene's counterpart, the ordinary walk. A network never
+hears of another material: its energy is by the one that it should have heard of. A network's shirt that has
+left the body has diverged; a simulated shirt may be where it likes: of a body that jumps by a metre it has to
+be left behind.
 
-Each is held against the same method in the scene's counterpart, the ordinary walk. A network never hears of
-another material: its energy is by the one that it should have heard of. A network's shirt that has left the
-body has diverged; a simulated shirt may be where it likes: of a body that jumps by a metre it has to be left
-behind.
-
-Metrics roll_out/*: does a garment look the same when the same motion comes again, much later?
-
-Energies are those of the cloth alone (strain, bending, inertia), which need no body; the first two frames of
-either stretch have no inertia and are left out.
+In roll_out/* one motion is seen early and much later. Energies are those of the cloth alone (strain, bending,
+inertia), which need no body; the first two frames of either stretch have no inertia and are left out.
 """
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.metric import Measurements, Metric, skinned
-from benchmarks.metrics import energy
+from benchmarks.metric import Measurements, metrics_of, skinned
 from benchmarks.metrics import penetration_and_distances as geometry
 from benchmarks.metrics.energy import FIRST_FULL_FRAME, energies
 
@@ -32,24 +26,6 @@ if TYPE_CHECKING:
 AFTER = (1, 10, 30)  # frames after the glitch
 MM = 1e3
 LOST = 0.5  # [m] from the skinned shirt: a vertex so far off is on no body any more
-
-_metric_extrapolation = partial(Metric, table="extrapolation", lower_is_better=True)
-
-EXTRAPOLATION_METRICS = (
-    _metric_extrapolation(name="motion/strain", unit="J", title="Worst strain",
-            definition="membrane energy of the worst frame"),
-    _metric_extrapolation(name="motion/strain_ratio", unit="1", title="Over the walk's",
-            definition="the same over that of the same method on the ordinary walk and cloth"),
-    _metric_extrapolation(name="motion/offset", unit="mm", title="From skinning", lower_is_better=None,
-            definition="largest distance of a vertex from the skinned garment, over all frames"),
-    _metric_extrapolation(name="motion/penetration", unit="%", title="Penetration",
-            definition="vertices inside the body, mean over frames"),
-    _metric_extrapolation(name="motion/total", unit="J", title="Total energy",
-            definition="sum of all terms by the changed material, mean over frames"),
-    *(_metric_extrapolation(name=f"motion/recovery_{after}", unit="mm", title=f"{after} frames after",
-              definition=f"distance to the walk without the wrong frame, {after} frames after it")
-      for after in AFTER),
-)  # fmt: skip
 
 
 def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
@@ -69,7 +45,7 @@ def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
     if scene.obstacle is not None:
         values["motion/penetration"] = 100.0 * float(geometry.inside_of(roll_out).share.mean())
     if scene.cloth.material != garment.material and len(x) == scene.frames:
-        values["motion/total"] = float(energy.energies(roll_out)["total"][roll_out.judged].mean())
+        values["motion/total"] = float(energies(roll_out)["total"][roll_out.judged].mean())
     if scene.glitch is not None and ordinary is not None:
         apart = geometry.distance_rms(whole, ordinary[: len(whole)])
         values |= {
@@ -101,17 +77,6 @@ def strains(cloth: Cloth, positions: np.ndarray) -> np.ndarray:
 
 OF_CLOTH = ("strain", "bending", "inertia")
 
-_metric_long_roll_out = partial(Metric, table="roll_outs", lower_is_better=True)
-
-LONG_ROLL_OUT_METRICS = (
-    _metric_long_roll_out(name="roll_out/first", unit="J", title="Energy, first",
-            definition="strain, bending and inertia, mean over the frames of the early stretch"),
-    _metric_long_roll_out(name="roll_out/last", unit="J", title="Energy, last",
-            definition="the same of the late stretch, which shows the same motion"),
-    _metric_long_roll_out(name="roll_out/drift", unit="mm", title="Drift",
-            definition="root mean square distance between the two stretches, about the pelvis"),
-)  # fmt: skip
-
 
 def measure_long_roll_out(roll_out: RollOut) -> dict[str, float]:
     """Return energies [J] of the early and the late stretch, and the drift between both [mm]."""
@@ -131,9 +96,32 @@ def measure_long_roll_out(roll_out: RollOut) -> dict[str, float]:
 
 
 EXTRAPOLATION = Measurements(
-    "extrapolation", EXTRAPOLATION_METRICS, measure=measure_extrapolation, judge=judge, where_named=True
-)
-
+    "extrapolation",
+    metrics_of(
+        ("motion/strain", "J", "Worst strain", "membrane energy of the worst frame"),
+        ("motion/strain_ratio", "1", "Over the walk's",
+         "the same over that of the same method on the ordinary walk and cloth"),
+        ("motion/offset", "mm", "From skinning",
+         "largest distance of a vertex from the skinned garment, over all frames", {"lower_is_better": None}),
+        ("motion/penetration", "%", "Penetration", "vertices inside the body, mean over frames"),
+        ("motion/total", "J", "Total energy",
+         "sum of all terms by the changed material, mean over frames"),
+        *((f"motion/recovery_{after}", "mm", f"{after} frames after",
+           f"distance to the walk without the wrong frame, {after} frames after it") for after in AFTER),
+        table="extrapolation", lower_is_better=True,
+    ),
+    measure=measure_extrapolation, judge=judge, where_named=True,
+)  # fmt: skip
 LONG_ROLL_OUT = Measurements(
-    "roll_out", LONG_ROLL_OUT_METRICS, measure=measure_long_roll_out, where_named=True
-)
+    "roll_out",
+    metrics_of(
+        ("roll_out/first", "J", "Energy, first",
+         "strain, bending and inertia, mean over the frames of the early stretch"),
+        ("roll_out/last", "J", "Energy, last",
+         "the same of the late stretch, which shows the same motion"),
+        ("roll_out/drift", "mm", "Drift",
+         "root mean square distance between the two stretches, about the pelvis"),
+        table="roll_outs", lower_is_better=True,
+    ),
+    measure=measure_long_roll_out, where_named=True,
+)  # fmt: skip

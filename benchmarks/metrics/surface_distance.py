@@ -13,13 +13,12 @@ penetration alone: energies, curvature errors and distances are of the same vert
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metric import Measurements, Metric
+from benchmarks.metric import Measurements, metrics_of
 from benchmarks.metrics.penetration_and_distances import MM, penetration, penetration_values
 from reference_sim.geometry.topology import triangle_areas
 
@@ -31,17 +30,6 @@ Indices = NDArray[np.int64]
 
 SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
 LOST = 1e6  # [m] from the origin: a vertex so far off is on no surface, and its square may overflow
-
-_metric_surface = partial(Metric, table="surface", lower_is_better=True)
-
-SURFACE_METRICS = (
-    _metric_surface(name="surface/chamfer", unit="mm", title="Chamfer",
-            definition="mean distance from vertices to the nearest point of the reference's surface and from "
-            "its vertices back, by area, mean of both ways and of 12 evaluated frames"),
-    _metric_surface(name="surface/normals", unit="deg", title="Normals",
-            definition="angle between the normals of the two surfaces at these nearest points, mean as "
-            "above"),
-)  # fmt: skip
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
@@ -117,4 +105,15 @@ def _barycentric(points: Floats, corners: Floats) -> Floats:
     return np.stack([1.0 - beside - beyond, beside, beyond], axis=1)
 
 
-SURFACE = Measurements("surface", SURFACE_METRICS, measure=measure, compare=compare, other_meshes=True)
+SURFACE = Measurements(
+    "surface",
+    metrics_of(
+        ("surface/chamfer", "mm", "Chamfer",
+         "mean distance from vertices to the nearest point of the reference's surface and from its vertices "
+         "back, by area, mean of both ways and of 12 evaluated frames"),
+        ("surface/normals", "deg", "Normals",
+         "angle between the normals of the two surfaces at these nearest points, mean as above"),
+        table="surface", lower_is_better=True,
+    ),
+    measure=measure, compare=compare, other_meshes=True,
+)  # fmt: skip

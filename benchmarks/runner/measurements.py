@@ -22,7 +22,7 @@ from benchmarks.runner.task import Context, Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:
-    from benchmarks.runner.networks import TrainNetwork
+    pass
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,8 +31,7 @@ class MeasureCell(Task):
 
     cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
     quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
-    training: what trained its network. outside: modules of metrics that are not the project's, measured in
-    every scene.
+    outside: files of metrics that are not the project's, measured in every scene.
     """
 
     kind = "metrics"
@@ -43,7 +42,6 @@ class MeasureCell(Task):
     gap_samples: int
     quasi_static: TaskId | None = None
     counterpart: Cell | None = None
-    training: TrainNetwork | None = None
     outside: tuple[str, ...] = ()
 
     @staticmethod
@@ -67,8 +65,6 @@ class MeasureCell(Task):
             outcome = needed.get(self.counterpart.task_id)
             if outcome is not None and outcome.status in USABLE:
                 roll_out.counterpart = _positions(folder.trajectory_path(*self.counterpart.key))
-        if self.training is not None:
-            roll_out.training_poses = _training_poses(self.training, context)
         metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
         path = folder.curves_path(*self.cell.key)
         if curves:
@@ -185,30 +181,6 @@ def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> N
     }
     with replacing(path) as temporary:
         np.savez(temporary, **padded)
-
-
-def _training_poses(training: TrainNetwork, context: Context) -> np.ndarray | None:
-    """(N,24,3) [rad], mixed ones included; None of a network that was not trained.
-
-    Mixing takes seconds and depends on little, so networks of one seed share the poses, in every scene.
-    """
-    from snug.kinds import find_kind
-    from snug.training.augmentation import augment, make_shared_clips
-
-    assets, how = context.assets, training.chosen
-    if how is None or assets is None:
-        return None
-    recipe, simulated, drawn = how.recipe, how.simulated, find_kind(how.kind).physics
-    mixed = (training.seed, recipe.mixed, recipe.mixed_turn, recipe.mixed_lift) if drawn else None
-    key = ("training poses", training.garment, training.motions, mixed, simulated)
-    if key not in context.kept:
-        given = assets.named(training.motions)
-        vertices = len(assets.garments[training.garment].rest_positions)
-        clips = augment(given, recipe, vertices=vertices, seed=training.seed) if drawn else []
-        if simulated is not None:
-            clips += make_shared_clips(given, simulated.mixed, vertices=vertices, swinging=simulated.swinging)
-        context.kept[key] = np.concatenate([motion.poses for motion in (*given, *clips)])
-    return context.kept[key]
 
 
 def _positions(path: Path) -> np.ndarray:

@@ -16,7 +16,6 @@ from benchmarks import provenance
 from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
-from benchmarks.metrics import measured_in
 from benchmarks.plan.cell import Cell, flat
 from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.provenance import digest, digest_of_file, find_module
@@ -352,7 +351,6 @@ class Schedule:
             same = (c for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, counterpart.task_id)
-        names = [measurements.name for measurements in measured_in(scene.metrics)]
         of_scene = self.inputs.of_scene(
             scene, f"{TASKS}/measurements.py", *METRICS, *users_code(*plan.metrics)
         )
@@ -369,14 +367,10 @@ class Schedule:
             ],
             "metrics": scene.metrics,
         }
-        training = None
-        if (network := network_of(cell)) and "training_distance" in names:
-            training = self.network(network)
-            inputs |= {name: training.inputs[name] for name in ("training", "seed", "motions")}
         return MeasureCell(
             name=cell.name, label=cell.label, cell=cell, cells=cells,
             gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
-            counterpart=counterpart, training=training, outside=plan.metrics,
+            counterpart=counterpart, outside=plan.metrics,
             needs=(cell.task_id,), reads=reads, batch=scene.name,
             units=self._frames(scene.motion) * MeasureCell.shares(len(cells) if cells[:1] == (cell,) else 0),
             **of_scene | {"inputs": of_scene["inputs"] | inputs},

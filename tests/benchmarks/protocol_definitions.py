@@ -125,7 +125,7 @@ def _metrics() -> dict[str, Any]:
 
 
 def _sampling() -> dict[str, Any]:
-    from benchmarks.metrics import dynamics, energy_gap, intersections, surface_distance
+    from benchmarks.metrics import dynamics, energy_gap, intersections, scene_facts, surface_distance
     from benchmarks.scenes import dressed_body
     from snug.networks.roll_out import QUASI_STATIC_FRAMES
 
@@ -133,12 +133,12 @@ def _sampling() -> dict[str, Any]:
         "presets": {preset.name: asdict(replace(preset, description="", steps={})) for preset in PRESETS},
         "gap": (energy_gap.PRECISION, energy_gap.NEGLIGIBLE, energy_gap.ITERATIONS),
         "hem": (
-            dynamics.HELD, dynamics.SHIFTING, dynamics.MAX_LAG, dynamics.SHORTEST, dynamics.NO_MOTION,
-            float(dynamics.TURNING), dynamics.AFTER,
+            dynamics.SHIFTING, dynamics.MAX_LAG, dynamics.SHORTEST, dynamics.NO_MOTION,
+            float(dynamics.TURNING),
         ),
         "start": (dressed_body.HOLD, dressed_body.SHORT),
         "quasi-static frames": QUASI_STATIC_FRAMES,
-        "body": (intersections.SAMPLED_FRAMES, intersections.OFFSET),
+        "body": (scene_facts.SAMPLED_FRAMES, scene_facts.OFFSET),
         "surface": surface_distance.SAMPLED_FRAMES,
         "crossings": intersections.SAMPLED_STEPS,
     }  # fmt: skip

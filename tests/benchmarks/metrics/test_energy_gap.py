@@ -20,7 +20,7 @@ from benchmarks.metrics import energy
 from benchmarks.metrics import energy_gap as module
 from benchmarks.metrics.curvature import curvature_error, curvature_series
 from benchmarks.metrics.energy import first_guess
-from benchmarks.metrics.energy_gap import FINDERS, gap_scale, optimality, spread_evenly
+from benchmarks.metrics.energy_gap import gap_scale, optimality, spread_evenly
 from reference_sim import Potential, Trajectory, minimise, simulate
 from reference_sim.energies import Inertia, Step
 from tests.benchmarks.runner.tasks_by_hand import small_scene
@@ -156,7 +156,6 @@ def test_the_gap_is_zero_for_the_reference_and_falls_with_the_iterations(name):
     for metric in ("gap/energy", "gradient/norm", "step/distance"):
         assert 0.0 <= whole[metric] < 1e-6 < some[metric] < one[metric], metric
     assert 0.0 <= whole["step/curvature"] < 1e-6 < some["step/curvature"]
-    assert sum(whole[f"gap/found_by_{finder}"] for finder in FINDERS) == 8
     x = [scene.start, scene.start]
     assert optimality(scene, np.array(x), samples=3).metrics() == {}
     if scene.obstacle is not None:
@@ -266,7 +265,6 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found_and_distances_to_the_one_b
     metrics = optimality(scene, np.array([scene.start, scene.start, crumpled]), samples=1).metrics()
     assert metrics["gap/energy"].value == pytest.approx(here - low, rel=1e-6)
     assert metrics["gap/local"].value == pytest.approx(here - below.energy, rel=1e-9)
-    assert metrics["gap/found_by_simulator"] == 1
     apart = 1e3 * np.sqrt(((crumpled - below.positions) ** 2).sum(1).mean())
     assert metrics["step/distance"].value == pytest.approx(apart, rel=1e-9)
 
@@ -277,7 +275,7 @@ def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypat
     still = np.repeat(scene.start[None], 3, axis=0)
     monkeypatch.setattr(energy, "first_guess", lambda scene, x, *_: np.full_like(x, np.nan))
     gaps = optimality(scene, still, samples=1)
-    assert gaps.values["gap/energy"][0] >= 0.0 and sum(gaps.found_by.values()) == 1
+    assert gaps.values["gap/energy"][0] >= 0.0
     nowhere = still.copy()
     nowhere[2] = 1e200
     assert np.isnan(values(optimality(scene, nowhere, samples=1).metrics())["gap/energy"])

@@ -10,26 +10,20 @@ import pytest
 
 from benchmarks.meshes import icosphere, right_grid
 from benchmarks.methods import METHODS
-from benchmarks.metric import RollOut
-from benchmarks.metrics import cost, declared, find_metric
-from benchmarks.metrics import intersections as body_metrics
+from benchmarks.metrics import declared, find_metric
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
     histogram_distance,
 )
-from benchmarks.metrics.deformation import area_change, dihedral_angle, edge_change
-from benchmarks.metrics.energy import accelerations, correlation_with_body, energy_series
-from benchmarks.metrics.intersections import inside_itself
+from benchmarks.metrics.energy import energy_series
 from benchmarks.metrics.penetration_and_distances import (
     distance_rms,
-    hem_drift,
     own_part_depth,
     penetration,
 )
+from benchmarks.metrics.scene_facts import inside_itself, measure_body
 from benchmarks.metrics.self_intersections import self_intersections, share_and_contours
-from benchmarks.metrics.time_errors import time_errors
-from reference_sim import Obstacle, Trajectory, simulate
-from snug.body.skeleton import JOINT
+from reference_sim import Obstacle, simulate
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 
@@ -75,32 +69,6 @@ def test_penetration_sees_the_surface_between_vertices():
     assert overlap.area[0] == 0.0
 
 
-def test_inertia_follows_the_body_where_the_cloth_is_shaken_as_the_body_is():
-    random, masses = np.random.default_rng(2), np.array([1.0, 3.0, 1.0, 2.0])
-    jumps, others = np.abs(random.normal(size=(2, 30)))
-
-    def shaken(sizes):
-        """(T,V,3) of a cloth that moves as one, by second differences of these sizes."""
-        path = np.concatenate([[0.0, 0.0], np.cumsum(np.cumsum(sizes))])
-        return path[:, None, None] * [0.6, 0.0, 0.8] + np.arange(4.0)[:, None]
-
-    def correlation(positions, **scene):
-        cloth = SimpleNamespace(masses=masses)
-        scene = SimpleNamespace(**{"dt": 0.1, "cloth": cloth, "warm_up": 2, "kept": None} | scene)
-        group = SimpleNamespace(scene=scene, kept=lambda make: shaken(jumps))
-        roll_out = RollOut(
-            group, None, Trajectory(positions, np.zeros((0, 3), int), np.arange(len(positions)) * 0.1)
-        )
-        return correlation_with_body(roll_out)
-
-    assert accelerations(shaken(jumps), masses, 0.1)[2:] == pytest.approx(100.0 * jumps)
-    assert correlation(shaken(3.0 * jumps + 0.2)) == pytest.approx(1.0)
-    assert correlation(shaken(4.0 - jumps)) == pytest.approx(-1.0)
-    assert correlation(shaken(others)[:20]) == pytest.approx(np.corrcoef(others[:18], jumps[:18])[0, 1])
-    assert correlation(shaken(0.0 * jumps)) is None and correlation(shaken(jumps)[:4]) is None
-    assert correlation(shaken(jumps), kept=np.arange(3)) is None  # frames are left out: no second difference
-
-
 def test_energies_of_a_rigid_acceleration_are_known_by_hand():
     scene = small_scene("hanging_sheet")
     heights = np.array([0.5, 0.6, 0.7, 0.8, 0.9])
@@ -111,7 +79,6 @@ def test_energies_of_a_rigid_acceleration_are_known_by_hand():
     longer, shorter = energy_series(scene, [positions, positions[:3]])
     mass = scene.cloth.masses.sum()
     inertia = 0.5 * mass * 25.0 * scene.dt**2
-    assert accelerations(positions, scene.cloth.masses, scene.dt)[2:] == pytest.approx([5.0] * 3, rel=1e-9)
     assert longer["inertia"] == pytest.approx([0, 0, inertia, inertia, inertia], rel=1e-9)
     height = (scene.cloth.masses * rest[:, 1]).sum() / mass
     assert longer["gravity"] == pytest.approx(mass * 9.81 * (height - heights), rel=1e-12)
@@ -149,27 +116,6 @@ def test_own_part_depth_does_not_see_the_limb_beside():
     )
 
 
-def test_hem_drift_follows_the_hem_against_the_pelvis():
-    x = np.zeros((3, 4, 3))
-    x[:, 2:, 1] = np.array([0.5, 0.6, 0.8])[:, None]
-    assert hem_drift(x, np.array([2, 3]), np.array([1.0, 1.1, 1.1])) == pytest.approx(0.2, abs=1e-15)
-
-
-def test_training_distance_is_of_judged_frames_to_the_nearest_training_pose():
-    poses = np.zeros((23, 24, 3))
-    poses[:, JOINT["right_knee"], 0] = np.deg2rad(22.0 * np.arange(23) / 2)  # 0, 0.5 ... 11 degrees / joint
-    scene = SimpleNamespace(dressed=SimpleNamespace(motion=SimpleNamespace(poses=poses)))
-    known = np.zeros((2, 24, 3))
-    known[1] = poses[22]
-    roll_out = SimpleNamespace(scene=scene, judged=slice(2, None), training_poses=known)
-    distances = cost.measure_training_distance(roll_out)
-    nearest = np.minimum(np.arange(2, 23), 22 - np.arange(2, 23)) / 2
-    assert distances["training_distance/median"] == pytest.approx(np.median(nearest))
-    assert distances["training_distance/p95"] == pytest.approx(np.percentile(nearest, 95))
-    roll_out.training_poses = None
-    assert cost.measure_training_distance(roll_out) == {}
-
-
 def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places():
     random = np.random.default_rng(5)
     h, area = random.uniform(1.0, 9.0, (2, 50)), random.uniform(0.5, 1.5, (2, 50))
@@ -183,22 +129,6 @@ def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places()
     one = CurvatureSeries(np.array([[4.0, 99.0]]), np.array([[0.3, 0.0]]))  # boundary vertices weigh nothing
     assert histogram_distance(two, one) == pytest.approx([3.0])
     assert histogram_distance(CurvatureSeries(h, 0 * area), still) == pytest.approx([0.0, 0.0])
-
-
-def test_edges_areas_and_folds_of_known_deformations():
-    faces = np.array([[0, 1, 2], [1, 0, 3]])
-    flat = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -1, 0]], float)
-    edges = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3]])
-    lengths = np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1)
-    hinge = np.array([[0, 1, 2, 3]])
-    angle = 0.7
-    folded = flat.copy()
-    folded[3] = [0.5, -np.cos(angle), np.sin(angle)]
-    x = np.stack([flat, 1.1 * flat, folded])
-    assert edge_change(x, edges, lengths) == pytest.approx([0.0, 0.1, 0.0], abs=1e-12)
-    assert area_change(x, faces, np.array([0.5, 0.5])) == pytest.approx([0.0, 0.21, 0.0], abs=1e-12)
-    assert dihedral_angle(x, hinge) == pytest.approx([0.0, 0.0, angle], abs=1e-12)
-    assert dihedral_angle(x, hinge[:0]) == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_intersections_are_those_of_two_crossing_strips():
@@ -243,44 +173,11 @@ def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_reference
     roll_out = SimpleNamespace(
         scene=scene, positions=np.zeros((4, 1, 3)), entry=SimpleNamespace(role="reference")
     )
-    metrics = body_metrics.measure_body(roll_out)
+    metrics = measure_body(roll_out)
     assert metrics["body/self_intersection"] == pytest.approx(100 * (0.375 - 0.125), abs=2.0)
     assert metrics["body/self_intersection_frame"] == 2.0
     roll_out.entry.role = "learned"
-    assert body_metrics.measure_body(roll_out) == {}
-
-
-def test_time_errors_of_a_first_order_quantity_are_exact_and_of_order_one():
-    ladder = [
-        {"energy/total": 5.0 + 3.0 / n, "energy/strain": 1.0 - 2.0 / n, "curvature/mean": 7.0 + 1.0 / n}
-        for n in (1, 2, 4, 8)
-    ]
-    expected = {"total": 3.0, "strain": -2.0, "curvature": 1.0, "order": 1.0}
-    assert time_errors(ladder) == pytest.approx(
-        {f"time_error/{name}": value for name, value in expected.items()}
-    )
-
-
-@pytest.mark.parametrize(
-    ("of_halvings", "order"),
-    [
-        (lambda k: 0.028 + 0.0075 * k, 0.0),  # as much with each halving, as the strain of undamped cloth
-        (lambda k: 2.0 ** (-2 * k), 2.0),
-        (lambda k: (-0.5) ** k, None),  # to and fro
-        (lambda k: 4.0, None),
-    ],
-)
-def test_what_shows_no_first_order_has_no_limit(of_halvings, order):
-    names = {"energy/total": "total", "energy/strain": "strain", "curvature/mean": "curvature"}
-    errors = time_errors([dict.fromkeys(names, of_halvings(k)) for k in range(4)])
-    expected = dict.fromkeys((f"eighth/{name}" for name in names.values()), of_halvings(0) - of_halvings(3))
-    if order is not None:
-        expected["order"] = order
-    assert errors == pytest.approx(
-        {f"time_error/{name}": value for name, value in expected.items()}, abs=1e-9
-    )
-    assert {find_metric(name).unit for name in errors if name.endswith("curvature")} == {"1/m"}
-    assert find_metric("time_error/eighth/strain").unit == "J"
+    assert measure_body(roll_out) == {}
 
 
 def test_families_hold_every_level_from_coarse_to_fine():

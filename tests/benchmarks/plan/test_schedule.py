@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from types import SimpleNamespace
-
-import numpy as np
-import pytest
 
 from benchmarks import provenance
 from benchmarks.methods import find_method
@@ -15,11 +11,9 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.measurements import _training_poses
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.runner.task import Context, Task
-from benchmarks.training import Simulated, Training
-from snug.motion.library import make_motion
+from benchmarks.runner.task import Task
+from benchmarks.training import Training
 from snug.recipe import DEFAULT, TERMS
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
 from tests.benchmarks.runner.test_cell_tasks import plan_of
@@ -44,30 +38,6 @@ def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeyp
     monkeypatch.setitem(TRAININGS, "mine", Training("snug", dataclasses.replace(DEFAULT, terms=terms)))
     plan = plan_of(tmp_path, motions=MOTIONS)
     assert {"reference_sim", "snug"} < set(network(plan, "mine").code)
-
-
-def test_a_networks_cell_is_measured_beside_the_poses_that_it_trained_on_mixed_ones_too(
-    tmp_path, monkeypatch
-):
-    scene = dressed_scene("kick")
-    names = ("simulation", "untrained", "snug", "supervised")
-    cells = tuple(Cell(scene, find_method(name), 0, ("garments",)) for name in names)
-    schedule = Schedule(plan_of(tmp_path, motions=MOTIONS, cells=cells))
-    trainings = {cell.method: schedule.metrics(cell).training for cell in cells}
-    walk = make_motion("walk").cut(0, 30)
-    shirt = SimpleNamespace(rest_positions=np.zeros((300, 3)))
-    assets = SimpleNamespace(named=lambda names: [walk] * len(names), garments={"tshirt": shirt})
-    context = Context(RunFolder(tmp_path), assets)
-    assert trainings["simulation"] is None and _training_poses(trainings["untrained"], context) is None
-    given = _training_poses(trainings["supervised"], context)
-    mixed = _training_poses(trainings["snug"], context)
-    assert np.array_equal(given, walk.poses) and np.array_equal(mixed[:30], walk.poses)
-    assert len(mixed) - 30 == pytest.approx(DEFAULT.mixed * 30, abs=30)
-    # What simulated vertices teach draws no mixed clips, whatever its recipe says.
-    monkeypatch.setitem(TRAININGS, "mine", Training("supervised", DEFAULT, Simulated()))
-    assert np.array_equal(_training_poses(network(schedule.plan, "mine"), context), walk.poses)
-    narrow = dataclasses.replace(cells[2], scene=dataclasses.replace(scene, metrics=("energy",)))
-    assert schedule.metrics(narrow).training is None
 
 
 def test_a_cell_that_begins_removes_nothing_that_another_task_of_its_scene_has_made(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets, read_inputs
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods import find_method
-from benchmarks.metrics import deformation
+from benchmarks.metrics.scene_facts import measure_body_shape
 from benchmarks.plan.plan import network_of
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.runner.cache import dependencies
@@ -100,7 +100,7 @@ def test_how_far_a_shape_is_from_the_mean_is_said_once():
     def of(role, betas):
         entry = SimpleNamespace(role=role)
         scene = SimpleNamespace(dressed=SimpleNamespace(betas=betas))
-        return deformation.measure_body_shape(SimpleNamespace(entry=entry, scene=scene))
+        return measure_body_shape(SimpleNamespace(entry=entry, scene=scene))
 
     assert of("reference", np.array([3.0, 0.0, -4.0])) == {"body/shape": 5.0}
     assert of("reference", None) == {"body/shape": 0.0} and of("network", None) == {}
