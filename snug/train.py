@@ -198,7 +198,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def print_summary(model: TrainedModel) -> None:
     """Print the last losses, high windows, the best validation and the size of a model."""
     terms = [f"{name} {value:.4g}" for name, value in model.history[-1].items()
-             if "/" not in name and name not in ("step", "seconds")]  # fmt: skip
+             if name not in ("step", "seconds")]  # fmt: skip
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
     print(f"last steps, {model.unit}, mean over frames: " + "  ".join(terms))
     for window in model.summary["named_windows"][:5]:

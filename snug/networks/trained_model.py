@@ -41,8 +41,7 @@ class TrainedModel:
         steps: number of updates.
         seconds: wall time of the steps, contact search and pretraining included [s].
         setup_seconds: wall time of preprocessing: motions and first contact anchors [s].
-        history: one dict for every few steps: step, seconds, loss and each term [unit, mean over
-            frames], and as `seconds/<part>` the mean time of the parts of a step.
+        history: one dict for every few steps: step, seconds, loss and each term [unit, mean over frames].
         summary: numbers and names of high windows, of updates left out, of returns to good weights.
         unit: of the loss: joules, or a distance from the simulated vertices.
         fps: frame rate of the training motions [1/s]; 0 where it is not known.

@@ -15,7 +15,7 @@ from snug.networks.tensor_file import TensorFileError, read_tensors, write_tenso
 from snug.training.optimisation_step import Trainer
 from snug.training.validation import Validator
 
-CHECKPOINT_FORMAT = "snug-checkpoint-7"
+CHECKPOINT_FORMAT = "snug-checkpoint-8"
 # Facts of a run that are short enough to be named in a message.
 NAMED_FACTS = ("kind", "seed", "steps", "threads", "vertices", "every")
 

@@ -50,20 +50,17 @@ class TensorContactCache:
         normals = (of_faces[:, self.around.clamp(min=0)] * present).sum(-2)
         return (127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)).round()
 
-    def planes(
-        self, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """Return points and unit normals (N, S, 3) of the planes of frames (N,).
-
-        Patch positions and normals of the frames are rows (N,) of (R, P, 3) tensors.
-        """
-        chosen, row = (torch.as_tensor(numbers, device=positions.device) for numbers in (frames, rows))
-        return self.planes_at(self.faces[chosen], self.barycentric[chosen], row, positions, normals)
+    def held(self, frames: Tensor) -> Anchors:
+        """Return the anchors of frames (N,)."""
+        return self.faces[frames], self.barycentric[frames]
 
     def _planes(
         self, faces: Tensor, barycentric: Tensor, row: Tensor, positions: Tensor, normals: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Return `planes` at anchors (N, S) with bodies in the rows (N,)."""
+        """Return points and unit normals (N, S, 3) of the planes at anchors (N, S).
+
+        Patch positions and normals of the bodies are rows (N,) of (R, P, 3) tensors.
+        """
         corners, row = self.corners[faces.long()], row[:, None, None]  # (N, S, 3)
         last = barycentric / PARTS
         weights = torch.cat([1 - last.sum(-1, keepdim=True), last], -1)[..., None]
@@ -71,31 +68,18 @@ class TensorContactCache:
         directions = (weights * normals[row, corners]).sum(-2)
         return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
 
-    def walk(
-        self, samples: Tensor, frames: np.ndarray, rows: np.ndarray, positions: Tensor, normals: Tensor, *,
-        reach: float,
-    ) -> None:  # fmt: skip
-        """Move anchors of frames (N,) as snug.kernels.contact.walk_to_foot does.
-
-        Anchors of samples (N, S, 3) less than `reach` and SLACK above their planes walk. positions, normals:
-        see `planes`.
-        """
-        chosen, first, row = (
-            torch.as_tensor(numbers, device=samples.device)
-            for numbers in (frames, first_places(frames), rows)
-        )
-        self.place(chosen, self.walked(samples, chosen, first, row, positions, normals, reach=reach))
-
     def walked(
         self, samples: Tensor, frames: Tensor, first: Tensor, rows: Tensor, positions: Tensor,
         normals: Tensor, *, reach: float,
     ) -> Anchors:  # fmt: skip
-        """Return the anchors of frames (N,) after `walk`; first (N,): see `first_places`.
+        """Return the anchors of frames (N,), moved as snug.kernels.contact.walk_to_foot does.
 
-        A frame that comes twice walks once, as its first garment has it.
+        Those of samples (N, S, 3) less than `reach` and SLACK above their planes walk. A frame that comes
+        twice walks once, as its first garment has it. first (N,): see `first_places`; rows, positions,
+        normals: see `planes_at`.
         """
-        held = self.faces[frames], self.barycentric[frames]
-        faces, barycentric = self._walked_from(samples, *held, rows, positions, normals, reach)
+        moved = self._walked_from(samples, *self.held(frames), rows, positions, normals, reach)
+        faces, barycentric = moved
         return faces[first], barycentric[first]
 
     def place(self, frames: Tensor, anchors: Anchors) -> None:

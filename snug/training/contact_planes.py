@@ -20,7 +20,7 @@ from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
 from snug.kernels.skinning import FastSkin
 from snug.training.contact_cache import ContactCache, Patch
-from snug.training.contact_cache_torch import Anchors, TensorContactCache
+from snug.training.contact_cache_torch import Anchors, TensorContactCache, first_places
 from snug.training.device import compiled
 from snug.training.physics_loss import Planes
 from snug.training.training_set import Batch, TrainingSet
@@ -181,26 +181,26 @@ class TrainingContact:
         """Return the body in the poses of a batch."""
         return self.bodies.posed(batch)
 
-    def walked(
-        self, batch: Batch, frames: Tensor, first: Tensor, x: Tensor
-    ) -> tuple[Posed, Anchors, tuple[Tensor, Tensor]]:
-        """Return bodies, anchors and planes (N, T, S, 3) of a batch; nothing is kept, nothing waited for.
+    def walked(self, frames: Tensor, first: Tensor, posed: Posed, x: Tensor) -> Anchors:
+        """Return where the anchors of a batch walk; nothing is kept, nothing waited for.
 
         Args:
-            batch: windows; its own row numbers are not read.
-            frames: (N, T), their row numbers on the device.
+            frames: (N T,), row numbers on the device.
             first: (N T,), see snug.training.contact_cache_torch.first_places.
+            posed: bodies of the batch.
             x: (N, T, V, 3), vertices that the anchors walk to.
         """
         assert isinstance(self.cache, TensorContactCache)
-        posed = self.posed(batch)
-        body = posed[1:]
         samples, rows = self._samples(x.detach().flatten(0, 1)), torch.arange(len(first), device=x.device)
-        reach = self.contact.margin
-        anchors = self.cache.walked(samples, frames.flatten(), first, rows, *body, reach=reach)
-        points, normals = self.cache.planes_at(*anchors, rows, *body)
-        shape = (*frames.shape, *points.shape[1:])
-        return posed, anchors, (points.reshape(shape), normals.reshape(shape))
+        return self.cache.walked(samples, frames, first, rows, *posed[1:], reach=self.contact.margin)
+
+    def planes_at(self, anchors: Anchors, shape: tuple[int, ...], posed: Posed) -> tuple[Tensor, Tensor]:
+        """Return points and normals (N, T, S, 3) at anchors of a batch of shape (N, T)."""
+        assert isinstance(self.cache, TensorContactCache)
+        rows = torch.arange(len(anchors[0]), device=self.data.device)
+        points, normals = self.cache.planes_at(*anchors, rows, *posed[1:])
+        whole = (*shape, *points.shape[1:])
+        return points.reshape(whole), normals.reshape(whole)
 
     def place(self, frames: Tensor, anchors: Anchors) -> None:
         """Keep anchors of frames (N,) that `walked` has found."""
@@ -226,12 +226,14 @@ class TrainingContact:
             where = batch.frames, rows, *body
             return lambda lanes, into: cache.energy(self.contact, lanes, into, *where, walk=walk)
         flat = batch.frames.ravel()
-        if x is not None:
-            samples = self._samples(x.detach().flatten(0, 1))
-            self.cache.walk(samples, flat, *posed, reach=self.contact.margin)
-        points, normals = self.cache.planes(flat, *posed)
-        shape = (*batch.frames.shape, *points.shape[1:])
-        return points.reshape(shape), normals.reshape(shape)
+        frames = torch.as_tensor(flat, device=self.data.device)
+        if x is None:
+            anchors = self.cache.held(frames)
+        else:
+            first = torch.as_tensor(first_places(flat), device=self.data.device)
+            anchors = self.walked(frames, first, posed, x)
+            self.cache.place(frames, anchors)
+        return self.planes_at(anchors, batch.frames.shape, posed)
 
     def search_first(self, weights: Tensor) -> None:
         """Search where the skinned template touches, in enough frames to propagate to all others.

@@ -1,14 +1,13 @@
 """One optimisation step: draw sub-sequences, predict, sum energies, update, search contact anchors anew.
 
-snug.training.training_loop repeats it.
+snug.training.train_network repeats it.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -25,58 +24,13 @@ from snug.networks.regressor import MotionPerceptron
 from snug.networks.tensor_file import select_tensors
 from snug.recipe import Recipe
 from snug.training.augmentation import make_training_set, varies_shape
-from snug.training.captured_step import CapturedStep
 from snug.training.contact_planes import Posed, TrainingContact
 from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.physics_loss import PhysicsLoss
 from snug.training.simulated_data import SimulatedPast
-from snug.training.training_set import Batch, HiddenStateCache, TrainingError, TrainingSet
+from snug.training.training_set import HiddenStateCache, TrainingError, TrainingSet
 from snug.training.vertex_targets import TARGETS, Trajectories, VertexTargets
-
-# On a GPU "captured" is all from the windows to the gradients; see snug.training.captured_step.
-PARTS = ("draw", "forward", "skinning", "contact", "energies", "backward", "captured", "optimiser", "requery")
-
-WATCH_EVERY = 10  # steps, on a GPU
-
-
-class Stopwatch:
-    """Wall time by part of a step.
-
-    On a GPU it must wait for the work of each part to end, so there it watches one step in WATCH_EVERY.
-    """
-
-    def __init__(self, device: torch.device) -> None:
-        self._waits = device.type == "cuda"
-        self.device, self._live, self.steps = device, True, 0
-        self._seconds = dict.fromkeys(PARTS, 0.0)
-
-    @contextmanager
-    def part(self, name: str) -> Iterator[None]:
-        """Count the time of the block for the part of that name (one of PARTS)."""
-        if not self._live:
-            yield
-            return
-        start = self._now()
-        yield
-        self._seconds[name] += self._now() - start
-
-    def _now(self) -> float:
-        if self._waits:
-            torch.cuda.current_stream(self.device).synchronize()
-        return time.perf_counter()
-
-    def step_begins(self, number: int) -> None:
-        """Begin step `number`."""
-        self._live = not self._waits or number % WATCH_EVERY == 0
-        self.steps += self._live
-
-    def taken(self) -> dict[str, float]:
-        """Return the mean seconds a step of each part since the last call, and start anew."""
-        means = {name: s / self.steps for name, s in self._seconds.items() if s and self.steps}
-        self._seconds, self.steps = dict.fromkeys(PARTS, 0.0), 0
-        return means
-
 
 DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
@@ -113,7 +67,7 @@ class Trainer:
             raise TrainingError(f"kernels=True, device={device}: the kernels run on a CPU alone")
         how = find_kind(kind)
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
-        self.device, self.clock = device, Stopwatch(device)
+        self.device = device
         self.kernels = device.type == "cpu" if kernels is None else kernels
         self.posed_by = FastSkin.apply if self.kernels else compiled(skin, device)
         self.data = make_training_set(how, dressed, motions, recipe, seed=seed, device=device)
@@ -150,7 +104,6 @@ class Trainer:
         self._set_up_supervision(motions, trajectories)
         self.hidden_states = self._hidden_state_cache()
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
-        self.captured = CapturedStep(self) if on_gpu and CapturedStep.serves(self) else None
 
     def _set_up_supervision(self, motions: Sequence[Motion], trajectories: Trajectories | None) -> None:
         """Prepare the loss: simulated vertices, or the energies, perhaps about a simulated past."""
@@ -210,55 +163,53 @@ class Trainer:
 
     def step(self, number: int) -> dict[str, float]:
         """Take step `number`; return the loss and its terms, mean over frames, in the unit of the kind."""
-        self.clock.step_begins(number)
-        with self.clock.part("draw"):
-            self._set_rate(number)
-            windows = self.draw()
-            betas = None
-            if self.shaped:
-                shapes = self.dressed.body.shape_count
-                betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
-            frames = self.data.frames_of(windows)
-            state = self.start_state(frames)
-        if self.captured and (means := self.captured.take(number, windows, frames, betas, state)):
-            return {"loss": sum(means.values()), **means}
-        with self.clock.part("draw"):
-            batch = self.data.batch(windows, betas)
-        if self.loss is None:
-            assert self.targets is not None
-            with self.clock.part("forward"):
-                terms = self.targets.terms(self.network, batch, state, self.posed_by)
-            means, _ = self._update(number, windows, terms)
-        else:
-            means = self._physics_step(number, windows, frames, batch, state)
+        self._set_rate(number)
+        windows = self.draw()
+        betas = None
+        if self.shaped:
+            shapes = self.dressed.body.shape_count
+            betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
+        state = self.start_state(self.data.frames_of(windows))
+        means = self.learn(number, windows, betas, state)
         return {"loss": sum(means.values()), **means}
 
-    def _physics_step(
-        self, number: int, windows: np.ndarray, frames: np.ndarray, batch: Batch, state: Tensor | None
+    def learn(
+        self, number: int, windows: np.ndarray, betas: np.ndarray | None, state: Tensor | None
     ) -> dict[str, float]:
-        """Take a step on the energies of windows (N,) with frames (N, T)."""
-        assert self.loss is not None
-        x, after = self.predict(batch, state)
+        """Descend once by the loss of windows; return its terms, mean over frames.
+
+        Args:
+            number: of the step.
+            windows: (N,), places of the batch's windows.
+            betas: (N, S) shape numbers, None on the mean body.
+            state: before the windows, None without one.
+        """
+        batch = self.data.batch(windows, betas)
+        if self.loss is None:
+            assert self.targets is not None
+            return self._update(
+                number, windows, self.targets.terms(self.network, batch, state, self.posed_by)
+            )[0]
+        offsets, after = self.network(batch.features, state)
+        # Offsets first: the sum then lies in memory as they do.
+        x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
         planes = posed = None
         if self.contact:
-            with self.clock.part("contact"):
-                posed = self.contact.posed(batch)
-                planes = self.contact.planes(batch, posed, x)
-        with self.clock.part("energies"):
+            posed = self.contact.posed(batch)
+            planes = self.contact.planes(batch, posed, x)
+        terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
+        if self.contact and posed and self._searched_for_high(number, batch.frames, posed, x, terms):
+            planes = self.contact.planes(batch, posed)
             terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
-            if self.contact and posed and self._searched_for_high(number, frames, posed, x, terms):
-                planes = self.contact.planes(batch, posed)
-                terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
-            if self.past:
-                terms |= self.past.terms(x, batch)
+        if self.past:
+            terms |= self.past.terms(x, batch)
         means, trusted = self._update(number, windows, terms)
         if trusted and self.hidden_states and after is not None:
             self.hidden_states.keep(batch.frames[:, -1], after)
         if self.contact and posed:
-            with self.clock.part("requery"):
-                self.contact.settle(frames, trusted=trusted)
-                if trusted:
-                    self.contact.requery(frames, posed, x)
+            self.contact.settle(batch.frames, trusted=trusted)
+            if trusted:
+                self.contact.requery(batch.frames, posed, x)
         return means
 
     def _searched_for_high(
@@ -293,14 +244,6 @@ class Trainer:
             return None
         return state + self.hidden_states.at(frames[:, 0]) if self.hidden_states else state
 
-    def predict(self, batch: Batch, state: Tensor | None) -> tuple[Tensor, Tensor | None]:
-        """Return vertices (N, T, V, 3) [m] relative to the pelvis, and the state after them."""
-        with self.clock.part("forward"):
-            offsets, after = self.network(batch.features, state)
-        with self.clock.part("skinning"):
-            # Offsets first: the sum then lies in memory as they do.
-            return self.posed_by(offsets + batch.rest, self.weights, batch.transforms), after
-
     def _set_rate(self, number: int) -> None:
         """Set the learning rate of step `number`, see Recipe.schedule."""
         factor = 1.0
@@ -330,17 +273,15 @@ class Trainer:
         verdict = self.guard.judge(number, joules, name)
         if verdict == "leave out":
             return means, False
-        with self.clock.part("backward"):
-            self.optimiser.zero_grad(set_to_none=True)
-            stacked.sum(1).mean().backward()
-        with self.clock.part("optimiser"):
-            parameters = [p for p in self.network.parameters() if p.grad is not None]
-            norm = nn.utils.get_total_norm([p.grad for p in parameters if p.grad is not None])
-            if not self.guard.accepts(number, verdict, float(norm), joules, name):
-                return means, False
-            if verdict != "update":
-                nn.utils.clip_grads_with_norm_(parameters, self.recipe.gradient_limit, norm)
-            self.optimiser.step()
+        self.optimiser.zero_grad(set_to_none=True)
+        stacked.sum(1).mean().backward()
+        parameters = [p for p in self.network.parameters() if p.grad is not None]
+        norm = nn.utils.get_total_norm([p.grad for p in parameters if p.grad is not None])
+        if not self.guard.accepts(number, verdict, float(norm), joules, name):
+            return means, False
+        if verdict != "update":
+            nn.utils.clip_grads_with_norm_(parameters, self.recipe.gradient_limit, norm)
+        self.optimiser.step()
         return means, verdict != "distrust"
 
     def namer(self, windows: np.ndarray) -> Callable[[int], str]:

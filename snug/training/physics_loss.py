@@ -177,11 +177,6 @@ class ClosedForm(torch.autograd.Function):
         return above[0][..., None, None] * ctx.gradients, None
 
 
-def evaluate(energy: Energy, x: Tensor, *, kernels: bool = True) -> Tensor:
-    """Return the energy (...) [J] of each configuration (..., V, 3) [m] by its closed form or definition."""
-    return ClosedForm.apply(x, energy) if kernels else energy.energy(x).sum(-1)
-
-
 def has_closed_form(energy: Energy) -> bool:
     """Return whether its gradient is known in closed form; automatic differentiation gives that of others."""
     closed_form = type(energy).value_and_gradient is not Energy.value_and_gradient
@@ -264,8 +259,12 @@ class PhysicsLoss:
         """Return the energies of `__call__`: those of `closed`, and the others by their definitions."""
         terms = {}
         for name, energy in self.static.items():
-            kernels_too = self.kernels and has_closed_form(energy)
-            terms[name] = closed[name] if name in closed else evaluate(energy, x, kernels=kernels_too)
+            if name in closed:
+                terms[name] = closed[name]
+            elif self.kernels and has_closed_form(energy):
+                terms[name] = ClosedForm.apply(x, energy)
+            else:
+                terms[name] = energy.energy(x).sum(-1)
         if "inertia" in self.terms and x.shape[1] >= 3:
             terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead, behind)
         if "collision" in self.terms and planes is not None:

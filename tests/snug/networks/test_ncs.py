@@ -99,7 +99,7 @@ def test_a_window_begins_with_the_state_that_its_lead_leaves():
     trainer = Trainer("ncs", tube_dress(), [swaying(40)], steps=1, seed=0, recipe=NCS)
     windows = np.array([0, 4, 20])
     batch = trainer.data.batch(windows)
-    state = trainer.start_state(3, slice(None), batch.frames)
+    state = trainer.start_state(batch.frames)
     assert not state[:, 0].any() and state.requires_grad
     for row, first in enumerate(windows[1:], 1):
         features = trainer.data.features[None, max(first - LEAD, 0) : first]

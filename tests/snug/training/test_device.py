@@ -118,7 +118,9 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     on = (contact, lanes, np.zeros_like(lanes), frames[:, None], rows[:, None], positions.numpy(), normals)
     assert fast.energy(*on).sum() > 0 and (fast.faces == still.faces).all()
     fast.energy(*on, walk=True)
-    slow.walk(samples, frames, rows, positions, torch.as_tensor(normals).float(), reach=contact.margin)
+    chosen = torch.as_tensor(frames)
+    at = torch.arange(2), torch.arange(2), positions, torch.as_tensor(normals).float()
+    slow.place(chosen, slow.walked(samples, chosen, *at, reach=contact.margin))
     for row, frame in enumerate(frames):
         searched.requery(int(frame), samples[row].numpy(), positions[row].numpy(), exact=True)
 
@@ -148,7 +150,8 @@ def test_torch_planes_are_those_of_numpy():
     numbers, torches = ContactCache(patch, 3), TensorContactCache(patch, 3, CPU)
     frames = np.array([2, 0])
     points, normals = planes_of(numbers, frames, frames, positions.numpy(), patch.normals(positions.numpy()))
-    theirs = torches.planes(frames, frames, positions, torches.normals(positions))
+    chosen = torch.as_tensor(frames)
+    theirs = torches.planes_at(*torches.held(chosen), chosen, positions, torches.normals(positions))
     assert np.abs(points - theirs[0].numpy()).max() < 1e-6
     # A normal on the border of two of its 127 steps may fall on either side.
     off = np.abs(normals - theirs[1].numpy()).max(-1)

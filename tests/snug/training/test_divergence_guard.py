@@ -10,7 +10,7 @@ from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
 from snug.training.divergence_guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
 from snug.training.optimisation_step import Trainer
-from snug.training.training_loop import TrainingLoop
+from snug.training.train_network import TrainingLoop
 from snug.training.training_set import TrainingError
 from tests.snug.training.dressing import swaying, tube_dress
 
