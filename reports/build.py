@@ -49,7 +49,7 @@ def build_report(run_dir: str | Path) -> Built:
     """
     # Heavy: not needed for --help.
     from reports.blocks import FIGURES, Report
-    from reports.figures.figure import draw_figures, remove_figures
+    from reports.figures.figure import draw_figures
     from reports.page.write_page import write_page
     from reports.pdf import write_pdf
     from reports.run.reading import read_run_with_trainings
@@ -61,7 +61,8 @@ def build_report(run_dir: str | Path) -> Built:
     tables = make_tables(run)
     write_tables(folder.tables, tables.values())
     if folder.trajectories.is_dir():  # else pictures of roll-outs that are gone stay
-        remove_figures(folder.figures, FIGURES)
+        for path in [path for figure in FIGURES for path in figure.files_in(folder.figures)]:
+            path.unlink()
     report = Report(run, tables, draw_figures(run, folder.figures, FIGURES))
     write_page(folder, report)
     return Built(write_pdf(folder, report), [*run.problems, *gaps(run)], answer(run, tables))

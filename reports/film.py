@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder, replacing
-from reports.rendering import camera_axes
+from reports.rendering import BODY_COLOUR, CLOTH_COLOUR, LIFT, Camera, Surface, camera_axes, views
 
 if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
-    from reports.run.reading import SelectedRollOuts
 
 EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.mp4
@@ -31,79 +30,60 @@ EXAMPLES = """examples:
 A .pc2 is no film: it gives kick_snug.pc2 and kick_body.pc2, the vertices of each method and of the body, with
 an .obj each, in metres, y up, for Blender's Mesh Cache modifier.
 
-An .mp4 needs pip install 'neural-garment-benchmark[film]'; a .gif does not. No screen is needed.
+An .mp4 needs pip install 'neural-garment-benchmark[film]'; a .gif does not.
 The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.
-exit status: 0 written; 2 the run has no such roll-out, or no film can be made here: one line says why."""
-CLOTH, BODY, PAPER, INK = "#D9694A", "#CFC9C2", "#F4F2EE", (40, 40, 40)
+exit status: 0 written; 2 the run has no such roll-out, or the extra is missing: one line says why."""
+PAPER, INK = (255, 255, 255), (40, 40, 40)
 PER_ROW = 4
 TALL = 1.25  # height of a view over its width
-ANGLE = 18.0  # [degrees] of the perspective, over the height of a view
 SMOOTHED = 0.6  # [s] over which the camera's path is smoothed
 MARGIN = 1.25  # around the garment
 MOST_RATE = 50.0  # frames a second of a GIF that browsers show in their time
-SWATCH = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).screenshot()"
 
 
-class Stage:
-    """Stage with all cloths and the body, one cloth shown at a time: every view has the same camera."""
+@dataclass(frozen=True)
+class SelectedRollOuts:
+    """Roll-outs of one scene: by method its finite frames and its label; the body where there is one."""
 
-    def __init__(self, selected: SelectedRollOuts, width: int, azimuth: float) -> None:
-        import pyvista
-        from vtkmodules.vtkCommonCore import vtkLogger
+    cloths: dict[str, Trajectory]
+    labels: dict[str, str]
+    body: Trajectory | None
 
-        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # that there is no screen
-        self.selected, self.axes = selected, camera_axes(-azimuth)
-        self.width, self.height = width - width % 2, round(width * TALL / 2) * 2
-        size = [self.width, self.height]
-        self.plotter: Any = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
-        self.plotter.background_color = pyvista.Color(PAPER)
-        # Nearly along the cloth from the side: folds of millimetres throw shade.
-        for place, strength in (((1.7, 0.8, 0.6), 1.0), ((-1.2, 0.6, 1.6), 0.4)):
-            self.plotter.add_light(
-                pyvista.Light(position=place, intensity=strength, light_type="camera light")
-            )
-        self.meshes = {name: self._added(cloth, CLOTH) for name, cloth in selected.cloths.items()}
-        self.body = self._added(selected.body, BODY) if selected.body else None
-        self.drawn = -1  # frame of the body
-        self.centres, half = camera_path(selected, self.axes)
-        self.away = half / np.tan(np.radians(ANGLE / 2.0))
-
-    def _added(self, cloth: Trajectory, colour: str) -> tuple[Any, Any]:
-        """Add a cloth or body; return its mesh and its actor."""
-        import pyvista
-
-        mesh = pyvista.PolyData.from_regular_faces(cloth.positions[0], cloth.faces)
-        actor = self.plotter.add_mesh(
-            mesh, color=colour, ambient=0.15, diffuse=0.9, specular=0.12, specular_power=10
-        )
-        actor.prop.interpolation = "Phong"
-        return mesh, actor
-
-    def view(self, method: str, frame: int) -> np.ndarray:
-        """Return (height,width,3) bytes: that method's cloth on the body; past its end, its last frame."""
-        for name, (_, actor) in self.meshes.items():
-            actor.visibility = name == method
-        _move(self.meshes[method][0], self.selected.cloths[method].positions, frame)
-        if self.body and self.selected.body and frame != self.drawn:
-            _move(self.body[0], self.selected.body.positions, frame)
-            self.drawn = frame
-        camera, centre = self.plotter.camera, self.centres[frame]
-        camera.focal_point, camera.up, camera.view_angle = centre, (0.0, 1.0, 0.0), ANGLE
-        camera.position = centre + self.away * self.axes[:, 2]
-        self.plotter.renderer.reset_camera_clipping_range()
-        self.plotter.render()
-        return np.asarray(self.plotter.screenshot(return_img=True))
-
-    def close(self) -> None:
-        """Free the renderer."""
-        self.plotter.close()
+    @property
+    def longest(self) -> Trajectory:
+        """The roll-out with the most frames; its dt is nan where it has one."""
+        return max(self.cloths.values(), key=lambda cloth: cloth.frames)
 
 
-def _move(mesh, positions: np.ndarray, frame: int) -> None:
-    from reference_sim.geometry.surface import vertex_normals  # loads numba
+def select_roll_outs(
+    folder: RunFolder, scene: str, methods: Sequence[str], seed: int | None = None
+) -> SelectedRollOuts:
+    """Read roll-outs of a scene.
 
-    mesh.points = positions[min(frame, len(positions) - 1)].astype(np.float32)
-    mesh.point_data.active_normals = vertex_normals(mesh.points.astype(float), mesh.regular_faces)
+    Args:
+        folder: of the run.
+        scene: as results.csv names it.
+        methods: as results.csv names them.
+        seed: of methods that have one; None takes the first that the run has.
+
+    Raises:
+        ResultsError: for a roll-out that the run did not keep; the message names those of its scenes.
+    """
+    from reports.run.reading import read_run
+
+    run = read_run(folder)
+    rows = run.frame[(run.frame["case"] == "") & (run.frame["scene"] == scene)]
+    cloths = {}
+    for method in methods:
+        of_method = rows[rows["method"] == method]
+        chosen = of_method["seed"].min() if seed is None or not of_method["seeded"].any() else seed
+        cloth = run.roll_outs.cloth(scene, method, int(chosen)) if len(of_method) else None
+        if cloth is None or not cloth.finite().frames:
+            kept = sorted(path.parent.name for path in folder.trajectories.glob("*/*.vtkhdf"))
+            reason = "; ".join(run.problems) or f"scenes with roll-outs are {', '.join(dict.fromkeys(kept))}"
+            raise ResultsError(f"{folder.path}: no roll-out of '{method}' in {scene}: {reason}")
+        cloths[method] = cloth.finite()
+    return SelectedRollOuts(cloths, {name: run.label(name) for name in cloths}, run.roll_outs.body(scene))
 
 
 def camera_path(selected: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
@@ -123,50 +103,48 @@ def camera_path(selected: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarra
     return centres @ axes.T, MARGIN * float(max(up, TALL * right))
 
 
+def drawn(mesh: Trajectory, frame: int, colour: tuple[float, float, float], lift: float = 0.0) -> Surface:
+    """Return a roll-out at that frame, past its end at its last, as it is painted."""
+    return Surface(mesh.positions[min(frame, mesh.frames - 1)], mesh.faces, colour, lift)
+
+
 def draw_frames(selected: SelectedRollOuts, width: int, azimuth: float) -> Iterator[np.ndarray]:
     """Yield every frame of the film: all views with their names, and the time."""
-    stage = Stage(selected, width, azimuth)
-    try:
-        for frame, time in enumerate(selected.longest.times):
-            views = {method: stage.view(method, frame) for method in selected.cloths}
-            yield _composed(selected, views, frame, float(time))
-    finally:
-        stage.close()
+    width, height = width - width % 2, round(width * TALL / 2) * 2
+    centres, half = camera_path(selected, camera_axes(-azimuth))
+    for frame, time in enumerate(selected.longest.times):
+        body = drawn(selected.body, frame, BODY_COLOUR) if selected.body else None
+        cloths = [drawn(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in selected.cloths.values()]
+        camera = Camera(centres[frame], 2.0 * half, -azimuth)
+        pictures = (255.0 * np.array(views(body, cloths, camera, width, height))).astype(np.uint8)
+        yield _composed(selected, pictures, frame, float(time))
 
 
-def _composed(
-    selected: SelectedRollOuts, views: dict[str, np.ndarray], frame: int, time: float
-) -> np.ndarray:
-    """Compose views in rows, each under its method's name, with the time [s] below them."""
+def _composed(selected: SelectedRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
+    """Compose pictures (N,H,W,3) in rows, each under its method's name, with the time [s] below them."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
-    height, width, _ = next(iter(views.values())).shape
+    count, height, width, _ = pictures.shape
     letter = max(12, width // 22)
     font = ImageFont.truetype(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf", letter)
-    rows = -(-len(views) // PER_ROW)
-    columns = -(-len(views) // rows)
-    room, foot = (2 * letter) // 2 * 2, (2 * letter) // 2 * 2
-    image = Image.new("RGB", (columns * width, rows * (height + room) + foot), PAPER)
+    rows = -(-count // PER_ROW)
+    columns = -(-count // rows)
+    room = 2 * letter
+    image = Image.new("RGB", (columns * width, rows * (height + room) + room), PAPER)
     draw = ImageDraw.Draw(image)
-    for place, (method, view) in enumerate(views.items()):
+    for place, (method, cloth) in enumerate(selected.cloths.items()):
         x, y = place % columns * width, place // columns * (height + room)
-        image.paste(Image.fromarray(view), (x, y + room))
-        cloth = selected.cloths[method]
-        label = _fitting(draw, selected.run.label(method), font, width)
-        draw.text((x + width / 2, y + room / 2), label, INK, font, anchor="mm")
+        image.paste(Image.fromarray(pictures[place]), (x, y + room))
+        texts = {y + room / 2: selected.labels[method]}
         if frame >= cloth.frames:
-            ended = _fitting(draw, f"ended at {cloth.times[-1]:.2f} s: {cloth.status}", font, width)
-            draw.text((x + width / 2, y + room + height - letter), ended, INK, font, anchor="mm")
-    draw.text((image.width / 2, image.height - foot / 2), f"{time:.2f} s", INK, font, anchor="mm")
+            texts[y + room + height - letter] = f"ended at {cloth.times[-1]:.2f} s: {cloth.status}"
+        for line, text in texts.items():
+            while draw.textlength(text, font) > 0.96 * width and len(text) > 1:
+                text = text.rstrip("…")[:-1] + "…"
+            draw.text((x + width / 2, line), text, INK, font, anchor="mm")
+    draw.text((image.width / 2, image.height - room / 2), f"{time:.2f} s", INK, font, anchor="mm")
     return np.asarray(image)
-
-
-def _fitting(draw, label: str, font, width: int) -> str:
-    """Cut the label where it is wider than a view."""
-    while draw.textlength(label, font) > 0.96 * width and len(label) > 1:
-        label = label.rstrip("…")[:-1] + "…"
-    return label
 
 
 def write_mp4(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
@@ -192,14 +170,14 @@ def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
 
     Browsers show a frame for two hundredths or more: of a higher rate every second or third frame is kept.
     """
-    from PIL import Image, ImageColor
+    from PIL import Image
 
     step = max(1, math.ceil(round(rate / MOST_RATE, 6)))
     rate /= step
     # Of all frames at once: one picture's own palette has no place for what the others show.
     shades = np.linspace(0.0, 1.3, 126)[:, None]
-    colours = [np.minimum(shades * ImageColor.getrgb(colour), 255.0) for colour in (CLOTH, BODY)]
-    table = np.concatenate([*colours, [ImageColor.getrgb(PAPER), INK]]).round().astype(np.uint8)
+    colours = [np.minimum(255.0 * shades * colour, 255.0) for colour in (CLOTH_COLOUR, BODY_COLOUR)]
+    table = np.concatenate([*colours, [PAPER, INK]]).round().astype(np.uint8)
     palette = Image.new("P", (1, 1))
     palette.putpalette(table.tobytes())
     drawn = [
@@ -222,26 +200,11 @@ def write_point_caches(path: Path, selected: SelectedRollOuts) -> None:
 WRITERS = {".mp4": write_mp4, ".gif": write_gif}
 
 
-def demand_possible(path: Path) -> None:
-    """Raise ValueError where no such film can be made here."""
-    from importlib.util import find_spec
-
-    if path.suffix == ".pc2":
-        return
-    if path.suffix not in WRITERS:
-        raise ValueError(f"{path}: a film ends in .mp4 or .gif, point caches in .pc2")
-    if path.suffix == ".mp4" and find_spec("av") is None:
-        raise ValueError(f"{path}: needs pip install 'neural-garment-benchmark[film]'; a .gif does not")
-    # In a process of its own: where there is no OpenGL, it is killed.
-    if subprocess.run([sys.executable, "-c", SWATCH], capture_output=True).returncode:
-        raise ValueError(
-            "no OpenGL to draw without a screen: install Mesa's (Debian: libegl1, libgl1-mesa-dri)"
-        )
-
-
 @command("reports.film")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
+    from importlib.util import find_spec
+
     parser = Parser(
         prog="python -m reports.film",
         description="A film of methods side by side in a scene of a run.",
@@ -260,10 +223,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
         raise ValueError("--speed is 0.01 to 10, --width 64 to 2000")
-    demand_possible(path)
+    if path.suffix not in (".pc2", *WRITERS):
+        raise ValueError(f"{path}: a film ends in .mp4 or .gif, point caches in .pc2")
+    if path.suffix == ".mp4" and find_spec("av") is None:
+        raise ValueError(f"{path}: needs pip install 'neural-garment-benchmark[film]'; a .gif does not")
     demand_writable_folder(path.parent)
-    from reports.run.reading import select_roll_outs
-
     selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
     if path.suffix == ".pc2":
         write_point_caches(path, selected)

@@ -1,6 +1,4 @@
-"""Rendering of meshes by an orthographic camera and a depth buffer; and sheets of such pictures.
-
-Rendering of meshes: an orthographic camera, a depth buffer, light from the side.
+"""Rendering of meshes: an orthographic camera, a depth buffer, light from the side; sheets of such pictures.
 
 Drawn on the processor: no OpenGL is needed, whose drivers kill the process where there is no display, and
 the same machine gives the same bytes.
@@ -13,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from reports.cloth_colours import Scale, colour_map
 from reports.figures.chosen_roll_outs import SceneRollOuts
@@ -29,7 +26,6 @@ KEY, FILL = np.array([-0.78, 0.42, 0.46]), np.array([0.7, 0.1, 0.7])  # lights: 
 LIFT = 0.012  # [m] that cloth is nearer: a coarse triangle cuts through the skin between its corners
 SAMPLES = 2  # of a pixel along each axis
 ABOVE = 8.0  # [degrees] that the camera looks down
-CREASE = 0.008  # [m] below its surroundings at which a fold is at its darkest
 
 
 @dataclass(frozen=True)
@@ -86,7 +82,7 @@ def views(
     for cloth in cloths:
         nearest, painted = depth.copy(), image.copy()
         _paint(cloth, camera, (w, h), nearest, painted)
-        painted = _creased(painted.reshape(h, w, 3), nearest.reshape(h, w))
+        painted = np.clip(painted, 0.0, 1.0)
         pictures.append(painted.reshape(height, SAMPLES, width, SAMPLES, 3).mean(axis=(1, 3)))
     return pictures
 
@@ -142,16 +138,6 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     kept = weights[0] >= 0.0
     triangle, x, y = triangle[kept], x[kept] + low[triangle[kept], 0], y[kept] + low[triangle[kept], 1]
     return y * w + x, seen[triangle], np.stack([weight[kept] for weight in weights], axis=1)
-
-
-def _creased(image: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """Darken where the surface lies a little below its surroundings, as in a fold; not behind an arm."""
-    shown = np.isfinite(depth)
-    level, reach = np.where(shown, depth, 0.0), image.shape[1] / 66.0
-    share = np.maximum(gaussian_filter(shown.astype(float), reach), 1e-6)
-    below = np.maximum(gaussian_filter(level, reach) / share - level, 0.0) / CREASE
-    dark = 1.0 - 0.3 * below * np.exp(1.0 - below)
-    return np.clip(np.where(shown[..., None], image * dark[..., None], image), 0.0, 1.0)
 
 
 FRONT, BACK = -25.0, 155.0  # turns of the camera [degrees]

@@ -36,30 +36,20 @@ class Picture:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: its name, what draws it, in no part, in one or in several, and its files.
-
-    files: patterns of them in the folder of figures, where they are not <name>.*.
-    """
+    """A figure: its name, with which its files begin, and what draws it, in no part, in one or in several."""
 
     name: str
     drawings: Callable[[Run], Iterable[Drawing]]
-    files: tuple[str, ...] = ()
-
-    @property
-    def patterns(self) -> tuple[str, ...]:
-        """Patterns of its files in the folder of figures."""
-        return self.files or (f"{self.name}.*",)
 
     def files_in(self, folder: Path) -> list[Path]:
-        """Return its files in the folder of figures, the one that was drawn first before the others."""
-        files = {path for pattern in self.patterns for path in folder.glob(pattern)}
-        return sorted(files, key=lambda path: (path.stat().st_mtime_ns, path.name))
+        """Return its files in the folder of figures."""
+        return sorted(path for path in folder.glob(f"{self.name}*") if path.suffix in (".png", ".svg"))
 
 
 def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, list[Picture]]:
     """Draw into the folder all that the run has the data for; return name of the figure -> its pictures.
 
-    What cannot be drawn is taken from the folder if it lies there, in the order in which it was drawn.
+    What cannot be drawn is taken from the folder if it lies there.
     """
     return {
         figure.name: [save_drawing(folder, drawing) for drawing in figure.drawings(run)]
@@ -88,10 +78,3 @@ def kept_picture(path: Path) -> Picture:
         caption, width = image.info.get("Description", ""), image.width / DOTS / PAGE_WIDTH
     vector = path.with_suffix(".svg")
     return Picture(vector if vector.is_file() else path, caption, min(1.0, width))
-
-
-def remove_figures(folder: Path, figures: Iterable[Figure]) -> None:
-    """Remove the files of these figures."""
-    for figure in figures:
-        for path in figure.files_in(folder):
-            path.unlink()

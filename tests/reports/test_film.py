@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -15,17 +12,9 @@ from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
 from reports import film
 from reports.rendering import camera_axes
-from reports.run.reading import SelectedRollOuts
-from tests.reports.report_folder import row, run_folder, run_of, sheet, write_mesh
+from tests.reports.report_folder import row, run_folder, sheet, write_mesh
 
 SCENE = "tshirt/walk"
-needs_opengl = pytest.mark.usefixtures("opengl")
-
-
-@pytest.fixture(scope="module")
-def opengl():
-    if subprocess.run([sys.executable, "-c", film.SWATCH], capture_output=True).returncode:
-        pytest.skip("no OpenGL without a screen on this machine")
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +39,7 @@ def filmed(run, path, *more) -> int:
     return film.main([*arguments, "-o", str(path), *more])
 
 
-@needs_opengl
-def test_a_gif_has_every_frame_in_its_time_and_the_same_bytes_twice(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(film, "SWATCH", "pass")  # it was tried above
+def test_a_gif_has_every_frame_in_its_time_and_the_same_bytes_twice(run, tmp_path):
     paths = [tmp_path / "x.gif", tmp_path / "y.gif"]
     assert [filmed(run, path, "--speed", ".5") for path in paths] == [0, 0]
     assert paths[0].read_bytes() == paths[1].read_bytes()
@@ -81,7 +68,6 @@ def test_a_gif_takes_its_time_and_no_frame_less_than_browsers_show(tmp_path, rat
     assert sum(lasted) == pytest.approx(1000 * 120 / rate, abs=10)
 
 
-@needs_opengl
 def test_an_mp4_has_every_frame(run, tmp_path):
     av = pytest.importorskip("av", reason="the extra [film] is not installed")
     assert filmed(run, tmp_path / "x.mp4") == 0
@@ -91,19 +77,17 @@ def test_an_mp4_has_every_frame(run, tmp_path):
         assert frames[0].width == 200
 
 
-@needs_opengl
-def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run, monkeypatch):
-    from reports.run.reading import select_roll_outs
+def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run):
+    selected = film.select_roll_outs(run, SCENE, ["simulation", "snug"])
+    frames = [np.asarray(frame, int) for frame in film.draw_frames(selected, 100, 25.0)]
+    assert len(frames) == 5 and list(selected.labels.values()) == ["Simulation", "SNUG"]
+    foot = slice(-4 * 12, -2 * 12)  # the last line of a view: letters are 12 pixels high
+    assert [(frame[foot, 100:] == film.INK[0]).any() for frame in frames] == [False, False, True, True, True]
+    cloth = selected.cloths["snug"]
+    assert np.array_equal(cloth.positions[-1], film.drawn(cloth, 4, (0.0, 0.0, 0.0)).positions)
 
-    labels: list[str] = []
-    monkeypatch.setattr(film, "_fitting", lambda draw, label, font, width: labels.append(label) or label)
-    frames = list(film.draw_frames(select_roll_outs(run, SCENE, ["simulation", "snug"]), 100, 25.0))
-    names = ["Simulation", "SNUG"]
-    assert len(frames) == 5 and labels == names + names + 3 * [*names, "ended at 0.03 s: ok"]
 
-
-def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(film, "SWATCH", "import os; os.kill(os.getpid(), 11)")  # no OpenGL is needed
+def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp_path):
     assert filmed(run, tmp_path / "x.pc2", "--methods", "snug") == 0
     assert {path.name for path in tmp_path.iterdir()} == {
         f"x_{name}.{ending}" for name in ("snug", "body") for ending in ("pc2", "obj")
@@ -116,10 +100,10 @@ def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp
         assert np.array_equal(first.faces, mesh.faces)
 
 
-def kept_of(*positions: np.ndarray) -> SelectedRollOuts:
+def kept_of(*positions: np.ndarray) -> film.SelectedRollOuts:
     faces = np.array([[0, 1, 2]])
     cloths = {str(k): Trajectory(x, faces, np.arange(len(x)) / 30.0) for k, x in enumerate(positions)}
-    return SelectedRollOuts(run_of([row(SCENE, "simulation")]), cloths, None)
+    return film.SelectedRollOuts(cloths, {}, None)
 
 
 def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
@@ -142,18 +126,13 @@ def test_a_single_frame_has_a_camera():
     assert centres.shape == (1, 3) and half > 0.0
 
 
-def test_the_normals_of_a_ball_that_moves_point_outwards():
-    import pyvista
-
-    ball = pyvista.Icosphere(radius=2.0, nsub=2)
-    film._move(ball, 0.5 * ball.points[None], 3)  # past its end
-    assert ball.point_data.active_normals == pytest.approx(ball.points, abs=0.02)
-
-
 @pytest.mark.parametrize(
     ("change", "hint"),
     [
-        (["--methods", "snug,simulatoin"], "no method in tshirt/walk is called 'simulatoin'"),
+        (
+            ["--methods", "snug,simulatoin"],
+            "no roll-out of 'simulatoin' in tshirt/walk: scenes",
+        ),
         (["-o", "x.avi"], "x.avi: a film ends in .mp4 or .gif, point caches in .pc2"),
         (["--speed", "0"], "--speed is 0.01 to 10"),
         (["--speed", "nan"], "--speed is 0.01 to 10"),
@@ -162,14 +141,9 @@ def test_the_normals_of_a_ball_that_moves_point_outwards():
 )
 def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, hint):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(film, "SWATCH", "pass")
     assert refused(hint, filmed, run, "x.gif", *change).startswith("reports.film: ")
 
 
-def test_without_opengl_or_the_extra_it_says_what_to_install(run, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(film, "SWATCH", "import os; os.kill(os.getpid(), 11)")
-    assert filmed(run, tmp_path / "x.gif") == 2
-    assert "libegl1" in capsys.readouterr().err
+def test_without_the_extra_it_says_what_to_install(run, tmp_path, monkeypatch, refused):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert filmed(run, tmp_path / "x.mp4") == 2
-    assert "pip install 'neural-garment-benchmark[film]'" in capsys.readouterr().err
+    refused("pip install 'neural-garment-benchmark[film]'", filmed, run, tmp_path / "x.mp4")

@@ -39,7 +39,7 @@ from tests.reports.report_folder import (
 )
 
 OLD = ("energy_series_flag.svg", "training_tunic.svg")
-KEPT = ("mine.png", "lead_mine.png", "map.txt", "gap-relative_against_cost-frame.svg")
+KEPT = ("mine.png", "map.txt", "gap-relative_against_cost-frame.svg")
 
 
 @pytest.fixture(scope="module")
