@@ -1,14 +1,8 @@
 """Body, garments and motions of a run: a user's files, each read once, and what is made for the body.
 
-A user's own body, garment and motions: each file is read once, when a run is planned.
-
-The digests are those of the contents as read, so that no file is opened a second time to know it again.
-
-The liveliest part of a motion, for suite speed: whole motions would take hours.
-
-A clip is the run of frames in which the joints are fastest on average, and the frames before it that are
-simulated and not evaluated. It begins in the midst of the motion, with the cloth as it is there: simulated
-from the motion's own start, see benchmarks.scenes.dressed_body.
+Digests are those of the contents as read. A clip of a motion, for suite speed, is the run of frames in which
+the joints are fastest on average, and the frames before it that are simulated and not evaluated. It begins in
+the midst of the motion, with the cloth as it is there: see benchmarks.scenes.dressed_body.
 """
 
 from __future__ import annotations
@@ -111,19 +105,17 @@ def read_inputs(
     >>> read_inputs().garment is None
     True
     """
-    worn = None if body is None else UserBody(body, _read_body(body))
+    worn = None
+    if body is not None:
+        from snug.body.smpl_files import read_body  # loads scipy
+
+        worn = UserBody(body, read_body(body))
     inputs = Inputs(worn, motions=_read_motions(motions, motion_options))
     if garment is None:
         return inputs
     from snug.garments.reading import read_garment  # it loads libraries of meshes
 
     return Inputs(worn, UserGarment(garment, read_garment(garment, inputs.wearer)), inputs.motions)
-
-
-def _read_body(path: Path) -> Body:
-    from snug.body.smpl_files import read_body  # loads scipy
-
-    return read_body(path)
 
 
 def _read_motions(paths: Sequence[str], options: MotionFileOptions | None) -> dict[str, Motion]:

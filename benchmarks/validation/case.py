@@ -79,7 +79,7 @@ class Case:
         """Measure here and now and return the row. What is raised becomes a failed row with its reason."""
         try:
             with slow_paths_allowed():
-                measured = self._imported(self.function)(**self.options)
+                measured = getattr(load(self.module), self.function)(**self.options)
             if isinstance(measured, Mapping):
                 measured = measured[self.name]
             if isinstance(measured, Measurement):
@@ -92,7 +92,7 @@ class Case:
     def warm_up(self) -> None:
         """Compile what the first case of a process would otherwise compile within its deadline."""
         with slow_paths_allowed():
-            self._imported("warm_up", lambda: None)()
+            getattr(load(self.module), "warm_up", lambda: None)()
 
     def judged(self, value: float, expected: float | None) -> Row:
         """Return the row of a number: ok where it is finite and within the tolerance of the expected one."""
@@ -117,23 +117,11 @@ class Case:
         terms: str = "",
     ) -> Row:
         """Return the row with these values; it expects what the case declares unless another is given."""
+        expected = self.expected if expected is None else expected
         return Row(
-            suite=self.suite,
-            scene=self.scene or self.name,
-            method=self.method,
-            seed=0,
-            metric=self.metric,
-            unit=self.unit,
-            value=value,
-            status=status,
-            reason=reason,
-            expected=self.expected if expected is None else expected,
-            tolerance=self.tolerance,
-            terms=terms,
-        )
-
-    def _imported(self, *name_and_default: Any) -> Any:
-        return getattr(load(self.module), *name_and_default)
+            self.suite, self.scene or self.name, self.method, 0, self.metric, self.unit, value=value,
+            status=status, reason=reason, expected=expected, tolerance=self.tolerance, terms=terms,
+        )  # fmt: skip
 
 
 _declared: dict[str, list[Case]] = defaultdict(list)  # by module

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
-import re
 import sys
-import threading
 from contextlib import nullcontext
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +12,6 @@ from benchmarks import check
 from benchmarks.contract import ContractError, check_derivatives
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.make_plan import check_garment_name
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import BatchCell
 from benchmarks.runner.ground_truth import SettleStart
@@ -24,7 +19,6 @@ from benchmarks.runner.task import Context
 from benchmarks.validation.equilibrium import DeadLoad
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring
-from snug.file_options import GarmentFile
 from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
 
@@ -158,43 +152,6 @@ def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatc
     assert "AttributeError" in look(lambda *, models, seed: object(), tmp_path, monkeypatch)
 
 
-@pytest.mark.parametrize(
-    ("how", "message"),
-    [
-        ("raise", "RuntimeError: broken on purpose"),
-        ("hungry", "MemoryError: no room"),
-        ("early", "positions still changed after run() had come back: wait in run() for all threads"),
-        ("unheld", "OSError: no room left for the held poses"),
-        ("crowded", "its time cannot be believed"),
-    ],
-)
-def test_the_check_catches_every_known_misbehaviour(how, message, tmp_path, monkeypatch):
-    from tests.benchmarks.runner import misbehaving
-
-    # What is still at work after run() would also be in the time of a batch.
-    fields = {"options": {"how": how}, "batched": how != "early"}
-    before = set(threading.enumerate())
-    assert message in look(misbehaving.make, tmp_path, monkeypatch, **fields)
-    for left in set(threading.enumerate()) - before:  # or they would be at work in the next test
-        left.join(2.0)
-
-
-@pytest.mark.parametrize(("how", "message"), [("segfault", "SIGSEGV"), ("hang", "no answer within 4 s")])
-def test_the_check_survives_what_dies_and_what_hangs(how, message, tmp_path, monkeypatch):
-    entry = MethodEntry(
-        name=how,
-        description="",
-        module=MISBEHAVING,
-        options={"how": how},
-        declared_in=MISBEHAVING,
-        needs_no_obstacle=True,
-    )
-    monkeypatch.setattr(check, "SCENES_OF_METHODS", ("free_fall",))
-    monkeypatch.setattr(check, "SIZES", dataclasses.replace(check.SIZES, cell_seconds=4.0))
-    verdicts = list(check.check_file(check.Declarations([entry]), tmp_path))
-    assert len(verdicts) == 1 and message in verdicts[0][1]
-
-
 def test_the_check_says_what_is_skipped_everywhere(tmp_path):
     entry = MethodEntry(name="m", description="", module=MISBEHAVING, package="nowhere")
     ((name, fault),) = check.check_file(check.Declarations([entry]), tmp_path)
@@ -227,10 +184,7 @@ def test_the_command_checks_what_files_declare(in_process, tmp_path, capsys):
 
 BOUND_FILE = """import numpy as np
 from benchmarks.method import Method, MethodEntry
-from benchmarks.plan.make_plan import check_garment_name
 from reference_sim import Trajectory
-from reference_sim.energies import StretchSpring
-from snug.file_options import GarmentFile
 
 METHODS = (MethodEntry(name="bound", label="Bound", description="", role="solver"),)
 
@@ -348,10 +302,3 @@ def test_the_command_refuses_in_one_line(word, message, tmp_path, monkeypatch, r
     (tmp_path / "empty.py").write_text("")
     monkeypatch.chdir(tmp_path)
     refused(message, check.main, [word])
-
-
-def test_garments_of_the_examples_have_names_that_a_file_can_have():
-    named = re.findall(r"--scene (\w+)/\S+ --garment (\S+)", check.EXAMPLES)
-    assert [scene for scene, _ in named] == [Path(file).stem for _, file in named] != []
-    for _, file in named:
-        check_garment_name(GarmentFile(path=Path(file)))

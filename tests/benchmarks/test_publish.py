@@ -33,14 +33,8 @@ def fall(tmp_path) -> str:
 
 def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     whole, target = tmp_path / "run", tmp_path / "published" / "run"
-    for name in (
-        "results.csv",
-        "run.json",
-        "report.pdf",
-        "tables/energies.csv",
-        "figures/lead.png",
-        "x.vtkhdf",
-    ):
+    made = "results.csv run.json report.pdf tables/energies.csv figures/lead.png x.vtkhdf"
+    for name in made.split():
         (whole / name).parent.mkdir(parents=True, exist_ok=True)
         (whole / name).write_text(name)
     (target / "tables").mkdir(parents=True)
@@ -83,14 +77,8 @@ def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
     """benchmarks.run ends with status 1 for a stalled simulation, whose numbers count."""
     folder = RunFolder(tmp_path)
     assert not all_usable(folder)  # no rows yet
-    fields = {
-        "scene": "tshirt/kick",
-        "method": "simulation",
-        "seed": 0,
-        "metric": "energy/total",
-        "unit": "J",
-    }
-    row = Row(suite=suite, status=status, reason="why" * (status != "ok"), value=1.0, **fields)
+    what = (suite, "tshirt/kick", "simulation", 0, "energy/total", "J")
+    row = Row(*what, status=status, reason="why" * (status != "ok"), value=1.0)
     folder.write_rows([row])
     folder.write_config(config)
     assert all_usable(folder) == usable
