@@ -3,40 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from benchmarks.assets import Inputs, read_inputs
+from benchmarks.assets import read_inputs
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import installed
 from benchmarks.methods import METHODS, find_method
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.choose_cells import Declared, choose_cells
-from benchmarks.plan.motions import Motions, split_motions
+from benchmarks.plan.choose_cells import ReadStudy, choose_cells
+from benchmarks.plan.motions import split_motions
 from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Plan
 from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.provenance import usable_cores
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import Scene
-from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, all_scenes
+from benchmarks.scenes import GarmentScenes, all_scenes
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
 from snug.file_options import GarmentFile
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
-
-
-@dataclass(frozen=True)
-class Read:
-    """A study whose files were read: names in place of files, inputs, motions by role, what is declared."""
-
-    study: Study
-    inputs: Inputs
-    motions: Motions
-    declared: Declared
 
 
 def make_plan(
@@ -74,11 +64,12 @@ def make_plan(
     check_machines(study, scheduler)
     folder = choose_folder(folder)
     states = choose_states(only, fresh=fresh)
-    processes = choose_workers(workers)
+    workers = min(WORKERS, usable_cores()) if workers is None else workers
+    if workers < 1:
+        raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
     read = read_files(study, scenes)
-    study, motions = read.study, read.motions
-    cells, cases = choose_cells(study, motions, read.declared)
-    check_body_shapes(study, read.inputs, [cell.scene for cell in cells])
+    cells, cases = choose_cells(read)
+    check_body_shapes(read, [cell.scene for cell in cells])
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
     return Plan(
         preset=study.sizes,
@@ -86,14 +77,14 @@ def make_plan(
         cells=cells,
         cases=cases,
         metrics=choose_metrics(study),
-        motions=motions,
+        motions=read.motions,
         inputs=read.inputs,
         seeds=study.seeds,
         device=study.device,
         folder=folder,
         only=states,
         fresh=fresh,
-        workers=processes,
+        workers=workers,
         scheduler=scheduler,
         trained=check_trained(study, folder, scheduler),
         command=command,
@@ -108,25 +99,30 @@ def plan_scene(study: Study, name: str) -> Plan:
         ValueError: one line for the first thing that cannot be met.
     """
     read = read_files(study)
-    declared = read.declared.scenes
-    if name not in declared:
-        raise StudyError(f"no scene '{name}'; {nearest(name, list(declared))}")
-    cell = Cell(declared[name].at(study.sizes), find_method("simulation"), 0, ("speed",))
-    check_body_shapes(study, read.inputs, [cell.scene])
+    if name not in read.scenes:
+        raise StudyError(f"no scene '{name}'; {nearest(name, list(read.scenes))}")
+    cell = Cell(read.scenes[name].at(study.sizes), find_method("simulation"), 0, ("speed",))
+    check_body_shapes(read, [cell.scene])
     return Plan(
         preset=study.sizes, suites=("speed",), cells=(cell,), cases=(), motions=read.motions,
         inputs=read.inputs, seeds=study.seeds, device="cpu", folder=Path(), command="", study=study.written,
     )  # fmt: skip
 
 
-def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
-    """Read all files of a user that a study names. Raises ValueError.
+def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
+    """Read all files of a user that a study names.
 
-    scenes: further ones that no file declares.
+    Args:
+        study: what is asked.
+        scenes: further ones that no file declares.
+
+    Raises:
+        ValueError: one line for the first file that cannot be read or named.
     """
     study, user_scenes, user_methods, user_cases = user_files.declarations_of(study)
-    if study.garment:
-        check_garment_name(study.garment)
+    if study.garment and study.garment.name in {name.split("/")[0] for name in all_scenes("-", "-")}:
+        what = f"garment {study.garment.path}: the project has scenes of that name"
+        raise StudyError(f"{what}: give the file another name")
     inputs = read_inputs(study.body, study.garment, study.motions, study.motion_files)
     motions = split_motions(study, inputs.motions)
     if study.garment:
@@ -135,20 +131,20 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> Read:
         if not installed("ipctk"):
             raise StudyError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
         motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
-    cases = tuple(by_name("known answer", (*CASES, *user_cases)).values())
-    taken = {case.name for case in cases}
+    cases = by_name("known answer", (*CASES, *user_cases))
     for scene in user_scenes:
-        if scene.name in taken:
-            raise DeclarationError(
-                f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name: give it "
-                "another"
-            )
-    of = motions
-    measured = dict.fromkeys((*of.measured, *of.test, *of.validation))
-    dynamic = dict.fromkeys((*of.dynamic_measured, *of.dynamic_test, *of.dynamic_validation))
-    known = (*all_scenes(measured, dynamic, of.worn).values(), *scenes, *user_scenes)
+        if scene.name in cases:
+            what = f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name"
+            raise DeclarationError(f"{what}: give it another")
+    roles, dynamic = motions.roles(), motions.roles(dynamic=True)
+    measured = all_scenes(
+        dict.fromkeys((*motions.measured, *roles["test"], *roles["validation"])),
+        dict.fromkeys((*motions.dynamic_measured, *dynamic["test"], *dynamic["validation"])),
+        motions.worn,
+    )
+    known = by_name("scene", (*measured.values(), *scenes, *user_scenes))
     methods = by_name("method", (*METHODS, *user_methods))
-    return Read(study, inputs, motions, Declared(by_name("scene", known), methods, cases))
+    return ReadStudy(study, inputs, motions, known, methods, tuple(cases.values()))
 
 
 def choose_metrics(study: Study) -> tuple[str, ...]:
@@ -167,40 +163,22 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
     return homes
 
 
-def check_garment_name(file: GarmentFile) -> None:
-    """Raise ValueError unless scenes can be named after the file of a garment, and none are."""
-    taken = {scene.split("/")[0] for scene in all_scenes((), ())} | {
-        scenes.garment for scenes in GARMENT_SCENES
-    }
-    if file.name in taken:
-        raise StudyError(
-            f"garment {file.path}: the project has scenes of that name: give the file another name"
-        )
-
-
-def check_body_shapes(study: Study, inputs: Inputs, scenes: Sequence[Scene]) -> None:
+def check_body_shapes(read: ReadStudy, scenes: Sequence[Scene]) -> None:
     """Raise StudyError for a user's body with fewer shapes than a scene of the project sets."""
-    count = inputs.body.body.shape_count if inputs.body else 0
-    for scene in scenes if inputs.body else ():
+    if not (body := read.inputs.body):
+        return
+    for scene in scenes:
         needed = 0 if scene.declared_in else len(scene.options.get("betas", ()))
-        if needed > count:
+        if needed > body.body.shape_count:
             raise StudyError(
-                f"body {study.body}: has {count} body shapes (array 'shapedirs'), scene {scene.name} "
-                f"needs {needed}: give a body with as many, or name other scenes by --scenes"
+                f"body {body.path}: has {body.body.shape_count} body shapes (array 'shapedirs'), scene "
+                f"{scene.name} needs {needed}: give a body with as many, or name other scenes by --scenes"
             )
 
 
 def scenes_of_file(file: GarmentFile) -> GarmentScenes:
     """Return the scenes of a user's garment, which take the place of the T-shirt's."""
     return GarmentScenes(file.name, f"a garment of {file.path.name}")
-
-
-def choose_workers(count: int | None) -> int:
-    """Return how many processes run side by side. Raises StudyError for less than one."""
-    workers = min(WORKERS, usable_cores()) if count is None else count
-    if workers < 1:
-        raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
-    return workers
 
 
 def choose_states(states: Sequence[str], *, fresh: bool) -> frozenset[str]:

@@ -7,45 +7,55 @@ from dataclasses import dataclass
 
 from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
+from snug.motion.library import (
+    DYNAMIC_TEST,
+    DYNAMIC_VALIDATION,
+    LIBRARY,
+    TEST,
+    TRAIN,
+    VALIDATION,
+    clip_of,
+)
 
 
 @dataclass(frozen=True)
 class Motions:
-    """Names of the motions of a run by their roles.
+    """Names of the motions of a run by their roles; garments that swing have others of the library.
 
-    files: those that came from a user's files. dynamic_*: those measured of garments that swing. worn: the
-    garments of the run; the first is that of a run where none is named. split: the role whose motions stand
-    in the suites' scenes, "test" or "validation". few: so many of them, the first, stand there; None: all.
+    files: those that came from a user's files. worn: the garments of the run; the first is that of a run
+    where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation".
+    few: so many of them, the first, stand there; None: all.
     """
 
     train: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
-    files: Collection[str] = ()
-    dynamic_test: tuple[str, ...] = ()
-    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
     validation: tuple[str, ...] = ()
-    dynamic_validation: tuple[str, ...] = ()
+    files: Collection[str] = ()
+    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
     split: str = "test"
     few: int | None = None
+
+    def roles(self, *, dynamic: bool = False) -> dict[str, tuple[str, ...]]:
+        """Return role -> names of the motions, or of those of garments that swing."""
+        validation, test = (DYNAMIC_VALIDATION, DYNAMIC_TEST) if dynamic else (self.validation, self.test)
+        return {"train": self.train, "validation": validation, "test": test}
 
     @property
     def measured(self) -> tuple[str, ...]:
         """Those of the split."""
-        return (self.test if self.split == "test" else self.validation)[: self.few]
+        return self.roles()[self.split][: self.few]
 
     @property
     def dynamic_measured(self) -> tuple[str, ...]:
         """The same for garments that swing."""
-        return (self.dynamic_test if self.split == "test" else self.dynamic_validation)[: self.few]
+        return self.roles(dynamic=True)[self.split][: self.few]
 
     def role_of(self, motion: str) -> str:
         """Return its role: "training", "validation", "test", or empty where it has none in this run."""
-        roles = {
-            "test": (*self.test, *self.dynamic_test),
-            "validation": (*self.validation, *self.dynamic_validation),
-            "training": self.train,
-        }
-        return next((role for role, names in roles.items() if motion in names), "")
+        for role, name in (("test", "test"), ("validation", "validation"), ("train", "training")):
+            if motion in (*self.roles()[role], *self.roles(dynamic=True)[role]):
+                return name
+        return ""
 
     @property
     def first_garment(self) -> str:
@@ -54,9 +64,7 @@ class Motions:
 
     def by_role(self, garment: str) -> dict[str, tuple[str, ...]]:
         """Return role -> names of a garment's motions."""
-        if of_garment(garment, self.worn).dynamic:
-            return {"train": self.train, "validation": self.dynamic_validation, "test": self.dynamic_test}
-        return {"train": self.train, "validation": self.validation, "test": self.test}
+        return self.roles(dynamic=of_garment(garment, self.worn).dynamic)
 
     def measured_of(self, garment: str) -> tuple[str, ...]:
         """Return the names of a garment's motions of the split."""
@@ -79,50 +87,32 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     Raises:
         StudyError: a name that no motion has, or a split without motions.
     """
-    from snug.motion.library import (
-        DYNAMIC_TEST,
-        DYNAMIC_VALIDATION,
-        LIBRARY,
-        TEST,
-        TRAIN,
-        VALIDATION,
-        clip_of,
-    )
-
-    test_names, validation_names = study.test_motions, study.validation_motions
-    with_library = "library" in study.motions or not files
-    learned = dict.fromkeys((*sorted(files), *(TRAIN if with_library else ())))
-    names = list(dict.fromkeys((*learned, *(LIBRARY if with_library else ()))))
-    for field, chosen in (("test_motions", test_names), ("validation_motions", validation_names)):
+    library = "library" in study.motions or not files
+    of_library = (*VALIDATION, *TEST) if library else ()
+    learned = dict.fromkeys((*sorted(files), *(TRAIN if library else ())))
+    names = list(dict.fromkeys((*learned, *(LIBRARY if library else ()))))
+    tested = {clip_of(name) for name in (*study.test_motions, *(TEST if library else ()))}
+    roles: dict[str, tuple[str, ...]] = {}
+    for role, chosen in (("test", study.test_motions), ("validation", study.validation_motions)):
         for name in chosen:
+            place = study.place(f"{role}_motions")
             if name not in names:
-                raise StudyError(f"{study.place(field)}: unknown motion '{name}'; {nearest(name, names)}")
-    tested = {clip_of(name) for name in (*test_names, *(TEST if with_library else ()))}
-    for name in validation_names:
-        if clip_of(name) in tested:
-            place = study.place("validation_motions")
-            raise StudyError(f"{place}: '{name}' is a test motion; choose others")
-    # Whoever names motions means all of them, whatever the sizes.
-    named = test_names if study.split == "test" else validation_names
-    test = tuple(name for name in names if name in test_names)
-    if not test:
-        test = TEST if with_library else tuple(n for n in learned if n not in validation_names)[:1]
-    validation = tuple(name for name in names if name in validation_names)
-    if with_library and not validation:
-        validation = tuple(name for name in VALIDATION if clip_of(name) not in tested)
-    of_library = (*VALIDATION, *TEST) if with_library else ()
+                raise StudyError(f"{place}: unknown motion '{name}'; {nearest(name, names)}")
+            if role == "validation" and clip_of(name) in tested:
+                raise StudyError(f"{place}: '{name}' is a test motion; choose others")
+        roles[role] = tuple(name for name in names if name in chosen)
+    test, validation = roles["test"], roles["validation"]
+    if library:
+        test = test or TEST
+        validation = validation or tuple(name for name in VALIDATION if clip_of(name) not in tested)
+    test = test or tuple(name for name in learned if name not in validation)[:1]
     held_out = {clip_of(name) for name in (*test, *validation, *of_library)}
     train = tuple(name for name in learned if clip_of(name) not in held_out)
     train = train or tuple(name for name in TRAIN if name not in held_out)
+    # Whoever names motions means all of them, whatever the sizes.
+    few = None if getattr(study, f"{study.split}_motions") else study.sizes.test_motions
     motions = Motions(
-        train=train[: study.sizes.train_motions],
-        test=test,
-        files=tuple(files),
-        dynamic_test=DYNAMIC_TEST,
-        validation=validation,
-        dynamic_validation=DYNAMIC_VALIDATION,
-        split=study.split,
-        few=None if named else study.sizes.test_motions,
+        train[: study.sizes.train_motions], test, validation, tuple(files), split=study.split, few=few
     )
     if not motions.measured:
         raise StudyError(

@@ -6,19 +6,16 @@ Light, so that --help answers at once.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import parse_roll_out
-from benchmarks.methods import METHODS
-from benchmarks.plan.choose_cells import expanded, matching
-from benchmarks.plan.motions import split_motions
+from benchmarks.plan.choose_cells import matching, scenes_of_parts
+from benchmarks.plan.make_plan import read_files
 from benchmarks.plan.study import Layer, Study, option, parse_setting, read_study, study_names
 from benchmarks.presets import PRESETS
-from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES
-from benchmarks.scenes.variations import shapes, there_and_back
-from benchmarks.validation.registry import CASES
 from reference_sim.command_line import Parser
 from snug.file_options import split_words
 
@@ -55,29 +52,19 @@ SHORT = {  # field -> its placeholder in help; those of a scene first
 }  # fmt: skip
 OF_SCENES = tuple(SHORT)[:4]
 SINGLE = ("body", "garment", "trained")  # given once
-REPLACED = {  # former option -> field of a study
+WORDS = {  # what now stands behind a path: former options
+    "ROLLOUT,units=cm": "units up fps match-vertices other-mesh declared-ms name",
+    "--motions PATH,up=z": "motion-up motion-fps joint-map repair",
+    "--garment FILE,units=cm": "garment-units garment-up garment-shift garment-rest garment-uv-scale "
+    "garment-material",
+}
+REPLACED = {  # former option -> what to say in its place
     "--preset": "name a study (smoke, paper), or --set sizes=NAME",
     "--suite": "name parts of a study: python -m benchmarks.run full:NAME",
-    "--metrics": "--set metrics=FILE",
-    "--split": "--set split=validation",
     "--frames": "--set sizes.frames=N",
-    "--device": "--set device=cuda",
-    "--self-contact": "--set self_contact=true",
-    "--validation-motions": "--set validation_motions=NAME,...",
-    "--motion-up": "--motions PATH,up=z",
-    "--motion-fps": "--motions PATH,fps=N",
-    "--joint-map": "--motions PATH,joint_map=FILE",
-    "--repair": "--motions PATH,repair",
-    "--units": "ROLLOUT,units=cm",
-    "--up": "ROLLOUT,up=z",
-    "--fps": "ROLLOUT,fps=N",
-    "--match-vertices": "ROLLOUT,match-vertices",
-    "--other-mesh": "ROLLOUT,other-mesh",
-    "--declared-ms": "ROLLOUT,ms=N",
-    "--name": "NAME=ROLLOUT",
-    **{f"--garment-{word}": f"--garment FILE,{word.replace('-', '_')}=..."
-       for word in ("units", "up", "shift", "rest", "uv-scale", "material")},
-}  # fmt: skip
+    **{f"--{f.name.replace('_', '-')}": f"--set {f.name}=..." for f in fields(Study) if f.name not in SHORT},
+    **{f"--{name}": f"say it behind a path: {place}" for place in WORDS for name in WORDS[place].split()},
+}
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -110,19 +97,22 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def add_study_options(parser: argparse.ArgumentParser, fields: Sequence[str] = OF_SCENES) -> None:
+def add_study_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF_SCENES) -> None:
     """Add --set and the short forms of these fields; those of a scene are the same in every command."""
     texts = attributes_of(Study)
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", dest="settings",
         help="another value of a field of the study, as split=validation or sizes.frames=60; repeatable"
     )  # fmt: skip
-    for field in fields:
+    for field in short:
         more: dict[str, Any] = {} if field in SINGLE else {"action": "append", "default": []}
         more |= {"nargs": "?", "const": True} if field == "trained" else {}
-        name = "--rollout" if field == "rollouts" else f"--{field.replace('_', '-')}"
         parser.add_argument(
-            name, dest=field, metavar=SHORT[field], help=f"field {field}: {texts[field]}", **more
+            _label(field), dest=field, metavar=SHORT[field], help=f"field {field}: {texts[field]}", **more
         )
+
+
+def _label(field: str) -> str:
+    return "--rollout" if field == "rollouts" else f"--{field.replace('_', '-')}"
 
 
 def study_of(options: argparse.Namespace, name: str = "default") -> Study:
@@ -131,27 +121,26 @@ def study_of(options: argparse.Namespace, name: str = "default") -> Study:
 
 
 def _layers(options: argparse.Namespace) -> Iterator[Layer]:
+    """Yield the fields that short forms give; words behind the path of motions are field motion_files."""
     for field in SHORT:
-        if not (given := getattr(options, field, None)):
+        value: Any = getattr(options, field, None)
+        if not value:
             continue
-        label = f"--{field.replace('_', '-')}"
-        value: Any = given if field in (*SINGLE, "motions") else split(given)
-        if field == "seeds":
-            value = [_whole_number(word) for word in value]
         if field == "garment":
-            path, words = split_words(given)
+            path, words = split_words(value)
             value = {"path": path, **words}
-        if field == "motions":
-            value, words = zip(*map(split_words, given))
-            if any(words):
-                yield option(label, "motion_files", {n: v for one in words for n, v in one.items()})
-        if field == "rollouts":
-            label, value = "--rollout", dict(map(parse_roll_out, given))
-        yield option(label, field, list(value) if isinstance(value, tuple) else value)
-
-
-def _whole_number(word: str) -> int | str:
-    return int(word) if word.removeprefix("-").isdecimal() else word
+        elif field == "motions":
+            paths = list(map(split_words, value))
+            value = [path for path, _ in paths]
+            if words := {name: word for _, given in paths for name, word in given.items()}:
+                yield option(_label(field), "motion_files", words)
+        elif field == "rollouts":
+            value = dict(map(parse_roll_out, value))
+        elif field not in SINGLE:
+            value = list(split(value))
+        if field == "seeds":
+            value = [int(word) if word.removeprefix("-").isdecimal() else word for word in value]
+        yield option(_label(field), field, value)
 
 
 def split(values: Sequence[str]) -> tuple[str, ...]:
@@ -164,66 +153,42 @@ def split(values: Sequence[str]) -> tuple[str, ...]:
 
 
 def list_names(study: Study) -> str:
-    """Return studies, scenes, methods, motions, sizes and cases, one line each.
+    """Return studies, scenes, methods, motions, sizes and known answers, one line each.
 
     Every scene and method can be named in every study. Those that take part without being named are those of
     the given study.
     """
-    from snug.motion.library import CLIPS, CONTROL, DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, TRAIN, VALIDATION
-
-    swinging = dict.fromkeys(DYNAMIC_TEST, "test") | dict.fromkeys(DYNAMIC_VALIDATION, "validation")
-    roles = dict.fromkeys(TEST, "test") | dict.fromkeys(VALIDATION, "validation") | swinging
-    dressed = [
-        (scene.name, f"{scene.description} ({role})")
-        for scenes in GARMENT_SCENES
-        for motion, role in (swinging if scenes.dynamic else roles).items()
-        for scene in (scenes.scene(motion),)
-    ]
-    plain = (*SCENES, there_and_back(TEST[0]), *shapes(TEST[0]), *FURTHER_SCENES)
-    motions = split_motions(study)
-    found = [
-        *dict.fromkeys((*(s.name for s in plain), *(n + clip for n, _ in dressed for clip in ("", "@clip"))))
-    ]
-    taken = {name: matching(found, expanded(part.scenes, motions)) for name, part in study.parts.items()}
-    parts = (
-        ("studies", ((name, read_study(name).question) for name in study_names())),
-        ("parts of this study", ((name, part.question) for name, part in study.parts.items())),
-        ("scenes of each part where none is named", ((n, ", ".join(s)) for n, s in taken.items() if s)),
-        (
-            f"scenes; of a dressed body, in a test or validation motion, also its liveliest part, as "
-            f"{dressed[0][0]}@clip",
-            [*((s.name, s.description) for s in plain), *dressed],
-        ),
-        (
-            "methods, and the parts in which they take part without being named",
-            ((m.name, f"{m.description} [{_parts_of(m.name, study) or 'when named'}]") for m in METHODS),
-        ),
-        (
-            "training motions",
-            ((name, f"{CLIPS[name].content}, {CLIPS[name].frames} frames") for name in TRAIN),
-        ),
-        ("motions without a role", ((name, "") for name in CONTROL)),
-        ("sizes", ((p.name, p.description) for p in PRESETS)),
-        *((f"cases of part {name}", _cases(name)) for name in dict.fromkeys(c.suite for c in CASES)),
-    )
-    return "\n\n".join(_section(title, rows) for title, rows in parts)
+    read = read_files(study)
+    roles, parts = read.motions.role_of, study.parts
+    whole = [scene for scene in read.scenes.values() if scene.part != "clip"]
+    in_parts = {
+        method.name: ", ".join(n for n, part in parts.items() if matching([method.name], part.methods))
+        for method in read.methods.values()
+    }
+    sections: dict[str, dict[str, str]] = {
+        "studies": {name: read_study(name).question for name in study_names()},
+        "parts of this study": {name: part.question for name, part in parts.items()},
+        "scenes of each part where none is named": {
+            name: ", ".join(scenes) for name, scenes in scenes_of_parts(read).items() if scenes
+        },
+        "scenes; of a dressed body, in a test or validation motion, also its liveliest part, as in "
+        f"{read.motions.first_garment}/{read.motions.measured[0]}@clip": {
+            scene.name: scene.description + (f" ({roles(scene.motion)})" if scene.dressed else "")
+            for scene in whole
+        },
+        "methods, and the parts in which they take part without being named": {
+            name: f"{read.methods[name].description} [{known or 'when named'}]"
+            for name, known in in_parts.items()
+        },
+        "training motions": dict.fromkeys(read.motions.train, ""),
+        "sizes": {preset.name: preset.description for preset in PRESETS},
+        "known answers": {case.name: f"{case.description} [{case.suite}]" for case in read.cases},
+    }
+    return "\n\n".join(_section(title, rows) for title, rows in sections.items())
 
 
-def _parts_of(method: str, study: Study) -> str:
-    return ", ".join(name for name, part in study.parts.items() if matching([method], part.methods))
-
-
-def _cases(suite: str) -> list[tuple[str, str]]:
-    """Return the cases of a suite; those that share a scene in one line."""
-    by_scene: dict[str, list[str]] = {}
-    for case in (case for case in CASES if case.suite == suite):
-        by_scene.setdefault(f"{case.scene}/*" if case.scene else case.name, []).append(case.description)
-    return [(name, f"{len(d)} points, {d[0]} the first" if d[1:] else d[0]) for name, d in by_scene.items()]
-
-
-def _section(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    rows = list(rows)
-    if not any(description for _, description in rows):
-        return f"{title}\n  {', '.join(name for name, _ in rows)}"
-    width = max(len(name) for name, _ in rows)
-    return "\n".join([title, *(f"  {name:<{width}}  {description}".rstrip() for name, description in rows)])
+def _section(title: str, rows: Mapping[str, str]) -> str:
+    if not any(rows.values()):
+        return f"{title}\n  {', '.join(rows)}"
+    width = max(map(len, rows))
+    return "\n".join([title, *(f"  {name:<{width}}  {rows[name]}".rstrip() for name in rows)])

@@ -16,7 +16,7 @@ from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_ty
 
 from benchmarks.assets import FEWEST_FRAMES, LIBRARY
 from benchmarks.external.roll_out_files import RollOutOption, roll_out_of
-from benchmarks.presets import PRESETS, Preset, find_preset
+from benchmarks.presets import Preset, find_preset
 from snug.file_options import GarmentFile, MotionFileOptions
 from snug.trained import FOLDER
 
@@ -47,8 +47,6 @@ class Part:
         scenes: names, patterns and files of scenes.
         optional_scenes: those that take part only where field `scenes` of the study names them.
         methods: names, patterns and files of methods.
-        optional_methods: those that take part only where field `methods` of the study names them.
-        untrained: scenes for which no network is trained unless field `scenes` of the study names them.
         cases: names, patterns and files of known answers; {smoke} for those marked so, {short} for all but
             long.
     """
@@ -57,8 +55,6 @@ class Part:
     scenes: tuple[str, ...] = ()
     optional_scenes: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()
-    optional_methods: tuple[str, ...] = ()
-    untrained: tuple[str, ...] = ()
     cases: tuple[str, ...] = ()
 
 
@@ -91,7 +87,7 @@ class Study:
         parts: name -> scenes that meet methods.
         sizes: smoke, quick or paper; or a table of changes to one of them, which `base` names.
         scenes: only these: names, patterns, files (mine.py) of scenes; without any all of the parts.
-        methods: only these: names, patterns, files (mine.py) of methods; without any all of the parts.
+        methods: these in every part, in place of its own: names, patterns, files (mine.py) of methods.
         metrics: files of your own metrics, measured besides all others.
         seeds: seeds of training.
         motions: motion files (.npz, .bvh, .amc with .asf), folders, or the word library (default).
@@ -206,12 +202,12 @@ def read_study(word: str = "default", options: Sequence[Layer] = ()) -> Study:
     for layer in reversed(layers):
         merged = _merged(merged, layer.table)
     merged.pop("like", None)
-    parts = merged.get("parts", {})
-    for part in filter(None, chosen.split(",")):
-        if part not in parts:
-            raise StudyError(f"study {name}: no part '{part}'; it has {', '.join(parts)}")
     if chosen:
-        merged["parts"] = {part: table for part, table in parts.items() if part in chosen.split(",")}
+        parts, names = merged.get("parts", {}), [part for part in chosen.split(",") if part]
+        for part in names:
+            if part not in parts:
+                raise StudyError(f"study {name}: no part '{part}'; it has {', '.join(parts)}")
+        merged["parts"] = {part: parts[part] for part in parts if part in names}
     reader = _Reader(layers)
     study: Study = reader.dataclass_of(Study, merged, ())
     return replace(study, written={"name": word, **merged}, origin=reader.place)
@@ -343,15 +339,19 @@ class _Reader:
     def place(self, field: Field) -> str:
         """Return where a field was said."""
         layer = self.layer(field)
-        return (
-            f"{layer.label}: line {line_of(layer.text, field)}: {'.'.join(field)}"
-            if layer.text
-            else layer.label
-        )
+        line = f": line {line_of(layer.text, field)}: {'.'.join(field)}"
+        return f"{layer.label}{line if layer.text else ''}"
 
     def refuse(self, field: Field, message: str) -> NoReturn:
         """Raise StudyError with the place."""
         raise StudyError(f"{self.place(field)}: {message}")
+
+    def checked(self, field: Field, make: Callable[[], Any]) -> Any:
+        """Return what `make` makes; what it refuses gets its place."""
+        try:
+            return make()
+        except ValueError as error:
+            self.refuse((*field, *getattr(error, "field", ())), str(error))
 
     def dataclass_of(self, kind: Any, table: Any, field: Field) -> Any:
         """Return an object of a dataclass from the table of its fields."""
@@ -360,37 +360,22 @@ class _Reader:
         if kind is RollOutOption:
             place = {"path": str(self.layer(field).folder / str(table.get("path", "")))}
             return self.checked(field, lambda: roll_out_of(field[-1], {**table, **place}))
+        if kind is Preset:  # changes to the sizes that `base` names
+            table = dict(table)
+            base = self.checked((*field, "base"), lambda: find_preset(table.pop("base", "quick")))
         declared = {f.name: f for f in fields(kind) if f.name not in HIDDEN.get(kind, ())}
         for name in table:
-            if name not in declared and (kind, name) != (Preset, "base"):
-                names = ", ".join(declared)
-                near = nearest(name, list(declared), otherwise=f"there are {names}")
+            if name not in declared:
+                near = nearest(name, list(declared), otherwise=f"there are {', '.join(declared)}")
                 self.refuse((*field, name), f"no field is called '{name}'; {near}")
         if kind is Preset:
-            return self.sizes(table, declared, field)
+            table = _merged(asdict(base), table)
         for name, f in declared.items():
             if f.default is MISSING and f.default_factory is MISSING and name not in table:
                 self.refuse(field, f"{name} is absent: give it")
         hints = get_type_hints(kind)
         values = {name: self.value(hints[name], value, (*field, name)) for name, value in table.items()}
         return self.checked(field, lambda: kind(**values))
-
-    def checked(self, field: Field, make: Any) -> Any:
-        """Return what `make` makes; what it refuses gets its place."""
-        try:
-            return make()
-        except ValueError as error:
-            self.refuse((*field, *getattr(error, "field", ())), str(error))
-
-    def sizes(self, table: Mapping[str, Any], declared: Any, field: Field) -> Preset:
-        """Return the sizes that `base` names, with changes."""
-        base = table.get("base", "quick")
-        if base not in (names := [preset.name for preset in PRESETS]):
-            self.refuse((*field, "base"), f"no sizes are called '{base}'; choose from {', '.join(names)}")
-        preset, hints = find_preset(base), get_type_hints(Preset)
-        changes = {name: value for name, value in table.items() if name != "base"}
-        whole = _merged({name: asdict(preset)[name] for name in declared}, changes)
-        return replace(preset, **{n: self.value(hints[n], whole[n], (*field, n)) for n in changes})
 
     def value(self, hint: Any, value: Any, field: Field) -> Any:
         """Return the value of a field as its type asks for it."""
@@ -403,8 +388,6 @@ class _Reader:
             return value
         if origin is tuple:
             values = value if isinstance(value, list | tuple) else [value]
-            if types[-1] is not Ellipsis and len(values) != len(types):
-                self.refuse(field, f"{value!r}: give {len(types)} numbers")
             return tuple(self.value(types[0], v, field) for v in values)
         if origin in (dict, Mapping):
             if not isinstance(value, Mapping):
@@ -416,13 +399,12 @@ class _Reader:
 
     def word(self, kind: Any, value: Any, field: Field) -> Any:
         """Return a number, a text or a path; paths of a file are relative to its folder."""
-        if kind is Path and field == ("trained",) and isinstance(value, bool):
+        if field == ("trained",) and isinstance(value, bool):
             return FOLDER if value else None
         if kind is float and type(value) is int:
             return float(value)
         if type(value) is not (str if kind is Path else kind):
             self.refuse(field, f"{value!r}: give {KINDS.get(kind, 'a path')}")
-        if kind is Path:
-            return self.layer(field).folder / value
+        folder = self.layer(field).folder
         file = kind is str and (value.endswith(".py") or (field == ("motions",) and value != LIBRARY))
-        return str(self.layer(field).folder / value) if file else value
+        return folder / value if kind is Path else str(folder / value) if file else value

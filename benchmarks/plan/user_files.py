@@ -6,10 +6,9 @@ that every process can load it.
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -17,6 +16,8 @@ from typing import Any, NamedTuple
 from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
 from benchmarks.method import MethodEntry
 from benchmarks.methods.declared_networks import TRAININGS
+from benchmarks.metric import Metric
+from benchmarks.metrics import MEASUREMENTS
 from benchmarks.plan.study import Part, Study
 from benchmarks.provenance import digest, find_module, imported_beside
 from benchmarks.scene import Scene
@@ -26,150 +27,108 @@ from benchmarks.validation.case import Case, cases_of
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A kind of declaration: the word of the command line, the tuple, and the function that stands beside."""
+class Kind(NamedTuple):
+    """A kind of declaration: its field in a study, tuple, entries, and the function that stands beside."""
 
     word: str
     tuple_name: str
-    function: str
-
-    @property
-    def entry(self) -> type:
-        """The class of the entries."""
-        if self.word == "metrics":  # loads numpy: only for whoever has one
-            from benchmarks.metric import Metric
-
-            return Metric
-        return MethodEntry if self.word == "methods" else Scene
+    entry: type
+    function: str = ""
 
 
-METHODS = Kind("methods", "METHODS", "make")
-SCENES = Kind("scenes", "SCENES", "build")
-METRICS = Kind("metrics", "METRICS", "measure")
+METHODS = Kind("methods", "METHODS", MethodEntry, "make")
+SCENES = Kind("scenes", "SCENES", Scene, "build")
+METRICS = Kind("metrics", "METRICS", Metric, "measure")
 KINDS = (METHODS, SCENES, METRICS)
-CASES = Kind("cases", "", "")  # declared by @known_answer, which stands on the function
+CASES = Kind("cases", "", Case)  # declared by @known_answer, which stands on the function
+OF_FIELD = {"scenes": SCENES, "optional_scenes": SCENES, "methods": METHODS, "cases": CASES}
 
 
-def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[list[str], list[Any]]:
-    """Return the names that an option means, and the entries that files among them declare.
-
-    Args:
-        kind: what is declared.
-        names_and_paths: names, and paths that end with ".py"; a path stands for the names that its file
-            declares.
+def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[tuple[str, ...], list[Any]]:
+    """Return names, and the entries that files among them (*.py) declare, whose names stand in their places.
 
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
     """
-    names: list[str] = []
-    entries: dict[str, list[Any]] = {}
-    for word in names_and_paths:
-        if not word.endswith(".py"):
-            names.append(word)
-            continue
-        file = file_of(word)
-        entries[file] = entries_of(kind, file)
-        names += [entry.name for entry in entries[file]]
-    return names, [entry for some in entries.values() for entry in some]
+    files = {w: entries_of(kind, file_of(w)) for w in names_and_paths if w.endswith(".py")}
+    names = [[e.name for e in files[w]] if w in files else [w] for w in names_and_paths]
+    return tuple(name for some in names for name in some), [e for some in files.values() for e in some]
 
 
-class Users(NamedTuple):
-    """A study with the names that its files declare in their places, and what they declare."""
-
-    study: Study
-    scenes: list[Scene]
-    methods: list[MethodEntry]
-    cases: list[Case]
-
-
-def declarations_of(study: Study) -> Users:
+def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry], list[Case]]:
     """Read the files that a study names; a known answer belongs to the part that names its file.
 
+    Returns:
+        The study with names in place of files, and the scenes, methods and known answers that they declare.
+
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
     """
-    entries: dict[Kind, dict[tuple[str, str], Any]] = {SCENES: {}, METHODS: {}, CASES: {}}
+    found: dict[Kind, list[Any]] = {SCENES: [], METHODS: [], CASES: []}
 
     def named(of: Study | Part, suite: str = "") -> Any:
         changes: dict[str, Any] = {}
-        for kind, found in entries.items():
-            for field in (kind.word, f"optional_{kind.word}"):
-                if any(word.endswith(".py") for word in getattr(of, field, ())):
-                    names, declared = resolve(kind, getattr(of, field))
-                    changes[field] = tuple(names)
-                    if kind is CASES:
-                        declared = [dataclasses.replace(case, suite=suite) for case in declared]
-                    found |= {(getattr(e, "declared_in", suite), e.name): e for e in declared}
-        return dataclasses.replace(of, **changes)
+        for field, kind in OF_FIELD.items():
+            changes[field], entries = resolve(kind, getattr(of, field, ()))
+            entries = [replace(case, suite=suite) for case in entries] if kind is CASES else entries
+            found[kind] += [entry for entry in entries if entry not in found[kind]]
+        return replace(of, **{field: names for field, names in changes.items() if hasattr(of, field)})
 
     parts = {name: named(part, name) for name, part in study.parts.items()}
-    study = dataclasses.replace(named(study), parts=parts)
-    scenes, methods, cases = (list(of_kind.values()) for of_kind in entries.values())
-    check_networks(methods)
-    return Users(study, scenes, methods, cases)
+    study = replace(named(study), parts=parts)
+    check_networks(found[METHODS])
+    return study, found[SCENES], found[METHODS], found[CASES]
 
 
 def check_networks(entries: Sequence[MethodEntry]) -> None:
     """Raise DeclarationError where two trainings have one name: one network would be the other's."""
     trainings: dict[str, Training | None] = {**TRAININGS, "untrained": None}
-    for entry in entries:
-        if entry.trained is None:
-            continue
-        what = f"{entry.declared_in}: method '{entry.name}'"
-        if entry.training is None and entry.trained not in trainings:
-            raise DeclarationError(
-                f"{what}: no training is called '{entry.trained}': say training=Training(...)"
-            )
-        if entry.training and trainings.setdefault(entry.trained, entry.training) != entry.training:
-            raise DeclarationError(
-                f"{what}: another training is called '{entry.trained}': give trained=another"
-            )
+    for entry in (entry for entry in entries if entry.trained is not None):
+        what, name = f"{entry.declared_in}: method '{entry.name}'", str(entry.trained)
+        known = entry.training or name in trainings
+        _demand(known, f"{what}: no training is called '{name}': say training=Training(...)")
+        same = not entry.training or trainings.setdefault(name, entry.training) == entry.training
+        _demand(same, f"{what}: another training is called '{name}': give trained=another")
 
 
 def file_of(word: str) -> str:
     """Return the absolute path of a file that is there. Raises DeclarationError."""
-    path = Path(word)
-    if not path.is_file():
-        raise DeclarationError(f"{word}: no such file")
-    return str(path.resolve())
+    _demand(Path(word).is_file(), f"{word}: no such file")
+    return str(Path(word).resolve())
 
 
 def entries_of(kind: Kind, home: str) -> list[Any]:
     """Return what a file declares of that kind. Raises DeclarationError."""
     module = import_file(home)
     if kind is CASES:
-        if not (cases := cases_of(module.__name__)):
-            raise DeclarationError(f"{home}: declares no known answer, a function with @known_answer")
-        return [dataclasses.replace(case, module=home) for case in cases]
+        cases = cases_of(module.__name__)
+        _demand(cases, f"{home}: declares no known answer, a function with @known_answer")
+        return [replace(case, module=home) for case in cases]
     declared = getattr(module, kind.tuple_name, None)
     if not isinstance(declared, tuple | list) or not all(isinstance(entry, kind.entry) for entry in declared):
         raise DeclarationError(f"{home}: declares no {kind.tuple_name}, a tuple of {kind.entry.__name__}")
-    if not declared:
-        raise DeclarationError(f"{home}: {kind.tuple_name} is empty")
+    _demand(declared, f"{home}: {kind.tuple_name} is empty")
     by_name(kind.word[:-1], declared)
-    return [_placed(kind, entry, module, home) for entry in declared]
-
-
-def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
-    """Return the entry with the file that declares it, and all paths made absolute."""
-    what = f"{home}: {kind.word[:-1]} '{entry.name}'"
+    has_function = callable(getattr(module, kind.function, None))
     if kind is METRICS:
-        _demand(callable(getattr(module, kind.function, None)), f"{home}: has no function {kind.function}")
-        return dataclasses.replace(entry, declared_in=home)
-    if not NAME.fullmatch(entry.name):
-        raise DeclarationError(f"{what}: use letters, digits and _ + - . / @ : in its name")
-    folder = Path(find_module(home)).parent
+        _demand(has_function, f"{home}: has no function {kind.function}")
+        return [replace(entry, declared_in=home) for entry in declared]
+    entries = [_placed(kind, entry, home) for entry in declared]
+    _demand(has_function or home not in {entry.module for entry in entries},
+            f"{home}: has no function {kind.function}")  # fmt: skip
+    return entries
+
+
+def _placed(kind: Kind, entry: Any, home: str) -> Any:
+    """Return the entry with the file that declares it, and all paths made absolute."""
+    what, folder = f"{home}: {kind.word[:-1]} '{entry.name}'", Path(find_module(home)).parent
+    _demand(NAME.fullmatch(entry.name), f"{what}: use letters, digits and _ + - . / @ : in its name")
     for field in ("files", "sizes", "metrics"):
         names = getattr(entry, field, None) or ()
         listed = isinstance(names, tuple | list) and all(isinstance(name, str) for name in names)
         _demand(listed, f"{what}: {field}={names!r}: give a tuple of strings")
-    if measured := set(getattr(entry, "metrics", None) or ()):
-        from benchmarks.metrics import MEASUREMENTS  # loads numpy
-
-        known = [measurements.name for measurements in MEASUREMENTS]
-        wrong = f"{what}: metrics={entry.metrics!r}: choose from {', '.join(known)}"
-        _demand(measured <= {*known}, wrong)
+    measured, known = getattr(entry, "metrics", None) or (), [m.name for m in MEASUREMENTS]
+    _demand({*measured} <= {*known}, f"{what}: metrics={measured!r}: choose from {', '.join(known)}")
     try:
         digest(dict(entry.options))
     except (TypeError, ValueError) as error:
@@ -186,12 +145,10 @@ def _placed(kind: Kind, entry: Any, module: ModuleType, home: str) -> Any:
         find_module(source)
     except DeclarationError as error:
         raise DeclarationError(f"{what}: {error}") from None
-    if source == home:
-        _demand(callable(getattr(module, kind.function, None)), f"{home}: has no function {kind.function}")
-    return dataclasses.replace(entry, module=source, declared_in=home, files=files)
+    return replace(entry, module=source, declared_in=home, files=files)
 
 
-def _demand(fine: bool, otherwise: str) -> None:
+def _demand(fine: object, otherwise: str) -> None:
     if not fine:
         raise DeclarationError(otherwise)
 

@@ -7,8 +7,6 @@ import torch
 
 from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
 from benchmarks.methods.declared_networks import TRAININGS
-from benchmarks.plan.choose_cells import matching
-from benchmarks.plan.study import read_study
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
 from snug.kinds import KINDS
@@ -31,7 +29,6 @@ def methods(*options):
 def test_they_run_when_named_and_not_otherwise(tmp_path):
     further = {entry.name for entry in FURTHER_METHODS}
     out = ("-o", str(tmp_path))
-    assert further == set(matching(further, read_study().parts["garments"].optional_methods))
     assert not further & methods(*out)
     assert further < methods(*out, "--methods", "*")
     named = methods(*out, "--methods", "snug-no-*")

@@ -14,6 +14,7 @@ from benchmarks.plan.motions import Motions, split_motions
 from benchmarks.plan.study import Study, StudyError
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
+from snug.motion.library import DYNAMIC_TEST
 from tests.benchmarks.plan.planned import planned, study_with
 
 SMOKE = find_preset("smoke")
@@ -48,7 +49,7 @@ def test_the_reference_comes_first_in_every_scene():
     for cell in planned("full:garments,speed", *TESTS).cells:
         if not cell.scene.networks_only:
             first.setdefault(cell.scene.name, cell.method)
-    assert set(first.values()) == {"simulation"} and len(first) == 10
+    assert set(first.values()) == {"simulation"} and len(first) == 9
 
 
 def test_only_what_has_a_seed_is_repeated_and_the_rest_is_the_same_whatever_the_seeds():
@@ -69,10 +70,11 @@ def test_patterns_choose_scenes_methods_and_cases():
 
 
 def test_places_of_a_pattern_are_filled_by_motions_of_the_split():
-    motions = Motions(("walk",), ("kick", "punch"), {}, ("twist_stop",), worn=GARMENT_SCENES[:3])
+    motions = Motions(("walk",), ("kick", "punch"), worn=GARMENT_SCENES[:3])
     names = expanded(["{garment}/{motion}", "tunic/{motion}", "tshirt/{motion 2}@clip", "flag"], motions)
-    assert names == ["tshirt/kick", "tshirt/punch", "tunic/twist_stop", "tshirt/punch@clip", "flag"]
-    assert expanded(["skirt/{swinging 1}", "skirt/{swinging 2}"], motions) == ["skirt/twist_stop"]
+    swinging = [f"tunic/{motion}" for motion in DYNAMIC_TEST]
+    assert names == ["tshirt/kick", "tshirt/punch", *swinging, "tshirt/punch@clip", "flag"]
+    assert expanded(["skirt/{swinging 1}", "skirt/{swinging 9}"], motions) == [f"skirt/{DYNAMIC_TEST[0]}"]
 
 
 def test_a_pattern_of_another_garment_means_its_motions_of_the_split():
@@ -94,7 +96,9 @@ def test_what_is_left_out_of_the_default_study_is_there_where_it_is_named():
         plan = planned(*words)
         assert slow & {cell.method for cell in plan.cells} == methods
         assert ("slit_annulus_inner" in [case.name for case in plan.cases]) == long
-    assert {cell.method for cell in planned("--methods", "lbfgs-40").cells} == {"lbfgs-40"}
+    cells = planned("--methods", "lbfgs-40").cells
+    assert {cell.method for cell in cells} == {"lbfgs-40"}
+    assert {suite for cell in cells for suite in cell.suites} == {"garments", "speed", "extremes"}
     assert planned("--scenes", "slit_annulus_inner").cases
 
 
@@ -111,15 +115,6 @@ def test_sizes_quick_have_eight_motions_paper_all_and_either_those_that_are_name
     validation = ("full:garments", "--set", "split=validation")
     assert motions(*validation, "--set", f"validation_motions={named}") == set(named.split(","))
     assert len(motions(*validation, "--test-motions", "walk")) == 8
-
-
-def test_networks_of_a_second_garment_are_left_out_with_a_reason_until_its_scenes_are_named():
-    skirt = [cell for cell in planned("full:speed").cells if "skirt" in cell.scene.name]
-    reasons = {cell.method: cell.entry.skip(cell.scene) for cell in skirt}
-    assert "second garment" in reasons["snug"] and "second garment" in reasons["pbns"]
-    assert not reasons["newton-4"]
-    named = planned("full:speed", "--scenes", skirt[0].scene.name, "--methods", "snug").cells
-    assert {cell.entry.skip(cell.scene) for cell in named} == {None}
 
 
 def test_what_no_part_lists_is_met_by_its_whole_name():

@@ -52,7 +52,6 @@ def test_a_study_has_its_own_fields_those_that_it_is_like_and_paths_beside_its_f
     assert study.body == mine / "mine.npz" and study.motions == (str(mine / "clips"), "library")
     assert study.metrics == (str(mine / "height.py"),)
     assert study.parts["speed"].methods == ("simulation", str(mine / "mine.py"))
-    assert study.parts["speed"].optional_methods == read_study("smoke").parts["speed"].optional_methods
     assert list(study.parts) == ["garments", "speed", "validation", "extremes", "shapes"]
     quick = find_preset("quick")
     assert study.sizes.frames == 60 and study.sizes.steps == {**quick.steps, "snug": 7}
@@ -105,7 +104,7 @@ def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word(text, table):
         ("body = 3", "study.toml: line 1: body: 3: give a path"),
         (
             "sizes = 'huge'",
-            "study.toml: line 1: sizes.base: no sizes are called 'huge'; choose from smoke, quick, paper",
+            "study.toml: line 1: sizes.base: unknown preset 'huge'; choose from smoke, quick, paper",
         ),
         (
             "[sizes]\nbase = 'smoke'\nframe = 3",
