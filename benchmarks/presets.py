@@ -66,9 +66,9 @@ class Preset:
 def _read_presets() -> tuple[Preset, ...]:
     tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     for table in tables.values():
-        table["dependence"] = Dependence(
-            **{name: tuple(v) if isinstance(v, list) else v for name, v in table["dependence"].items()}
-        )
+        sizes = table["dependence"]
+        sizes |= {name: tuple(sizes[name]) for name in ("meshes", "substeps")}
+        table["dependence"] = Dependence(**sizes)
     return tuple(Preset(name=name, **table) for name, table in tables.items())
 
 

@@ -160,6 +160,6 @@ def _made(kind: Any, words: Mapping[str, Any], text: str) -> Any:
             raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(known)}")
     paths = {name: Path(words[name]) for name in ("path", "material", "joint_map") if name in words}
     try:
-        return kind(**words | paths)
+        return kind(**{**words, **paths})
     except ValueError as error:
         raise ValueError(f"{text}: {error}") from None

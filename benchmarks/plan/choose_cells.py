@@ -94,9 +94,9 @@ def _means(name: str, patterns: Sequence[str]) -> bool:
 def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
     """Return part -> names of its scenes.
 
-    A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind, or
-    in the first part: called by its whole name, or in a motion of the split by a pattern that no listed scene
-    has, as 'trousers/*'.
+    A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind:
+    called by its whole name (without such a part in the first), or in a motion of the split by a pattern that
+    no listed scene has, as 'trousers/*'.
     """
     declared, wanted, parts = read.scenes, read.study.scenes, read.study.parts
     usual = {name: matching(declared, expanded(part.scenes, read.motions)) for name, part in parts.items()}
@@ -109,9 +109,10 @@ def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
     for name in matching(declared, fresh) if set(fresh) - listed else ():
         scene = declared[name]
         of_split = scene.dressed and scene.motion in read.motions.measured_of(scene.garment)
-        if name not in listed and (name in wanted or of_split):
-            homes = [part for part in parts if scene.part in {declared[n].part for n in usual[part]}]
-            chosen[[*homes, *parts][0]].append(name)
+        homes = [part for part in parts if scene.part in {declared[n].part for n in usual[part]}]
+        homes += list(parts) if name in wanted else []
+        if name not in listed and homes and (name in wanted or of_split):
+            chosen[homes[0]].append(name)
     return chosen
 
 
@@ -163,7 +164,10 @@ def _cases(study: Study, cases: Sequence[Case]) -> Iterator[Case]:
 def _check_words(read: ReadStudy) -> None:
     """Raise StudyError for a word of a field that nothing has as its name."""
     study, methods, cases = read.study, list(read.methods), [case.name for case in read.cases]
-    fields = {("scenes",): ([*read.scenes, *cases], study.scenes), ("methods",): (methods, study.methods)}
+    fields: dict[tuple[str, ...], tuple[list[str], tuple[str, ...]]] = {
+        ("scenes",): ([*read.scenes, *cases], study.scenes),
+        ("methods",): (methods, study.methods),
+    }
     # Scenes that tailor a T-shirt themselves are none of a run with another garment.
     scenes = list(dict.fromkeys((*read.scenes, *all_scenes((), ()))))
     for name, part in study.parts.items():

@@ -160,7 +160,7 @@ def list_names(study: Study) -> str:
     """
     read = read_files(study)
     roles, parts = read.motions.role_of, study.parts
-    whole = [scene for scene in read.scenes.values() if scene.part != "clip"]
+    whole = [scene for scene in read.scenes.values() if not scene.name.endswith("@clip")]
     in_parts = {
         method.name: ", ".join(n for n, part in parts.items() if matching([method.name], part.methods))
         for method in read.methods.values()

@@ -80,7 +80,7 @@ def test_the_list_has_the_scenes_that_the_study_measures(capsys):
         (["--only", "failed", "--fresh"], "leave out"),
         (["--workers", "0"], "1 or more"),
         (["--frobnicate"], "--frobnicate"),
-        (["--scenes", "flag", "--methods", "snug-dynamic"], "no such scene meets such a method in parts"),
+        (["default:shapes"], "no such scene meets such a method in part shapes"),
         (["--list", "full:garment"], "it has garments"),
     ],
 )

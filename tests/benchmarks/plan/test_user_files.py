@@ -105,7 +105,7 @@ def test_they_stand_in_tables_and_plots(done):
     assert config["metrics"]["height/highest"]["definition"] == "of all vertices"
     assert config["methods"]["mine"]["label"] == "Mine"
     figures = {path.name for path in done.figures.glob("*.svg")}
-    assert "error_against_time_lift.svg" in figures
+    assert "error_against_time.svg" in figures
 
 
 def test_a_program_is_not_timed_and_its_own_time_is_marked(done):
