@@ -9,6 +9,7 @@ G_bone = G_parent C M C^-1 is its rotation in the world. Its far end lies at G_b
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from snug.body.skeleton import LEG_LENGTH
 from snug.file_options import MotionFileOptions
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import Line, RawMotion, check_frame_count, frame_rate, read_lines
+from snug.motion.raw_motion import Line, RawMotion, frame_rate, read_lines
 from snug.motion.retarget import FEET, HINGES, LIMBS, retarget
 
 CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
@@ -91,6 +92,7 @@ def read_asf_amc(path: Path, options: MotionFileOptions) -> RawMotion:
     if leg <= 0.0:
         raise MotionError(f"{file}: the left leg has no length; fetch the skeleton again")
     channels = read_amc(path, skeleton)
+    fps = frame_rate(path, len(channels["root"]), None, options, CMU_RATE)
     turned = world_turns(skeleton, channels)
     poses = retarget(
         file,
@@ -105,7 +107,7 @@ def read_asf_amc(path: Path, options: MotionFileOptions) -> RawMotion:
     )  # fmt: skip
     return RawMotion(
         path=path, poses=poses, translations=LEG_LENGTH / leg * root,
-        fps=frame_rate(path, None, options, CMU_RATE), source=f"{path.name} with {file.name}",
+        fps=fps, source=f"{path.name} with {file.name}",
     )  # fmt: skip
 
 
@@ -120,7 +122,7 @@ def world_turns(skeleton: Skeleton, channels: dict[str, np.ndarray]) -> dict[str
     return turned
 
 
-def product(channels: tuple[str, ...], values: np.ndarray) -> np.ndarray:
+def product(channels: Sequence[str], values: np.ndarray) -> np.ndarray:
     """Return M (T, 3, 3) of a bone: the product of its rotations (T, channels), the first applied first."""
     rotation = Rotation.identity(len(values))
     for channel, angles in zip(channels, values.T):
@@ -194,9 +196,7 @@ def _bone(block: dict[str, Line], metres: float, degrees: bool) -> Bone:
         if sorted(letters) != ["x", "y", "z"]:
             raise line.error(f"axis order '{order[0]}' is not a permutation of XYZ")
         angles = np.array([line.numbers(1, 3)])
-        axes = product(tuple(f"r{letter}" for letter in letters), np.radians(angles) if degrees else angles)[
-            0
-        ]
+        axes = product([f"r{letter}" for letter in letters], np.radians(angles) if degrees else angles)[0]
     line = block.get("order" if root else "dof")
     channels = tuple(word.lower() for word in line.tokens[1:]) if line else ()
     allowed = TRANSLATIONS + ROTATIONS if root else ROTATIONS
@@ -241,7 +241,6 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
             )
         else:
             frames[-1][word] = line.numbers(1, moving[word], last=True)
-    check_frame_count(path, len(frames))
     for number, frame in enumerate(frames, 1):
         if missing := [name for name in moving if name not in frame]:
             raise MotionError(

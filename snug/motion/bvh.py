@@ -17,10 +17,9 @@ from scipy.spatial.transform import Rotation
 from snug.body.skeleton import LEG_LENGTH
 from snug.file_options import MotionFileOptions
 from snug.motion.motion import MotionError
-from snug.motion.raw_motion import Line, RawMotion, check_frame_count, frame_rate, read_lines
+from snug.motion.raw_motion import Line, RawMotion, frame_rate, read_lines
 from snug.motion.retarget import FEET, LIMBS, match_joints, retarget, way_up
 
-MAX_ROTATIONS = 5_000_000  # joints times frames: 11 minutes of 60 joints at 120 frames per second
 CHANNELS = {f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}
 
 
@@ -48,7 +47,8 @@ def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
 
     Raises MotionError.
     """
-    joints, frames, fps = read_clip(path)
+    joints, frames, stated = read_clip(path)
+    fps = frame_rate(path, len(frames), stated, options)
     parents = [joint.parent for joint in joints]
     matches = match_joints(path, [joint.name for joint in joints], parents, options.joint_map)
     places = np.zeros((len(parents), 3))
@@ -76,7 +76,7 @@ def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
         path=path,
         poses=retarget(path, {name: turned[k] @ axes for name, k in matches.items()}, directions, {}),
         translations=LEG_LENGTH / leg * pelvis,
-        fps=frame_rate(path, fps, options),
+        fps=fps,
         source=f"{path.name} ({len(matches)} of 24 joints)",
     )
 
@@ -141,10 +141,7 @@ def read_clip(path: Path) -> tuple[list[Joint], np.ndarray, float | None]:
     rows = [np.array(line.numbers(0, columns, last=True)) for line in lines]
     if len(rows) != declared:
         raise MotionError(f"{path}: declares {declared:g} frames and holds {len(rows)}; export it again")
-    check_frame_count(path, len(rows))
-    if len(rows) * len(joints) > MAX_ROTATIONS:
-        raise MotionError(f"{path}: {len(rows)} frames of {len(joints)} joints are too many; cut the clip")
-    return joints, np.stack(rows), 1.0 / seconds if seconds else None
+    return joints, np.reshape(rows, (len(rows), columns)), 1.0 / seconds if seconds else None
 
 
 def _next_line(lines: Iterator[Line], path: Path, *tokens: str) -> Line:

@@ -29,9 +29,6 @@ class RawMotion:
         translations: (T, 3) [m] of the root.
         fps: frames per second [1/s].
         source: file and kind, in words.
-
-    Raises:
-        MotionError: a clip of more than MAX_SECONDS.
     """
 
     path: Path
@@ -39,12 +36,6 @@ class RawMotion:
     translations: np.ndarray
     fps: float
     source: str
-
-    def __post_init__(self) -> None:
-        if (seconds := len(self.poses) / self.fps) > MAX_SECONDS:
-            raise MotionError(
-                f"{self.path}: lasts {seconds:.0f} s, more than {MAX_SECONDS:.0f}; cut the clip"
-            )
 
 
 @dataclass(slots=True)
@@ -93,20 +84,14 @@ def read_lines(path: Path, comment: str | None = None) -> Iterator[Line]:
             yield Line(path, number, tokens)
 
 
-def check_frame_count(path: Path, frames: int) -> None:
-    """Raise MotionError unless a clip has between 1 and MAX_FRAMES frames."""
-    if not 0 < frames <= MAX_FRAMES:
-        remedy = "cut the clip" if frames else "give a clip with frames"
-        raise MotionError(f"{path}: {frames} frames; between 1 and {MAX_FRAMES} are read: {remedy}")
-
-
 def frame_rate(
-    path: Path, stated: float | None, options: MotionFileOptions, usual: float | None = None
+    path: Path, frames: int, stated: float | None, options: MotionFileOptions, usual: float | None = None
 ) -> float:
     """Return the frames per second [1/s]: of the file, else of the options, else `usual` for such files.
 
     Raises:
-        MotionError: there is none of them, file and options disagree, or no recording has that rate.
+        MotionError: there is none of them, file and options disagree, no recording has that rate, or the
+            clip has no frame, more than MAX_FRAMES, or more than MAX_SECONDS.
     """
     given = options.fps
     if stated is not None and given is not None and abs(stated - given) > 0.01 * stated:
@@ -118,6 +103,9 @@ def frame_rate(
         raise MotionError(f"{path}: states no frame rate; add ,fps=N behind the path")
     if not LOWEST_RATE <= fps <= HIGHEST_RATE:
         raise MotionError(f"{path}: {fps:g} frames per second; rates are {LOWEST_RATE:g} to {HIGHEST_RATE:g}")
+    if not 0 < frames <= min(MAX_FRAMES, MAX_SECONDS * fps):
+        limits = f"1 to {MAX_FRAMES} frames and at most {MAX_SECONDS:.0f} s are read"
+        raise MotionError(f"{path}: {frames} frames, which last {frames / fps:.0f} s; {limits}: cut the clip")
     return fps
 
 
@@ -153,18 +141,14 @@ def remove_recording_errors(raw: RawMotion, *, repair: bool) -> RawMotion:
         missing = ~np.isfinite(track).all(axis=1)
         if missing.all():
             raise MotionError(f"{raw.path}: {name} is not finite in any frame; export it again")
-        for first, last in _runs(missing):
-            errors.setdefault(f"{name} is not finite", []).append(f"{first}-{last}")
-        _bridge(track, missing, turns)
-        jumps = _jumps(track, turns, raw.fps)
-        wrong |= missing
-        for first, last in _spans_around(jumps, raw.fps, len(track)):
-            errors.setdefault(f"{name} jumps", []).append(f"{first}-{last}")
-            around = np.zeros(len(track), dtype=bool)
-            around[first : last + 1] = True
-            wrong |= around
-            if not around.all():
-                _bridge(track, around, turns)
+        gaps = [(f"{name} is not finite", first, last) for first, last in _runs(missing)]
+        _bridge(track, gaps, turns)
+        spans = _spans_around(_jumps(track, turns, raw.fps), raw.fps, len(track))
+        leaps = [(f"{name} jumps", first, last) for first, last in spans]
+        _bridge(track, leaps, turns)
+        for what, first, last in gaps + leaps:
+            errors.setdefault(what, []).append(f"{first}-{last}")
+            wrong[first : last + 1] = True
         for frame in _jumps(track, turns, raw.fps)[:1]:
             stays = stays or f"{name} jumps after frame {frame}"
     if not errors:
@@ -186,13 +170,10 @@ def _short(names: list[str]) -> str:
 
 def _check_units(file: Path, poses: np.ndarray, path: np.ndarray) -> None:
     angles = np.linalg.norm(poses, axis=2)
-    limits = np.full(angles.shape[1], MAX_ANGLE)
-    limits[0] = MAX_ROOT_ANGLE
-    for frame, joint in np.argwhere(angles > limits)[:1]:
-        raise MotionError(
-            f"{file}: {JOINT_NAMES[joint]} turns by {angles[frame, joint]:.3g} rad in frame {frame}; write "
-            "radians, not degrees"
-        )
+    angles[:, 0] *= MAX_ANGLE / MAX_ROOT_ANGLE
+    for frame, joint in np.argwhere(angles > MAX_ANGLE)[:1]:
+        name = JOINT_NAMES[joint]
+        raise MotionError(f"{file}: {name} turns too far in frame {frame}; write radians, not degrees")
     for frame in np.flatnonzero((np.abs(path) > MAX_DISTANCE).any(axis=1))[:1]:
         raise MotionError(
             f"{file}: the root is more than {MAX_DISTANCE:g} m away in frame {frame}; write metres"
@@ -225,17 +206,19 @@ def _runs(mask: np.ndarray) -> Iterator[tuple[int, int]]:
     return ((int(start), int(stop) - 1) for start, stop in zip(edges[::2], edges[1::2]))
 
 
-def _bridge(track: np.ndarray, bad: np.ndarray, turns: bool) -> None:
-    """Fill the bad frames (T,), not all of them, of a track (T, 3) in place."""
-    for first, last in _runs(bad):
+def _bridge(track: np.ndarray, spans: list[tuple[str, int, int]], turns: bool) -> None:
+    """Fill the frames first to last of each span, in place, unless they are all of the track (T, 3)."""
+    for _, first, last in spans:
         before, after = first - 1, last + 1
+        if before < 0 and after >= len(track):
+            continue
         if before < 0 or after >= len(track):
-            track[first : last + 1] = track[after if before < 0 else before]
+            track[first:after] = track[after if before < 0 else before]
             continue
         share = np.linspace(0.0, 1.0, after - before + 1)[1:-1]
-        start, end = (np.tile(track[k], (last - first + 1, 1)) for k in (before, after))
+        start, end = (np.tile(track[k], (after - first, 1)) for k in (before, after))
         straight = start + share[:, None] * (end - start)
-        track[first : last + 1] = slerp(start, end, share) if turns else straight
+        track[first:after] = slerp(start, end, share) if turns else straight
 
 
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
