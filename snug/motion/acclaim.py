@@ -252,5 +252,6 @@ def read_amc(path: Path, skeleton: Skeleton) -> dict[str, np.ndarray]:
             (math.pi / 180 if degrees else 1.0) if channel in ROTATIONS else skeleton.metres
             for channel in skeleton.bones[name].channels
         ]
-        channels[name] = np.array([frame[name] for frame in frames]) * scale
+        rows = np.array([frame[name] for frame in frames])
+        channels[name] = rows.reshape(len(frames), len(scale)) * scale
     return channels

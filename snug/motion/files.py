@@ -38,6 +38,7 @@ ROTATIONS = ("poses", "pose", "rotations", "rotation_matrices", "pose_body", "bo
 ROOT_ROTATIONS = ("root_orient", "global_orient")
 PATHS = ("trans", "transl", "translations")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
+ARRAY_NAMES = (*ROTATIONS, *ROOT_ROTATIONS, *PATHS, *RATES)
 UNIT = 0.02  # entries of a product of a matrix and its transpose may be off by as much
 
 
@@ -47,10 +48,9 @@ def read_smpl_arrays(path: Path, options: MotionFileOptions) -> RawMotion:
     Raises:
         MotionError: names file, array and remedy.
     """
-    names = (*ROTATIONS, *ROOT_ROTATIONS, *PATHS, *RATES)
     read = read_pickled_arrays if path.suffix.lower() == ".pkl" else read_arrays
     try:
-        arrays = read(path, names)
+        arrays = read(path, ARRAY_NAMES)
     except ArrayFileError as error:
         raise MotionError(f"{error}; give an .npz with 'poses', 'trans' and 'fps'") from None
     for name, array in arrays.items():
@@ -126,7 +126,10 @@ def _axis_angles(path: Path, name: str, array: np.ndarray) -> np.ndarray:
     matrices = np.where(whole[..., None, None], array, np.eye(3))
     off = np.abs(np.swapaxes(matrices, -1, -2) @ matrices - np.eye(3)).max(axis=(2, 3))
     for frame, joint in np.argwhere((off > UNIT) | (np.linalg.det(matrices) <= 0))[:1]:
-        raise MotionError(f"{path}: '{name}' of frame {frame}, joint {joint} is no rotation matrix")
+        raise MotionError(
+            f"{path}: '{name}' of frame {frame}, joint {joint} is no rotation matrix; give rotations "
+            "relative to the parent"
+        )
     return np.where(whole[..., None], axis_angles(matrices), np.nan)
 
 

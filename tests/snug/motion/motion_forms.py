@@ -40,7 +40,7 @@ def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
     poses, trans = of_root(motion, turn)
     count, fps = len(poses), motion.fps
     flat = Rotation.from_rotvec(poses.reshape(-1, 3))
-    quaternions, matrices = flat.as_quat().reshape(count, 24, 4), flat.as_matrix().reshape(count, 24, 3, 3)
+    matrices = flat.as_matrix().reshape(count, 24, 3, 3)
     forms = {
         "smpl": {"poses": columns(poses, 24), "trans": trans, "fps": fps},
         "joints": {"poses": poses, "transl": trans[:, None], "framerate": fps},
@@ -53,9 +53,6 @@ def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
                       "fps": fps},
         "root_matrix": {"global_orient": matrices[:, 0], "body_pose": poses[:, 1:], "translations": trans,
                         "fps": fps},
-        "xyzw": {"quaternions_xyzw": quaternions, "trans": trans, "fps": fps},
-        "wxyz": {"rotations_quat": quaternions[..., [3, 0, 1, 2]], "trans": trans, "fps": fps},
-        "scalar_first": {"quaternions_wxyz": quaternions[..., [3, 0, 1, 2]], "trans": trans, "fps": fps},
         "matrices": {"rotations": matrices, "trans": trans, "fps": fps},
     }  # fmt: skip
     files = []
