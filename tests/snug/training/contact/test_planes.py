@@ -216,27 +216,6 @@ def test_anchors_walk_while_training_and_are_in_its_state():
     assert (twin.cache.barycentric == contact.cache.barycentric).all()
 
 
-def test_an_input_that_never_varied_is_not_read():
-    trainer = made([swaying(30)])
-    shapes = trainer.dressed.body.shape_count
-    features = trainer.data.features[None, :9].clone()
-    with torch.no_grad():
-        trainer.network.offsets.weight.normal_()
-        plain, _ = trainer.network(features, None)
-        features[..., -shapes:] = 5.0
-        assert torch.equal(trainer.network(features, None)[0], plain)
-        features[..., int(features.std(1).argmax())] += 0.1
-        assert not torch.equal(trainer.network(features, None)[0], plain)
-    sampled = made([swaying(30)], shape_range=2.0).data.input_statistics()[1]
-    assert np.isfinite(sampled[-shapes:]).all()
-
-
-def test_an_epoch_may_be_left_to_chance():
-    trainer = made([swaying(402)], even=1)
-    drawn = np.concatenate([trainer.draw() for _ in range(len(trainer.data.starts) // trainer.windows)])
-    assert len(np.unique(drawn)) == len(drawn) and set(np.diff(np.sort(drawn[:20]))) != {DEFAULT.even}
-
-
 def test_each_part_of_an_epoch_passes_over_all_motions():
     trainer = made([swaying(402)])
     count = len(trainer.data.starts)

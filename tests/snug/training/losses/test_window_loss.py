@@ -129,14 +129,6 @@ def test_a_detached_past_gets_no_gradient_and_the_present_the_same():
     assert torch.allclose(detached[:, 2], whole[:, 2])
 
 
-def test_two_transitions_need_the_motion_of_the_pelvis():
-    dressed = tube_dress()
-    x = dressed.rest().expand(1, 3, -1, 3)
-    loss = PhysicsLoss(dressed.cloth, replace(PAPER, inertia_form="two_transitions"), dt=DT)
-    with pytest.raises(ValueError, match="behind"):
-        loss(x, torch.zeros(1, 3, 3), None)
-
-
 def test_the_training_set_knows_the_motion_of_the_pelvis():
     from snug.training.training_set import TrainingSet
 
