@@ -15,11 +15,11 @@ from reports.figures.costs import break_even, error_of_page_one
 from reports.figures.figure import Figure, Picture
 from reports.figures.over_time import energy_series, training_curves
 from reports.figures.values import dots, known_answers
-from reports.pictures import failures, lead_row, side_by_side
+from reports.pictures import failures, side_by_side
 from reports.run.finished_run import Run
 from reports.tables.table import Cell, Table
 
-ROWS = 12  # of a printed table; the CSV has all
+ROWS, LETTERS = 12, 90  # of a printed table and of a text in its cells; the CSV has all
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,18 @@ class TableBlock:
         chosen = sorted(line for _, line in sorted(order)[: self.most])
         more = len(table.rows) - len(chosen)
         rest = f"{more} more rows are in tables/{table.name}.csv. " if more else ""
-        return replace(table, rows=tuple(rows[line] for line in chosen), note=(rest + table.note).strip())
+        kept = tuple(tuple(map(_cut, rows[line])) for line in chosen)
+        return replace(table, rows=kept, note=(rest + table.note).strip())
+
+
+def _cut(cell: Cell) -> Cell:
+    """Return the cell, a text of at most LETTERS letters."""
+    long = isinstance(cell, str) and len(cell) > LETTERS
+    return f"{str(cell)[: LETTERS - 1].rstrip()}…" if long else cell
 
 
 BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
-    Figure("lead", lead_row),
+    Figure("frames", side_by_side),
     Figure("error_against_time", error_of_page_one),
     TableBlock("overview"),
     TableBlock("reference_uncertainty"),
@@ -90,10 +97,8 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     Heading("Error against run time"),
     TableBlock("error_rivals"),
     Figure("break_even", break_even),
-    Heading("Garments in motion"),
-    Figure("frames", side_by_side),
-    Figure("failures", failures),
     Heading("Behind the means"),
+    Figure("failures", failures),
     Figure("dots", dots),
     Heading("Dynamics"),
     TableBlock("dynamics"),

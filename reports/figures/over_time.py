@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from reports.figures.chosen_roll_outs import long_motion
 from reports.figures.figure import Drawing
 from reports.figures.plotting import few, file_name, fit, leading, log_axis, new_panels, style
 from reports.run.finished_run import Run, shown_seeds
@@ -43,19 +42,7 @@ def energy_series(run: Run) -> Iterator[Drawing]:
 
 
 def _frames(run: Run) -> tuple[str, pd.DataFrame]:
-    """Return a motion and method, seconds and energies by term [J] of its frames.
-
-    It is the one shown at length or, where no roll-outs were kept, the first of frame_energies.csv.
-    """
-    if motion := long_motion(run):
-        parts = [
-            pd.DataFrame(
-                {"method": method, "seconds": cloth.times}
-                | {term: cloth.frame_fields.get(f"energy/{term}", np.nan) for term in TERMS}
-            )
-            for method, cloth in motion.series.items()
-        ]
-        return motion.scene, pd.concat(parts)
+    """Return the first motion of frame_energies.csv and its lines, of the seed shown of each method."""
     frames = run.frame_energies
     if frames.empty:
         return "", frames

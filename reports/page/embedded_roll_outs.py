@@ -16,11 +16,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import scipy.sparse
 
+from benchmarks.metrics.curvature import curvature_series
 from benchmarks.results.run_folder import RunFolder
+from reference_sim.geometry.topology import corner_areas
 from reference_sim.obstacle import Obstacle
 from reference_sim.trajectory import Trajectory
-from reports.cloth_colours import area_change, depth, distance, mean_curvature, skin_of
 from reports.run.finished_run import Run, shown_seeds
 from reports.run.stored_files import STEP
 
@@ -261,3 +263,52 @@ def _body(body: Trajectory) -> Pack:
     pack.numbers("times", body.times)
     pack.positions("positions", body.positions[:, kept])
     return pack
+
+
+MM = 1e3
+
+
+def mean_curvature(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the magnitude of the mean curvature (T,V) [1/m] of positions (T,V,3) [m]; 0 on boundaries."""
+    series = curvature_series(positions, faces)
+    return np.where(series.area > 0.0, series.curvature, 0.0)
+
+
+def area_change(positions: np.ndarray, faces: np.ndarray, rest_areas: np.ndarray) -> np.ndarray:
+    """Return area over rest area less 1 (T,V) [%], mean over a vertex's faces by rest_areas (F,) [m^2]."""
+    areas = corner_areas(positions[:, faces].reshape(-1, 3, 3)).reshape(len(positions), -1)
+    gather = _gather(faces, positions.shape[1])
+    rest = gather @ np.repeat(rest_areas, 3)
+    now = (gather @ np.repeat(areas, 3, axis=1).T).T
+    return 100.0 * (np.divide(now, rest, out=np.ones_like(now), where=rest > 0.0) - 1.0)
+
+
+def distance(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Return the distance (T,V) [mm] between the same vertices of positions (T,V,3) [m] and a reference.
+
+    The reference has as many frames or more.
+    """
+    return MM * np.linalg.norm(positions - reference[: len(positions)], axis=-1)
+
+
+def depth(points: np.ndarray, skin: Obstacle, frame: int) -> np.ndarray:
+    """Return the penetration (P,) [mm] of points (P,3) [m] into the body at that frame, 0 outside.
+
+    Inside is the side behind the normal of the nearest point: a winding number takes six times as long.
+    """
+    planes = skin.planes(np.ascontiguousarray(points, dtype=float), frame)
+    return MM * np.maximum(-np.einsum("pi,pi->p", planes.normals, points - planes.points), 0.0)
+
+
+def skin_of(positions: np.ndarray, faces: np.ndarray) -> Obstacle | None:
+    """Return a body (T,B,3) [m], or (B,3), as an obstacle; None where its faces (F,3) do not close."""
+    try:
+        return Obstacle(positions, faces)
+    except ValueError:
+        return None
+
+
+def _gather(corners: np.ndarray, count: int) -> scipy.sparse.csr_array:
+    """Return (V,3F), which sums values at the corners of faces (F,3) over each vertex."""
+    size = corners.size
+    return scipy.sparse.csr_array((np.ones(size), (corners.ravel(), np.arange(size))), shape=(count, size))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reports import rendering
+from reports import pictures
 from reports.figures import figure
 
 DOTS = 40  # of a picture in an inch; 200 in a report
@@ -11,6 +11,6 @@ DOTS = 40  # of a picture in an inch; 200 in a report
 @pytest.fixture(scope="session", autouse=True)
 def few_dots():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rendering, "DOTS", DOTS)
+        patch.setattr(pictures, "DOTS", DOTS)
         patch.setattr(figure, "DOTS", DOTS)
         yield

@@ -88,7 +88,7 @@ def test_every_file_of_the_report_is_there(made):
     pictures = {path.name for path in made.figures.iterdir()}
     for stem in ("energy_series_tshirt-walk", "error_against_time", "training", "dots"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
-    assert {"lead.png", "frames_tshirt-walk.png", "failures.png"} <= pictures
+    assert {"frames_tshirt-walk.png", "failures.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
 
 
@@ -111,8 +111,9 @@ def test_pictures_of_roll_outs_that_are_gone_stay_in_the_report(made, tmp_path):
     shutil.rmtree(published.trajectories)
     build.build_report(published.path)
     pictures = draw_figures(read_run(published), published.figures, FIGURES)
-    kept = {picture.path.name: picture for name in ("lead", "dots") for picture in pictures[name]}
-    assert list(kept) == ["lead.png", "dots.svg"] and "walk at" in kept["lead.png"].caption
+    kept = {picture.path.name: picture for name in ("frames", "dots") for picture in pictures[name]}
+    assert list(kept) == ["frames_tshirt-walk.png", "dots.svg"]
+    assert "walk: frame" in kept["frames_tshirt-walk.png"].caption
     assert b"/Subtype/Image" in published.report_path.read_bytes()
 
 

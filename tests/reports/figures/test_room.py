@@ -50,7 +50,6 @@ class Kept(RollOuts):
         points = np.repeat(points[:1], FRAMES, axis=0)
         points[..., 2] += 0.01 * (1 + place) * np.sin(points[..., 0] * swing[:, None])
         fields = {f"energy/{term}": 0.1 * (1.1 + np.sin(swing)) for term in ("strain", "bending", "inertia")}
-        fields["step/vertices"] = np.full((FRAMES, points.shape[1]), 1.0 + place)
         return mesh(points, faces, fields)
 
     def body(self, scene: str) -> Trajectory:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics import curvature
-from reports.cloth_colours import area_change, depth, distance, mean_curvature, skin_of
-from reports.page.embedded_roll_outs import Pack
+from reports.page.embedded_roll_outs import Pack, area_change, depth, distance, mean_curvature, skin_of
 from tests.reports.page.page_by_hand import block, unpacked
 from tests.reports.report_folder import sheet
 

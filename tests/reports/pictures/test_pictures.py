@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from reports import rendering
 from reports.blocks import FIGURES
-from reports.cloth_colours import error_scale
-from reports.figures.chosen_roll_outs import SceneRollOuts
-from reports.pictures import draw_side_by_side, failures, worst_failures
+from reports.pictures import SceneRollOuts, draw_side_by_side, failures, worst_failures
 from reports.run.reading import read_run
 from tests.reports.report_folder import FRAMES, Stored, mesh, row, run_folder, run_of, sheet
 
@@ -32,19 +29,6 @@ def test_what_ended_early_moves_nobody_elses_picture():
     drawing = draw_side_by_side(run, shown, ["simulation", "snug"])
     assert "frame 3 " in drawing.caption
     assert drawing.caption.endswith("want of room: L-BFGS, 5 iterations.")
-
-
-def test_the_frame_of_page_one_is_one_whose_step_was_judged():
-    shown = scene_of({"simulation": FRAMES, "snug": FRAMES})
-    for cloth in shown.series.values():
-        cloth.frame_fields["step/vertices"] = np.zeros((FRAMES, 16))
-        cloth.frame_fields["step/vertices"][3] = np.nan
-    assert shown.chosen_frame(["simulation", "snug"], "simulation")[0] == 4
-    shown.series["snug"].frame_fields["step/vertices"][4, :4] = 7.0
-    scale = error_scale(shown, ["simulation", "snug"], 4, "simulation")
-    assert scale is not None and scale.top == 7.0 and scale.title == "one-step error [mm]"
-    pale, dark = scale.colours("simulation")[0], scale.colours("snug")[0]
-    assert dark.mean() < pale.mean() - 0.3  # told apart in grey
 
 
 def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
@@ -100,11 +84,3 @@ def test_only_what_was_drawn_is_read(tmp_path):
     path.write_bytes(b"no mesh")
     run = read_run(folder)
     assert [drawing for figure in FIGURES for drawing in figure.drawings(run)] == [] and run.problems == []
-
-
-def test_words_beside_a_row_have_room_for_all_their_lines():
-    tile = np.zeros((10, 10, 3))
-    figure = rendering.sheet([[tile]], (1.0, 1.0), ["0 s"], beside=["SNUG, paper's\ntext"])
-    (caption,) = (text for text in figure.texts if text.get_rotation() == 90)
-    box = caption.get_window_extent(FigureCanvasAgg(figure).get_renderer())
-    assert box.x0 >= 0.0 and box.x1 <= figure.axes[0].get_window_extent().x0
