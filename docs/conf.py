@@ -1,6 +1,7 @@
 """Configuration of the site: `sphinx-build -W docs reports/runs/site` makes it."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -40,7 +41,22 @@ class NotebookParser(MystParser):
         super().parse("\n\n".join(page), document)
 
 
+def write_study_pages(target: Path) -> None:
+    """Write the README of each study of the repository as a page, with links that lead from there."""
+    target.mkdir(exist_ok=True)
+    for path in (DOCS.parent / "studies").glob("*/README.md"):
+        text = path.read_text(encoding="utf-8").replace("](../../docs/", "](../")
+        text = text.replace("](frozen/", f"](../../studies/{path.parent.name}/frozen/")
+        (target / f"{path.parent.name}.md").write_text(text, encoding="utf-8", newline="\n")
+
+
 def setup(app: Sphinx) -> None:
-    """Read notebooks too."""
+    """Make the pages of studies before the sources are read; read notebooks too."""
+
+    def lead_to_study_pages(_: Sphinx, __: str, source: list[str]) -> None:
+        source[0] = re.sub(r"\]\((?:\.\./)+studies/(\w+)/README\.md", r"](/studies/\1.md", source[0])
+
+    app.connect("builder-inited", lambda _: write_study_pages(DOCS / "studies"))
+    app.connect("source-read", lead_to_study_pages)
     app.add_source_suffix(".ipynb", "notebook")
     app.add_source_parser(NotebookParser)

@@ -227,8 +227,10 @@ def find_study(name: str) -> Path:
     for place in places:
         if place.is_file():
             return place
-    raise StudyError(f"no study '{name}': name one, or a file or folder with {FILE}; "
-                     f"{nearest(name, study_names())}")  # fmt: skip
+    raise StudyError(
+        f"no study '{name}': name one, or a file or folder with {FILE}; {nearest(name, study_names())}; "
+        "those that bring code are in the folder studies of a checkout"
+    )
 
 
 def study_names() -> list[str]:
