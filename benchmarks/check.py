@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,11 +11,11 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.assets import Assets
-from benchmarks.contract import ContractError, check_method, check_scene, demand
+from benchmarks.contract import ContractError, check_method, check_scene
 from benchmarks.declarations import DeclarationError, by_name, raised_at
 from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS, find_method
-from benchmarks.metric import Estimate, Metric
+from benchmarks.metric import Metric
 from benchmarks.metrics import declared as declared_metrics
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell, TaskId
@@ -31,7 +30,6 @@ from benchmarks.runner.cells import CellTask, RunCell
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.loop import Runner
-from benchmarks.runner.measurements import MeasureCell
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, RunStopped, Task
 from benchmarks.scene import Scene
@@ -42,8 +40,8 @@ from reference_sim.command_line import Parser, command
 PROGRAM = "benchmarks.check"
 DESCRIPTION = """Run what files of yours declare on tiny scenes, and say what is wrong: methods (shapes,
 start, pins, times, the clock, the same answer twice, the scene left as it was, no connections), scenes
-(built alike twice, parts, derivatives of their own energies, a simulation) and metrics (declared, finite,
-the same twice)."""
+(built alike twice, parts, derivatives of their own energies, a simulation) and metrics (that they can be
+measured)."""
 EXAMPLES = """examples:
   python -m benchmarks.check mine.py            all that METHODS, SCENES and METRICS of the file declare
   python -m benchmarks.check mine.py my_scene.py
@@ -146,7 +144,11 @@ def check_file(
     plan = replace(plan, cells=tuple(cell for cell in plan.cells if cell not in unfit))
     sheets = [cell for cell in plan.cells if cell not in users]
     wanted = {cell.metrics_id for cell in sheets}
-    tasks = [checked(task) for task in tasks_of(plan) if task.kind in KINDS or task.id in wanted]
+    tasks = [
+        CheckedCell(**{f.name: getattr(task, f.name) for f in fields(task)}) if task.kind == "cell" else task
+        for task in tasks_of(plan)
+        if task.kind in KINDS or task.id in wanted
+    ]
     outcomes = early | (outcomes_of(tasks, plan, assets) if tasks else {})
     for cell in users:
         name = f"{cell.method} in {cell.scene.name}" if cell.entry.declared_in else cell.scene.name
@@ -158,30 +160,25 @@ def check_file(
 
 def plan_of(declared: Declarations, folder: Path, scene_plan: Plan | None) -> Plan:
     """Return the plan of each method in all scenes that fit it; scenes and metrics meet simulations."""
-    if scene_plan is not None:
-        scenes = [scene_plan.cells[0].scene]
-    else:
-        known = (*map(find_scene, SCENES_OF_METHODS), of_garment(GARMENT).scene(TEST))
-        scenes = [scene.at(SIZES) for scene in known]
+    known = (*map(find_scene, SCENES_OF_METHODS), of_garment(GARMENT).scene(TEST))
+    scenes = [scene_plan.cells[0].scene] if scene_plan else [scene.at(SIZES) for scene in known]
     met = [
         (replace(scene, metrics=()), entry)
         for entry in declared.methods
         for scene in scenes
         if entry.meant_for(scene) and entry.skip(scene) is None
     ]
-    if scene_plan is not None:
-        cells = tuple(Cell(scene, entry, 0, ("speed",)) for scene, entry in met)
-        return replace(scene_plan, cells=cells, suites=("speed",), folder=folder)
-    simulation, stopped = find_method("simulation"), find_method("lbfgs-10")
-    met += [(replace(scene.at(SIZES), metrics=()), simulation) for scene in declared.scenes]
-    if declared.metrics:
-        sheet = replace(find_scene(SCENE_OF_METRICS).at(SIZES), metrics=())
-        met += [(sheet, simulation), (sheet, stopped)]
-    return Plan(
-        preset=SIZES, suites=("speed",), cells=tuple(Cell(*pair, 0, ("speed",)) for pair in met), cases=(),
-        metrics=tuple({metric.declared_in for metric in declared.metrics}),
-        motions=Motions((TRAIN,), (TEST,)), seeds=(0,), device="cpu", folder=folder, command="",
+    if scene_plan is None:
+        sheets = [find_scene(SCENE_OF_METRICS)] if declared.metrics else []
+        simulated = (replace(scene.at(SIZES), metrics=()) for scene in (*declared.scenes, *sheets))
+        met += [(scene, find_method("simulation")) for scene in simulated]
+    tiny = Plan(
+        preset=SIZES, suites=(), cells=(), cases=(), motions=Motions((TRAIN,), (TEST,)), seeds=(0,),
+        metrics=tuple({metric.declared_in for metric in declared.metrics}), device="cpu", folder=folder,
+        command="",
     )  # fmt: skip
+    cells = tuple(Cell(scene, entry, 0, ("speed",)) for scene, entry in met)
+    return replace(scene_plan or tiny, cells=cells, suites=("speed",), folder=folder)
 
 
 def outcomes_of(tasks: Sequence[Task], plan: Plan, assets: Assets | None) -> dict[TaskId, Outcome]:
@@ -253,31 +250,6 @@ class CheckedCell(RunCell):
             if entry.declared_in and not outcome.failed:
                 check_method(entry, self.scene(context), partial(entry.make, models=models), self.cell.seed)
         return outcome
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CheckedMetrics(MeasureCell):
-    """Metrics of a cell, measured twice."""
-
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Measure, and compare the numbers."""
-        outcome = super().run(context, needed)
-        context.memo.clear()
-        again = super().run(context, needed)
-        for name, value in outcome.result.items():
-            number = value.value if isinstance(value, Estimate) else value
-            demand(
-                (math.isfinite(number), f"{name} is {number}: leave out what does not apply"),
-                (again.result.get(name) == value,
-                    f"{name} is {value}, then {again.result.get(name)}: fix its seed"),
-            )  # fmt: skip
-        return outcome
-
-
-def checked(task: Task) -> Task:
-    """Return the task that checks what it runs in place of one that runs a cell or measures it."""
-    kind = {"cell": CheckedCell, "metrics": CheckedMetrics}.get(task.kind)
-    return kind(**{f.name: getattr(task, f.name) for f in fields(task)}) if kind else task
 
 
 if __name__ == "__main__":
