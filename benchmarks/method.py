@@ -122,7 +122,6 @@ class MethodEntry:
         package: what it needs installed besides this project.
         batched: whether it has `batch(copies)`, which computes many bodies at once.
         gives_first_frame: whether it computes frame 0 too, as networks do; other methods are given the start.
-        conserving: whether conservation laws are measured.
         timed: whether its run time is measured in scenes that measure run times.
         declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance of a
             trajectory may say it as well.
@@ -156,7 +155,6 @@ class MethodEntry:
     package: str | None = None
     batched: bool = False
     gives_first_frame: bool = False
-    conserving: bool = False
     timed: bool = True
     declared_ms: float | None = None
     other_mesh: bool = False

@@ -54,7 +54,6 @@ class Metric:
             say something, and ratios nothing.
         of: what it is a number of: the "answer" of a method; the "method" itself, as its size; or the
             "machine", as every time. Another seed gives another answer; another machine another time.
-        reference_tolerance: how far from zero the value of the reference may be; its row is then judged.
         declared_in: as of a MethodEntry.
 
     Raises:
@@ -72,7 +71,6 @@ class Metric:
     lower_is_better: bool | None = None
     arbitrary_zero: bool = False
     of: str = "answer"
-    reference_tolerance: float | None = None
     declared_in: str = ""
 
     def __post_init__(self) -> None:

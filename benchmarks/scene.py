@@ -150,7 +150,6 @@ class BuiltScene:
         repeated: two sets of frames of the trajectory that show the same motion.
         minimised: terms of simulations in place of `energies`, with self-contact, which no metric knows; none
             where the cloth may cross itself.
-        settle_uncrossed: like `settle`, with self-contact; None where a start is not simulated.
 
     Raises:
         ValueError: a warm-up below two.
@@ -173,7 +172,6 @@ class BuiltScene:
     kept: np.ndarray | None = None
     repeated: tuple[np.ndarray, np.ndarray] | None = None
     minimised: tuple[Energy, ...] = ()
-    settle_uncrossed: Callable[[], np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         by_name("energy", self.energies)  # rows of one would overwrite those of the other

@@ -69,7 +69,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser = Parser(
         replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
-        description="Energies, gap to the minimum of each step, curvature, depth, conservation, dynamics of "
+        description="Energies, gap to the minimum of each step, curvature, depth, dynamics of "
         "a roll-out of another program: rows, a report, one line.",
         epilog=EXAMPLES,
     )

@@ -49,7 +49,6 @@ METHODS = (
         description="the reference: backward Euler minimised to tolerance 1e-6",
         module="benchmarks.methods.simulation:make_simulation",
         role="reference",
-        conserving=True,
     ),
     MethodEntry(
         name="skinning",
@@ -59,16 +58,14 @@ METHODS = (
         needs_body=True,
         dtype="float32",
         gives_first_frame=True,
-        conserving=True,
     ),
     network("untrained", "SNUG, untrained",
             "the SNUG network with a random last layer (SNUG itself starts as skinning)",
-            role="baseline", conserving=False, timed=False),  # a frame of it costs what one of SNUG does
+            role="baseline", timed=False),  # a frame of it costs what one of SNUG does
     network("snug", "SNUG", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
     network("supervised", "Supervised", "the SNUG network trained on simulated vertices instead"),
     network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     *FURTHER_METHODS,
-    *declared_networks.RECIPE_DEVIATIONS,
     *EQUAL_DATA,
     *SOLVERS,
 )  # fmt: skip

@@ -1,16 +1,7 @@
-"""Networks as methods: baselines, ablations, equal data; and their trainings.
+"""Networks as methods: baselines, ablations, equal data; and the trainings of all of them.
 
-Trainings of the project's networks, by the name of the network that a method declares as `trained`.
-
-No result depends on this list, but on the training of its own network alone: a further line makes no
+No result depends on these lists, but on the training of its own network alone: a further line makes no
 finished network out of date.
-
-Networks that learn from the same motions (equal data). They run when they are named.
-
-The last training motion is held out of all of them. Those that simulated vertices teach get the same mixed
-clips with every seed, simulated once; the others mix as many anew. All have SNUG's number of steps, or go on
-until the held-out motion gets no better; learners without steps are fitted once. Members of a family differ
-in their number of frames alone.
 """
 
 from __future__ import annotations
@@ -21,15 +12,7 @@ from typing import Any
 from benchmarks.method import MethodEntry, Reporting
 from benchmarks.training import Simulated, Training
 from snug.kinds import KINDS
-from snug.named_recipes import (
-    ABLATIONS,
-    DEVIATIONS,
-    DYNAMIC,
-    PAPER,
-    PBNS_SPRINGS,
-    exchange_deviations,
-)
-from snug.recipe import DEFAULT
+from snug.named_recipes import ABLATIONS, DYNAMIC, PAPER, PBNS_SPRINGS
 
 TRAININGS = {
     # Each kind by its own recipe; `dynamic` learns from other simulations, as `snug-dynamic`.
@@ -42,13 +25,6 @@ TRAININGS = {
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
     "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
-    # Each deviation has as many steps as the recipe that it changes.
-    **{
-        f"snug-{recipe.name}": Training(
-            "snug", recipe, steps_of="snug-paper" if recipe.name.startswith("paper-") else ""
-        )
-        for recipe in exchange_deviations(DEFAULT, PAPER)
-    },
 }
 
 
@@ -77,7 +53,6 @@ def network(
         "seeded": True,
         "batched": True,
         "gives_first_frame": True,
-        "conserving": True,
         "role": "network",
         "reporting": Reporting(base=base, pairing_group=pairing_group or name),
     }
@@ -199,49 +174,29 @@ RECIPES = tuple(
     for recipe in ABLATIONS
 )  # fmt: skip
 
-# Each a training of its own, of equal steps: their times stand beside them.
-RECIPE_DEVIATIONS = tuple(
-    network(
-        f"{base}-{verb}-{deviation.name}", f"{label} {verb} {deviation.description}",
-        f"{base} {verb} {deviation.description}", role="ablation", base=base, pairing_group="snug",
+
+def _equal_data(name: str, label: str, mixed: int, *, converged: bool = False) -> MethodEntry:
+    """Declare a network on equal data, with `mixed` augmented frames for each given one.
+
+    The last training motion is held out. With every seed a network that simulated vertices teach gets the
+    same clips, simulated once; another mixes as many anew. Both have SNUG's number of steps or go on until
+    the held-out motion gets no better. Not timed: its run time is that of the network of the usual data.
+    """
+    usual = TRAININGS[name]
+    recipe = replace(usual.recipe, name=f"{usual.recipe.name}-data-{mixed}")
+    training = (
+        replace(usual, recipe=recipe, simulated=Simulated(mixed=mixed))
+        if usual.simulated
+        else replace(usual, recipe=replace(recipe, mixed=float(mixed)))
     )
-    for base, label, verb in (("snug", "SNUG", "without"), ("snug-paper", "SNUG, paper's text,", "with"))
-    for deviation in DEVIATIONS
-)  # fmt: skip
-
-
-# Mixed frames for each given one; between the ends for the curve of error against training frames.
-ENDS, CURVE = (0, 12), (0, 1, 3, 12)
-FAMILIES_OF_NETWORKS = (
-    ("snug", "SNUG", CURVE),
-    ("pbns", "PBNS", ENDS),
-    ("supervised", "Supervised", CURVE),
-    ("santesteban2019", "Santesteban 2019", ENDS),
-    ("tailornet", "TailorNet", ENDS),
-)
-FITTED = (("nearest-poses", "Nearest poses"), ("pose-regression", "Ridge on principal components"))
-
-
-def _training(name: str, mixed: int, *, converged: bool) -> Training:
-    training = TRAININGS[name]
-    recipe = replace(training.recipe, name=f"{training.recipe.name}-data-{mixed}")
-    if training.simulated:
-        training = replace(training, simulated=Simulated(mixed=mixed))
-    else:
-        recipe = replace(recipe, mixed=float(mixed))
-    return replace(training, recipe=recipe, steps_of="snug", held_out=1, converged=converged)
-
-
-def _entry(name: str, label: str, mixed: int, *, converged: bool = False, seeded: bool = True) -> MethodEntry:
-    """Declare a network on equal data. Not timed: its run time is that of the network of the usual data."""
     family = f"{name}-data" + "-converged" * converged
     data = f"original data and {mixed} augmented frames for each" if mixed else "original data"
     title = f"{label}, {mixed} augmented for each" if mixed else f"{label}, original data"
     return network(
         f"{family}-{mixed}", title + ", converged" * converged,
         f"{name} that learns from {data}" + ", until a held-out motion gets no better" * converged,
-        training=_training(name, mixed, converged=converged), role="ablation", batched=False, timed=False,
-        seeded=seeded,
+        training=replace(training, steps_of="snug", held_out=1, converged=converged),
+        role="ablation", batched=False, timed=False,
         reporting=Reporting(
             family=family, level=float(mixed), base=f"{name}-data-{mixed}" if converged else name,
             pairing_group=name,
@@ -249,14 +204,9 @@ def _entry(name: str, label: str, mixed: int, *, converged: bool = False, seeded
     )  # fmt: skip
 
 
-def _block(name: str, label: str, numbers: tuple[int, ...]) -> tuple[MethodEntry, ...]:
-    """Declare all numbers at equal steps, the ends to convergence too, and these with post-processing."""
-    equal = tuple(_entry(name, label, mixed, converged=False) for mixed in numbers)
-    converged = tuple(_entry(name, label, mixed, converged=True) for mixed in ENDS)
-    ends = (entry for entry in (*equal, *converged) if entry.reporting.level in ENDS)
-    return (*equal, *converged, *map(post_processed, ends))
-
-
 EQUAL_DATA = tuple(
-    entry for network_and_numbers in FAMILIES_OF_NETWORKS for entry in _block(*network_and_numbers)
-) + tuple(_entry(name, label, mixed, seeded=False) for name, label in FITTED for mixed in ENDS)
+    _equal_data(name, label, mixed, converged=converged)
+    for name, label in (("snug", "SNUG"), ("supervised", "Supervised"))
+    for converged, numbers in ((False, (0, 1, 3, 12)), (True, (0, 12)))
+    for mixed in numbers
+)

@@ -32,7 +32,7 @@ _LBFGS: dict[str, Any] = {
 
 def _truncated(
     family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
-    counted: str = "iterations", dtype: str = "float64", conserving: bool = False, **options: Any,
+    counted: str = "iterations", dtype: str = "float64", **options: Any,
 ) -> tuple[MethodEntry, ...]:  # fmt: skip
     """Declare one entry for each number of iterations, which is the option `counted` of the module."""
     return tuple(
@@ -43,7 +43,6 @@ def _truncated(
             module=module,
             options={counted: count, **options},
             dtype=dtype,
-            conserving=conserving,
             truncated=True,
             role="solver",
             reporting=Reporting(family=family, level=count),
@@ -66,7 +65,6 @@ def warm_started(base: str, label: str, solver: str) -> tuple[MethodEntry, ...]:
             trained=trained,
             seeded=trained is not None,
             truncated=True,
-            conserving=solver == "fast-lbfgs",
             role="warm-started",
             reporting=Reporting(
                 family=f"{base}+{solver}", level=count, base=base, pairing_group="snug" if trained else ""
@@ -149,15 +147,6 @@ SOLVERS = (
             ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
         )
     ),
-    MethodEntry(
-        name="simulation-self-contact",
-        label="Simulation, self-contact",
-        description="the reference with a barrier that keeps the cloth from crossing itself",
-        module="benchmarks.methods.reference_variants:make_self_contact",
-        package="ipctk",
-        role="ablation",
-        reporting=Reporting(base="simulation"),
-    ),
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
         (1, 2, 4, 8), **_NEWTON,
@@ -169,7 +158,7 @@ SOLVERS = (
     *_truncated(
         "fast-lbfgs", "Fast L-BFGS", "iteration",
         "L-BFGS compiled as a whole, float32, stopped after {}", (5, 10, 20, 40),
-        module="benchmarks.methods.simulation:make_fast_lbfgs", dtype="float32", conserving=True,
+        module="benchmarks.methods.simulation:make_fast_lbfgs", dtype="float32",
     ),
     *_truncated(
         "gradient-descent", "Gradient descent", "iteration",

@@ -100,7 +100,6 @@ def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
         options={"path": path, "digest": digest(stored), **asdict(option.stated)},
         dtype=stored.dtype,
         gives_first_frame=True,
-        conserving=not option.stated.other_mesh,
         timed=False,
         declared_ms=option.declared_ms,
         other_mesh=option.stated.other_mesh,

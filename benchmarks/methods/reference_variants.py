@@ -1,4 +1,4 @@
-"""Variants of the reference: other material, perturbed start, self-contact.
+"""Variants of the reference: other material, perturbed start.
 
 All are measured, as every method, by the energies that the scene declares; another material starts where the
 scene's own does. Wrinkling cloth has several minima, and which one is reached hangs on the last digits: what
@@ -15,7 +15,6 @@ import numpy as np
 
 from benchmarks.methods.simulation import Simulation
 from benchmarks.scene import BuiltScene
-from benchmarks.scenes.self_contact import crossing, demand_uncrossed, with_self_contact
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.stretch_spring import StretchSpring
@@ -90,23 +89,3 @@ class PerturbedStart(Simulation):
 def make_perturbed_start(*, models: Path, seed: int, shift: float) -> PerturbedStart:
     """Make the reference from a start perturbed by `shift` [m]."""
     return PerturbedStart(options={}, shift=shift)
-
-
-class SelfContact(Simulation):
-    """Reference simulation with self-contact, from the scene's start, or from one of its own."""
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Settle the garment anew, with self-contact, where the cloth of the scene's start crosses itself.
-
-        Raises ValueError where that start cannot be had without a crossing.
-        """
-        energies, settle = with_self_contact(scene.energies), scene.settle_uncrossed
-        if settle is not None and crossing(scene.start, energies):
-            scene = dataclasses.replace(scene, settle=settle)
-        demand_uncrossed(scene.start, energies, scene.name)
-        super().prepare(dataclasses.replace(scene, minimised=energies))
-
-
-def make_self_contact(*, models: Path, seed: int) -> SelfContact:
-    """Make the reference with self-contact."""
-    return SelfContact(options={})

@@ -12,7 +12,6 @@ from functools import cache
 
 from benchmarks.declarations import by_name
 from benchmarks.metric import Measurements, Metric, measurements_in
-from benchmarks.metrics.conservation import CONSERVATION
 from benchmarks.metrics.cost import COST, RELAXED
 from benchmarks.metrics.curvature import CURVATURE
 from benchmarks.metrics.dynamics import DYNAMICS
@@ -26,7 +25,7 @@ from benchmarks.metrics.surface_distance import SURFACE
 
 MEASUREMENTS = (
     ENERGY, PRINTED_BENDING, CURVATURE, INTERSECTIONS, GEOMETRY, SURFACE, BODY, GAP, RELAXED, EXACT, DYNAMICS,
-    CONSERVATION, COST, EXTRAPOLATION, LONG_ROLL_OUT, MESH, BODY_SHAPE,
+    COST, EXTRAPOLATION, LONG_ROLL_OUT, MESH, BODY_SHAPE,
 )  # fmt: skip
 
 

@@ -112,10 +112,6 @@ def _rows(
         if name == "cost/spread" and value > 100.0 * SPREAD:
             why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
         judged: dict[str, Any] = {"protocol": OWN} if metric.declared_in else {}
-        if metric.reference_tolerance is not None and entry.role == "reference":
-            judged |= {"expected": 0.0, "tolerance": metric.reference_tolerance}
-            if value > metric.reference_tolerance:
-                ended, why = "failed", f"{value:.3g} in a frame that claims to have converged"
         if not math.isfinite(value):
             why, ended = why or f"{name} is not finite", "failed" if status == "ok" else status
         yield dataclasses.replace(

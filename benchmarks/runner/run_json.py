@@ -183,7 +183,7 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     order = {name: place for place, name in enumerate(declared(plan.metrics))}
     ordered = sorted(declarations, key=lambda name: order.get(name, len(order)))
     metrics = {
-        name: _fields(metric, "name", "reference_tolerance", "declared_in")
+        name: _fields(metric, "name", "declared_in")
         for name in ordered
         if (metric := declarations[name]) is not None
     }

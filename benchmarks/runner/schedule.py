@@ -361,7 +361,6 @@ class Schedule:
                 entry.role,
                 entry.reporting.family,
                 entry.reporting.level,
-                entry.conserving,
                 entry.static_known,
                 entry.other_mesh,
             ],

@@ -59,7 +59,7 @@ def build_dressed_body(
     motion = assets.motion(scene.motion, scene.part)
     before = assets.before(scene.motion, scene.part)
 
-    def settle(terms: tuple[Energy, ...]) -> np.ndarray:
+    def settle() -> np.ndarray:
         if before is None:
             return settled(cloth, terms, assets, garment, motion, settle_frames, shape)
         start = settled(cloth, terms, assets, garment, before, settle_frames, shape)
@@ -67,25 +67,20 @@ def build_dressed_body(
         x = _simulated(cloth, terms, body, garment, way, start, shape, aim)
         return np.stack([x[-1], (x[-1] - x[-2]) * way.fps])
 
-    def settle_uncrossed() -> np.ndarray:
-        return settle(apart())
-
-    def apart() -> tuple[Energy, ...]:
+    cloth = garment.cloth()
+    terms = energies = declared_energies(cloth)
+    if scene.self_contact:
         from benchmarks.scenes.self_contact import with_self_contact  # loads the barrier
 
-        return with_self_contact(energies)
-
-    cloth = garment.cloth()
-    energies = declared_energies(cloth)
+        terms = with_self_contact(energies)
     return worn(
         scene,
         assets,
         Dressed(body, garment, motion, shape, before=before),
         cloth=cloth,
         energies=energies,
-        settle=settle_uncrossed if scene.self_contact else lambda: settle(energies),
-        minimised=apart() if scene.self_contact else (),
-        settle_uncrossed=settle_uncrossed,
+        settle=settle,
+        minimised=terms if scene.self_contact else (),
         warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
     )
 

@@ -25,14 +25,10 @@ def with_self_contact(energies: tuple[Energy, ...]) -> tuple[Energy, ...]:
     return (*energies, ContactBarrier(energies[0].cloth, distance=DISTANCE, stiffness=STIFFNESS))
 
 
-def crossing(x: np.ndarray, energies: tuple[Energy, ...]) -> str:
-    """Name an edge and a face that cut each other at x (V, 3) [m]; "" if none do, or no term sees them."""
-    return next(filter(None, (term.infeasibility(x) for term in energies if term.joins_late)), "")
-
-
 def demand_uncrossed(x: np.ndarray, energies: tuple[Energy, ...], name: str) -> None:
     """Raise ValueError where x (V, 3) [m], the start of the cloth called `name`, crosses itself."""
-    if place := crossing(x, energies):
+    places = (term.infeasibility(x) for term in energies if term.joins_late)
+    if place := next(filter(None, places), ""):
         raise ValueError(
             f"{name}: {place} where it starts: self-contact cannot untangle it; mend the mesh at this face, "
             "or simulate without self-contact"

@@ -85,7 +85,4 @@ METRIC_FAULTS = {
         Fault("static answer one frame late", "dynamic_part", "difference = moving - static\n",
               "difference = moving - np.roll(static, 1, axis=0)\n"),
     ),
-    "test_conservation": (
-        Fault("momentum without the time step", "_one_step", "v) - dt * force", "v) - force"),
-    ),
 }  # fmt: skip

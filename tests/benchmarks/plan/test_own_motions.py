@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from benchmarks import run
+from benchmarks.plan.motions import split_motions
+from benchmarks.plan.study import StudyError, read_study
+from snug.motion.library import TEST, VALIDATION
 from snug.motion.motion import MotionError
 from tests.benchmarks.assets.test_inputs import write_motions
-from tests.benchmarks.plan.planned import planned
+from tests.benchmarks.plan.planned import planned, study_with
 
 WORDS = ("smoke:garments", "--methods", "skinning")
 
@@ -57,3 +60,12 @@ def test_a_folder_without_any_motion_and_a_damaged_file_are_refused(tmp_path, re
     (tmp_path / "clips" / "b.npz").write_bytes(b"PK")
     refused("b.npz", run.main, [*options, folder])
     assert refused("no such file", run.main, [*options, str(tmp_path / "nowhere")])
+
+
+def test_a_recipe_is_never_chosen_by_the_test_motions():
+    ablations = read_study("ablations")
+    assert ablations.split == "validation" and not ablations.test_motions
+    motions = split_motions(ablations)
+    assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
+    with pytest.raises(StudyError, match="'dance_turn' is a test motion"):
+        split_motions(study_with(validation_motions="dance_turn", split="validation"))

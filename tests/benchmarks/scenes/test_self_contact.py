@@ -9,8 +9,6 @@ import pytest
 
 from benchmarks.methods import find_method
 from benchmarks.methods.simulation import Simulation
-from benchmarks.metric import RollOut, SceneRollOuts
-from benchmarks.metrics import conservation
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import protocol_of
 from benchmarks.plan.study import StudyError
@@ -20,14 +18,11 @@ from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 from reference_sim.minimise.newton import Newton
-from reference_sim.time_loop import simulate
-from tests.benchmarks.plan.planned import planned, study_with
+from tests.benchmarks.plan.planned import study_with
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid
 
 pytest.importorskip("ipctk", reason="ipctk is not installed: no self-contact")
-
-METHOD = "simulation-self-contact"
 
 
 def two_sheets(height: float):
@@ -43,26 +38,6 @@ def two_sheets(height: float):
     return dataclasses.replace(
         scene, cloth=cloth, energies=energies, settle=lambda: start, pin_positions=None, exact=None
     )
-
-
-def made(scene):
-    method = find_method(METHOD).make(models=None, seed=0)
-    method.prepare(scene)
-    return method
-
-
-def test_where_nothing_meets_it_is_the_simulation_and_is_measured_without_its_barrier():
-    scene = small_scene("hanging_sheet", cells=4, frames=5)
-    reference = Simulation(options={})
-    reference.prepare(scene)
-    expected, method = reference.run(), made(scene)
-    trajectory = method.run()
-    assert np.array_equal(trajectory.positions, expected.positions)
-    assert "energy/barrier" in trajectory.frame_fields
-    assert "energy/barrier" not in expected.frame_fields
-    assert [term.name for term in method.scene.energies] == ["strain", "bending", "gravity"]
-    entry = find_method(METHOD)
-    assert (entry.role, entry.reporting.base, entry.package) == ("ablation", "simulation", "ipctk")
 
 
 def test_solvers_that_stop_early_know_no_self_contact():
@@ -98,33 +73,6 @@ def test_another_material_is_minimised_beside_the_barrier(exchange):
         assert mine.parameters() == theirs.parameters()
 
 
-def test_laws_are_those_of_what_is_minimised(monkeypatch):
-    scene = two_sheets(0.035)
-    scene = dataclasses.replace(scene, frames=6, minimised=with_self_contact(scene.energies))
-    thrown = np.zeros(scene.start.shape)
-    thrown[len(thrown) // 2 :, 1] = -0.5  # [m/s] the upper sheet, towards the lower one
-    trajectory = simulate(
-        scene.cloth, scene.minimised, dt=scene.dt, frames=6, start=scene.start, velocity=thrown
-    )
-    group = SceneRollOuts(scene)
-    group.roll_outs.append(RollOut(group, find_method("simulation"), trajectory))
-    monkeypatch.setattr(conservation, "_asked", lambda group: group.roll_outs)  # though nobody is dressed
-    (declared,) = conservation.law_series(scene, [trajectory.positions])
-    (minimised,) = conservation._laws_of(group).values()
-    assert minimised.residual.max() <= 1e-6 < declared.residual.max()
-
-
-def test_a_start_that_crosses_itself_is_settled_anew_or_refused():
-    crossed, free = two_sheets(0.0), two_sheets(0.05)
-    message = r"edge \(\d+, \d+\) of the cloth cuts face \d+ of the cloth where it starts.*mend the mesh"
-    with pytest.raises(ValueError, match=message):
-        made(crossed)
-    again = made(dataclasses.replace(crossed, settle_uncrossed=lambda: free.start))
-    assert np.array_equal(again.scene.start, free.start)
-    kept = made(dataclasses.replace(free, settle_uncrossed=lambda: crossed.start))
-    assert np.array_equal(kept.scene.start, free.start)
-
-
 def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     study = study_with(
         scenes=["tshirt/kick", "flag"], methods=["simulation", "snug"], split="validation", self_contact=True
@@ -139,8 +87,3 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     monkeypatch.setitem(make_plan.__globals__, "installed", lambda package: False)
     with pytest.raises(StudyError, match="--self_contact: needs the package ipctk: pip install ipctk"):
         make_plan(study)
-
-
-def test_garments_have_it_as_a_row_beside_the_simulation_where_it_is_named():
-    plan = planned("--scenes", "tunic/*", "--methods", f"simulation,{METHOD}")
-    assert {cell.method for cell in plan.cells} == {"simulation", METHOD}
