@@ -15,7 +15,8 @@ SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 def data_files() -> list[Path]:
     """Return the files of the packages that are no source, as paths below the root."""
     files = [path for layer in LAYERS for path in (ROOT / layer).rglob("*") if path.is_file()]
-    return [path.relative_to(ROOT) for path in files if path.suffix not in SOURCE]
+    data = [path for path in files if path.suffix not in SOURCE and "__pycache__" not in path.parts]
+    return [path.relative_to(ROOT) for path in data]
 
 
 def is_named(path: Path, patterns: dict[str, list[str]]) -> bool:

@@ -14,6 +14,7 @@ import faulthandler
 import json
 import os
 import random
+import re
 import sys
 import time
 import traceback
@@ -28,7 +29,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.timing import peak_memory
 from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError
-from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays, read_pickled_arrays
+from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
 from snug.body.parametric_body import Body
@@ -42,8 +43,54 @@ from snug.motion.motion import MotionError
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from tests.project.fuzzing import samples
-from tests.project.fuzzing.mutations import bytes_of, values_of
 from tests.reports.report_folder import all_rows
+
+NUMBERS = (b"-1", b"0", b"1e300", b"nan", b"inf", b"99999999999999999999", b"9" * 5000, b"1000000000", b"")
+VALUES = (None, True, -1, 0, 1e300, 10**30, "x", "\0" * 300, [], {}, [[]], {"a": {}}, float("nan"))
+
+
+def bytes_of(data: bytes, draw: random.Random) -> bytes:
+    """Make one to three mutations: bits, cuts, repeats, other numbers, words of ones."""
+    for _ in range(draw.randint(1, 3)):
+        at, end = sorted(draw.randint(0, len(data)) for _ in range(2))
+        kind = draw.randrange(7)
+        if kind == 0 and data:
+            changed = bytearray(data)
+            for _ in range(draw.randint(1, 8)):
+                changed[draw.randrange(len(changed))] ^= 1 << draw.randrange(8)
+            data = bytes(changed)
+        elif kind == 1:
+            data = data[:at]
+        elif kind == 2:
+            data = data[:at] + data[min(end, at + 64) :]
+        elif kind == 3:
+            data = data[:end] + data[at:]
+        elif kind == 4:
+            data = data[:at] + draw.choice((b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0" * 16)) + data[at + 8 :]
+        elif kind == 5 and (matches := list(re.finditer(rb"\d+(\.\d+)?", data))):
+            number = draw.choice(matches)
+            data = data[: number.start()] + draw.choice(NUMBERS) + data[number.end() :]
+        else:
+            data = data[:at] + draw.randbytes(draw.randint(0, 40)) + data[at:]
+    return data
+
+
+def values_of(data: bytes, draw: random.Random) -> bytes:
+    """One to three values anywhere in a JSON object are others, or are gone."""
+    value = json.loads(data)
+    for _ in range(draw.randint(1, 3)):
+        inner, place = value, draw.choice(list(value) or ["x"])
+        while isinstance(inner, dict | list) and draw.random() < 0.7:
+            inside = inner.get(place) if isinstance(inner, dict) else inner[place]
+            if not isinstance(inside, dict | list) or not inside:
+                break
+            inner = inside
+            place = draw.choice(list(inner)) if isinstance(inner, dict) else draw.randrange(len(inner))
+        if draw.random() < 0.2:
+            inner.pop(place, None) if isinstance(inner, dict) else inner.pop(place)
+        else:
+            inner[place] = draw.choice(VALUES)
+    return json.dumps(value).encode()
 
 
 class Reader(NamedTuple):
@@ -64,10 +111,6 @@ def read_cloth(path: Path) -> None:
 
 def read_clip(path: Path) -> None:
     load_motions(path)
-
-
-def read_pickled(path: Path) -> None:
-    read_pickled_arrays(path, ("J", *samples.roll_out()))
 
 
 def read_worn(path: Path) -> None:
@@ -123,10 +166,6 @@ def read_config(path: Path) -> None:
     read_rows(path, "run.json")
 
 
-def read_frames(path: Path) -> None:
-    read_rows(path, "frame_energies.csv")
-
-
 MESH = (MeshError,)
 READERS: tuple[Reader, ...] = (
     Reader("array", ".npy", samples.arrays_npy, read_array, (ArrayFileError,), bytes_of),
@@ -135,10 +174,6 @@ READERS: tuple[Reader, ...] = (
     Reader("body", ".npz", samples.arrays(**samples.smpl_arrays()), read_body, (BodyError,), bytes_of),
     Reader("AMASS", ".npz", samples.arrays(**samples.amass_arrays()), read_clip, (MotionError,), bytes_of),
     Reader("body pickle", ".pkl", samples.pickled(samples.smpl_arrays), read_body, (BodyError,), bytes_of),
-    Reader("motion pickle", ".pkl", samples.pickled(samples.amass_arrays),
-           read_clip, (MotionError,), bytes_of),
-    Reader("plain pickle", ".pkl", samples.pickled(samples.anything),
-           read_pickled, (ArrayFileError,), bytes_of),
     Reader("garment", ".obj", samples.shirt, read_worn, (GarmentError,), bytes_of),
     Reader("material", ".toml", lambda: samples.MATERIAL, read_material, (GarmentError,), bytes_of),
     Reader("joints", ".toml", lambda: samples.JOINTS, read_joints, (MotionError,), bytes_of),
@@ -154,18 +189,15 @@ READERS: tuple[Reader, ...] = (
     Reader("OBJ", ".obj", samples.mesh(".obj"), read_cloth, MESH, bytes_of),
     Reader("PLY", ".ply", samples.mesh(".ply", binary=False), read_cloth, MESH, bytes_of),
     Reader("binary PLY", ".ply", samples.mesh(".ply"), read_cloth, MESH, bytes_of),
-    Reader("STL", ".stl", samples.mesh(".stl", binary=False), read_cloth, MESH, bytes_of),
     Reader("binary STL", ".stl", samples.mesh(".stl", binary=True), read_cloth, MESH, bytes_of),
     Reader("OFF", ".off", samples.mesh(".off"), read_cloth, MESH, bytes_of),
     Reader("VTK", ".vtk", samples.mesh(".vtk", binary=False), read_cloth, MESH, bytes_of),
-    Reader("VTK polygons", ".vtk", samples.polydata(".vtk"), read_cloth, MESH, bytes_of),
     Reader("VTP", ".vtp", samples.polydata(".vtp"), read_cloth, MESH, bytes_of),
     Reader("VTU", ".vtu", samples.mesh(".vtu"), read_cloth, MESH, bytes_of),
     Reader("trajectory", ".vtkhdf", samples.trajectory, Trajectory.load, (TrajectoryError,), bytes_of),
     Reader("model", ".safetensors", samples.model_file, TrainedModel.load, (ModelFileError,), bytes_of),
     Reader("model's header", ".json", samples.model_header, read_header, (ModelFileError,), values_of),
     Reader("results.csv", ".csv", samples.results_csv, read_rows, (ResultsError,), bytes_of),
-    Reader("frame_energies.csv", ".csv", samples.frame_energies_csv, read_frames, (ResultsError,), bytes_of),
     Reader("run.json", ".json", samples.run_json, read_config, (ResultsError,), bytes_of),
     Reader("values of run.json", ".json", samples.run_json, read_config, (ResultsError,), values_of),
 )  # fmt: skip

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
@@ -21,7 +20,7 @@ from snug.networks.garment_network import make_network
 from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
-from tests.reports.report_folder import SCENES, all_rows, declaration
+from tests.reports.report_folder import all_rows, declaration
 from tests.snug.motion.cmu_clips import amc_frame, cmu_like
 from tests.snug.motion.motion_forms import bvh
 
@@ -88,11 +87,6 @@ def pickled(arrays: Callable[[], dict[str, np.ndarray]]) -> Callable[[], bytes]:
     return lambda: pickle.dumps(arrays())
 
 
-def anything() -> dict[str, Any]:
-    sparse = scipy.sparse.csc_matrix(np.eye(3))
-    return {**roll_out(), "J": sparse, "names": np.array(["neck"]), "more": [(1, None, True), {"a"}]}
-
-
 def shirt() -> bytes:
     made = find_template("tshirt").tailor(Body.load(), vertices=200)
     return written(".obj", lambda path: write_obj(path, made.rest_positions, made.faces))
@@ -132,11 +126,6 @@ def model_header() -> bytes:
 def results_csv() -> bytes:
     RunFolder(".").write_rows(all_rows())
     return Path("results.csv").read_bytes()
-
-
-def frame_energies_csv() -> bytes:
-    lines = [f"{SCENES[0]},{m},0,{k / 10},{k + 1}e-3,.5" for m in ("snug", "pbns") for k in range(4)]
-    return "\n".join(["scene,method,seed,seconds,strain,total", *lines, ""]).encode()
 
 
 def run_json() -> bytes:

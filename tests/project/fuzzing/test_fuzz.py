@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -12,12 +13,29 @@ import pytest
 
 from snug.motion.files import load_motions
 from snug.motion.motion import MotionError
+from tests.project.fuzzing.fuzz_readers import READERS
 
 HERE = Path(__file__).resolve().parent
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(2001, marks=pytest.mark.slow)])
-def test_mutated_files_are_refused_in_one_line(count, tmp_path):
+@pytest.mark.parametrize("name", ["arrays", "AMASS", "body pickle", "joints", "BVH", "amc", "asf", "JSON"])
+def test_some_mutated_files_are_refused_in_one_line(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (reader,) = (reader for reader in READERS if reader.name == name)
+    data, path, refused = reader.make(), tmp_path / f"mutated{reader.suffix}", 0
+    for number in range(8):
+        path.write_bytes(reader.mutate(data, random.Random(number)))
+        try:
+            reader.read(path)
+        except reader.errors as error:
+            refused += 1
+            assert "\n" not in str(error) and len(str(error)) < 1000
+    assert refused > 2
+
+
+@pytest.mark.slow
+def test_mutated_files_are_refused_in_one_line(tmp_path):
+    count = 2001
     done = subprocess.run(
         [sys.executable, HERE / "fuzz_readers.py", str(count), tmp_path],
         env=os.environ | {"PYTHONPATH": str(HERE.parents[2])}, capture_output=True, text=True, timeout=900,

@@ -38,25 +38,6 @@ def test_chain_against_homogeneous_matrices():
         np.testing.assert_allclose(transforms[joint].numpy(), (matrix @ unpose)[:3], atol=1e-14)
 
 
-def test_rest_joints_are_fixed_points_without_rotation():
-    joints = random_tensor(4, 3)
-    identity = torch.eye(3, dtype=torch.float64).expand(4, 3, 3)
-    transforms = joint_transforms(identity, joints, PARENTS, torch.zeros(3, dtype=torch.float64))
-    torch.testing.assert_close(skin(joints, torch.eye(4, dtype=torch.float64), transforms), joints)
-
-
-def test_a_joint_does_not_move_itself():
-    """Rotating joint 1 moves its children and leaves joints 0 and 1 where they are."""
-    joints = random_tensor(4, 3)
-    turns = torch.zeros(4, 3, dtype=torch.float64)
-    turns[1] = torch.tensor([0.3, -0.8, 0.5])
-    still = torch.zeros(3, dtype=torch.float64)
-    transforms = joint_transforms(rotations_of(turns), joints, PARENTS, still)
-    moved = skin(joints, torch.eye(4, dtype=torch.float64), transforms)
-    torch.testing.assert_close(moved[:2], joints[:2])
-    assert (moved[2:] - joints[2:]).norm(dim=-1).min() > 0.1
-
-
 def test_batches_broadcast_and_gradients_flow():
     joints, points = random_tensor(4, 3), random_tensor(2, 5, 9, 3, seed=1)
     weights = torch.softmax(random_tensor(9, 4, seed=2), dim=-1)

@@ -178,22 +178,6 @@ class TestRetargeting:
         np.testing.assert_allclose(step, [0, 0, 10 * LEG_LENGTH / 14.4], atol=1e-12)
         assert motion.fps == CMU_RATE
 
-    def test_hands_are_damped(self, tmp_path):
-        motion = read_motion(write_clip(tmp_path, [amc_frame(1, lhand=(50,))]), MotionFileOptions())
-        assert np.linalg.norm(motion.poses[0, JOINT["left_wrist"]]) == pytest.approx(np.radians(5))
-
-
-def test_a_spike_of_a_bone_is_bridged_and_named(tmp_path):
-    angles = np.linspace(0, 30, 61)
-    angles[30] = 150
-    clip = write_clip(tmp_path, [amc_frame(k + 1, rradius=(a,)) for k, a in enumerate(angles)])
-    with pytest.raises(MotionError, match="right_elbow jumps in frames 28-32; add ,repair"):
-        read_motion(clip, MotionFileOptions())
-    motion = read_motion(clip, MotionFileOptions(repair=True))
-    assert "repaired: right_elbow jumps in frames 28-32" in motion.source
-    turned = np.linalg.norm(motion.poses[:, JOINT["right_elbow"]], axis=1)
-    np.testing.assert_allclose(np.degrees(turned), np.linspace(0, 30, 61), atol=1e-6)
-
 
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="no CMU clips here; set CMU_MOTIONS to a folder of them")
 class TestRecordedClips:

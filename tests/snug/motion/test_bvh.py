@@ -12,7 +12,7 @@ from snug.motion.bvh import read_clip, shift_of, turns_of
 from snug.motion.files import read_motion
 from snug.motion.library import make_motion
 from snug.motion.motion import MotionError
-from snug.motion.retarget import NEEDED, _side, match_joints
+from snug.motion.retarget import NEEDED, match_joints
 from tests.snug.motion.motion_forms import MIXAMO, bvh
 
 WALK = make_motion("walk").cut(20, 40)
@@ -61,26 +61,6 @@ Frame Time: 0.0083333
     np.testing.assert_allclose(
         turns_of(below, frames)[0], Rotation.from_euler("YZ", [40, 50], degrees=True).as_matrix(), atol=1e-12
     )
-
-
-@pytest.mark.parametrize(
-    ("name", "side", "rest"),
-    [
-        ("mixamorig:LeftUpLeg", "left", "upleg"),
-        ("lThigh", "left", "thigh"),
-        ("RHip", "right", "hip"),
-        ("thigh_l", "left", "thigh"),
-        ("Bip01 R UpperArm", "right", "upperarm"),
-        ("left_knee", "left", "knee"),
-        ("LHipJoint", "left", "hipjoint"),
-        ("LowerBack", "", "lowerback"),
-        ("Head", "", "head"),
-        ("L", "", "l"),
-        ("", "", ""),
-    ],
-)
-def test_sides_of_names(name, side, rest):
-    assert _side(name) == (side, rest)
 
 
 # Names with the indices of their parents. CMU's clips as BVH: half bones inside hips and neck.

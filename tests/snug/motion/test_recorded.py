@@ -3,7 +3,6 @@
 import hashlib
 import re
 import tomllib
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from snug.motion.library import (
     DYNAMIC_VALIDATION,
     LIBRARY,
     SEGMENTS,
-    SEGMENTS_OF,
     TEST,
     TRAIN,
     VALIDATION,
@@ -112,16 +110,6 @@ def test_a_segment_starts_at_the_origin_facing_forward_on_the_clips_floor(name, 
     np.testing.assert_array_equal(motion.poses[:, 1:], clip.poses[start:stop, 1:])
     steps = [np.linalg.norm(np.diff(m.translations, axis=0), axis=1) for m in (motion, clip.cut(start, stop))]
     np.testing.assert_allclose(*steps, atol=1e-12)
-
-
-def test_segments_cover_their_clip_without_overlap():
-    for clip, count in SEGMENTS_OF.items():
-        edges = [
-            (SEGMENTS[f"{clip}_{letter}"].start, SEGMENTS[f"{clip}_{letter}"].stop)
-            for letter in "abcdefg"[:count]
-        ]
-        assert edges[0][0] == 0 and edges[-1][1] == CLIPS[clip].frames
-        assert all(before[1] == after[0] for before, after in pairwise(edges))
 
 
 def test_the_notice_is_shipped_and_the_file_is_small():
