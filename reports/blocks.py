@@ -11,12 +11,17 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from reports.figures.costs import break_even, error_of_page_one
+from reports.figures.charts import (
+    break_even,
+    dots,
+    energy_series,
+    error_of_page_one,
+    known_answers,
+    training_curves,
+)
 from reports.figures.figure import Figure, Picture
-from reports.figures.over_time import energy_series, training_curves
-from reports.figures.values import dots, known_answers
+from reports.finished_run import Run
 from reports.pictures import failures, side_by_side
-from reports.run.finished_run import Run
 from reports.tables.table import Cell, Table
 
 ROWS, LETTERS = 12, 90  # of a printed table and of a text in its cells; the CSV has all

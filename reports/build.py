@@ -18,7 +18,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from reports.run.finished_run import Run
+    from reports.finished_run import Run
 
 SHOWN = 4  # names in a line
 
@@ -50,9 +50,9 @@ def build_report(run_dir: str | Path) -> Built:
     # Heavy: not needed for --help.
     from reports.blocks import FIGURES, Report
     from reports.figures.figure import draw_figures
+    from reports.finished_run import read_run_with_trainings
     from reports.page.write_page import write_page
     from reports.pdf import write_pdf
-    from reports.run.reading import read_run_with_trainings
     from reports.tables import make_tables, write_tables
     from reports.text.text_table import answer
 

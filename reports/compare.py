@@ -11,8 +11,7 @@ from collections.abc import Iterator, Sequence
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 from reports.comparison import BETTER, FAILING, GONE, OTHER, TIME_TOLERANCE, WORSE, Comparison, compare
-from reports.run.finished_run import Run
-from reports.run.reading import read_run
+from reports.finished_run import Run, read_run
 
 EXAMPLES = """examples:
   python -m reports.compare before after

@@ -24,7 +24,7 @@ from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEVEL, one_protocol
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import OF_SCENES
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means
 from reports.statistics.pareto import REPEATS, TIME, WHOLE

@@ -10,9 +10,8 @@ from pathlib import Path
 from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
+from reports.finished_run import Run, read_run
 from reports.page.write_page import filled, table_data
-from reports.run.finished_run import Run
-from reports.run.reading import read_run
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.relative_excess import excess_of

@@ -69,7 +69,7 @@ def select_roll_outs(
     Raises:
         ResultsError: for a roll-out that the run did not keep; the message names those of its scenes.
     """
-    from reports.run.reading import read_run
+    from reports.finished_run import read_run
 
     run = read_run(folder)
     rows = run.frame[(run.frame["case"] == "") & (run.frame["scene"] == scene)]

@@ -22,7 +22,7 @@ from reference_sim.files.atomic_files import replacing
 from reports.blocks import BLOCKS, ROWS, Heading, Report, TableBlock
 from reports.figures.figure import Figure, Picture
 from reports.figures.plotting import printable
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.sentences import headline
 from reports.tables.table import DASH, CellText, Column, Table, column_texts, duration, number, remarks_below
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import pandas as pd
 
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import ensemble_spread, mean_of
 from reports.statistics.outcomes import (

@@ -16,8 +16,7 @@ import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
 from reports.comparison import FAILING, Change, compare
-from reports.run.finished_run import Run
-from reports.run.reading import read_run
+from reports.finished_run import Run, read_run
 
 
 @dataclass(frozen=True)

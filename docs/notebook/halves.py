@@ -10,8 +10,7 @@ import sys
 from dataclasses import replace
 
 from benchmarks.results.run_folder import RunFolder
-from reports.run.finished_run import Run
-from reports.run.reading import read_run
+from reports.finished_run import Run, read_run
 from reports.statistics.paper_claims import FAILS, HOLDS, Claim, judged
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from reference_sim.files.atomic_files import replacing
 from reports.figures.plotting import DOTS, PAGE_WIDTH
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

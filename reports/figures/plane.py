@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports.figures.plotting import Style, family_style, log_axis, power_text, style
-from reports.run.finished_run import ReportedMethod, Run
+from reports.finished_run import ReportedMethod, Run
 from reports.statistics.pareto import Point, front
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.run.finished_run import ReportedMethod, Run
+from reports.finished_run import ReportedMethod, Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -23,8 +23,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.geometry.topology import corner_areas
 from reference_sim.obstacle import Obstacle
 from reference_sim.trajectory import Trajectory
-from reports.run.finished_run import Run, shown_seeds
-from reports.run.stored_files import STEP
+from reports.finished_run import STEP, Run, shown_seeds
 
 STEPS = 2**16 - 1
 FINEST = 1e-4  # [m] of a step: nothing finer is seen, and noise does not deflate

@@ -18,8 +18,8 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
 from reports.blocks import BLOCKS, Report, TableBlock
 from reports.figures.plotting import style
+from reports.finished_run import Run
 from reports.page.embedded_roll_outs import BUDGET, RULE, Embedded, deflated, embed
-from reports.run.finished_run import Run
 from reports.sentences import headline
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean, value_of

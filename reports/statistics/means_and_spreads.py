@@ -20,7 +20,7 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEAST_MEMBERS
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,7 @@ from scipy import stats
 from benchmarks.results.protocol import LEVEL, OWN
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
-from reports.run.finished_run import Run
-from reports.run.reading import read_run
+from reports.finished_run import Run, read_run
 from reports.statistics.effects import EXCESS, off_scale, on_scale, recording_of
 from reports.statistics.means_and_spreads import mean_of, shared_scenes
 from reports.statistics.pareto import NETWORK

@@ -16,7 +16,7 @@ import pandas as pd
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import BEFORE_FRAMES
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect, recording_of
 from reports.statistics.means_and_spreads import HALF, half_of, pair, share_of_frames, with_shares
 from reports.statistics.verdicts import (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from benchmarks.results.row import BEFORE_FRAMES
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.means_and_spreads import ensemble_spread, mean_of, means, value_of
 
 TIME, REPEATS = "cost/frame", "cost/spread"

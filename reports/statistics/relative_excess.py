@@ -21,7 +21,7 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import SOFTENING
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.effects import (
     EXCESS,
     Effect,

@@ -21,7 +21,7 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEAST_MOTIONS, LEVEL
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.effects import EXCESS, RANGE, Effect, cost_effect, effect
 from reports.statistics.means_and_spreads import Mean, pair
 from reports.statistics.relative_excess import compared_excess, relative_metric

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from reports.run.finished_run import Run
-from reports.tables.costs import error_rivals, reference_uncertainty
+from reports.finished_run import Run
 from reports.tables.findings import (
     endings,
     errors_in_spreads,
@@ -20,7 +19,7 @@ from reports.tables.findings import (
     unfinished,
     validation,
 )
-from reports.tables.page_one_table import overview
+from reports.tables.page_one import error_rivals, overview, reference_uncertainty
 from reports.tables.pivots import ablation_effects, ablations, metric_tables, shapes
 from reports.tables.table import Table
 

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.metric import Metric
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.effects import recording_of
 from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
 from reports.statistics.outcomes import BAD, check_name, checks, counted, stress_tests, tolerances_away

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from benchmarks.metric import Metric
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.means_and_spreads import mean_of, means
 from reports.statistics.relative_excess import (
     SKINNING,

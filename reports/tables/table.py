@@ -13,7 +13,7 @@ import pandas as pd
 from benchmarks.metric import Metric
 from benchmarks.results.row import cell_text
 from reference_sim.files.atomic_files import replacing
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
 from reports.statistics.means_and_spreads import Mean
 

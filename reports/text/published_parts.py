@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.results.run_folder import RunFolder
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.sentences import ALIKE, GAP, SWING, secondary_motion
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
@@ -41,7 +41,7 @@ from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods, measure_of
 from reports.tables import TABLES
-from reports.tables.page_one_table import overview
+from reports.tables.page_one import overview
 from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
 from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows

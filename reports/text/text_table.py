@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.sentences import headline
 from reports.statistics.effects import Effect
 from reports.tables.table import DASH, REMARKS, CellText, Table, column_texts

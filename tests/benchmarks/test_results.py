@@ -13,7 +13,7 @@ from benchmarks.results.protocol import NUMBER, OWN
 from benchmarks.results.row import COLUMNS, ResultsError, Row, with_provenance
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
-from reports.run.reading import read_run
+from reports.finished_run import read_run
 
 ROWS = [
     Row("garments", "dressed/walk", "snug", 0, "energy/strain", "J", 0.1 + 0.2, terms="strain+gravity"),

@@ -15,8 +15,7 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
 from reports.blocks import Report
-from reports.run.finished_run import Run, make_run
-from reports.run.stored_files import RollOuts
+from reports.finished_run import RollOuts, Run, make_run
 from reports.tables import make_tables
 from snug.kinds import find_kind
 

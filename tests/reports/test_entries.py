@@ -11,7 +11,7 @@ import pytest
 from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.entries import entries_tables, full_scenes, of_entry, page_of
-from reports.run.reading import read_run
+from reports.finished_run import read_run
 from tests.reports.report_folder import row, run_folder
 
 TOTAL = {"simulation": 1.0, "skinning": 9.0}

@@ -11,7 +11,7 @@ from reports.pdf import content
 from reports.sentences import endings, headline
 from reports.statistics.outcomes import leads
 from reports.tables import make_tables
-from reports.tables.page_one_table import ROWS
+from reports.tables.page_one import ROWS
 from reports.tables.table import Column, Table
 from tests.reports.report_folder import SCENES, all_rows, report_of, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes

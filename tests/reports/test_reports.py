@@ -15,12 +15,11 @@ from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build
+from reports import finished_run as training
 from reports.blocks import FIGURES
 from reports.figures.figure import draw_figures
+from reports.finished_run import make_run, read_run
 from reports.pdf import changed_files
-from reports.run import stored_files as training
-from reports.run.finished_run import make_run
-from reports.run.reading import read_run
 from reports.statistics.means_and_spreads import Mean
 from reports.tables import make_tables
 from tests.reports.report_folder import (

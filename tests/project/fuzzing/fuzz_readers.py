@@ -150,8 +150,8 @@ def read_header(path: Path) -> None:
 def read_rows(path: Path, name: str = "results.csv") -> None:
     """Read a run whose file `name` is the one at `path`, the others intact, up to the report's tables."""
     from reports.blocks import Report
+    from reports.finished_run import read_run
     from reports.pdf import content
-    from reports.run.reading import read_run
     from reports.tables import make_tables
 
     folder = RunFolder(path.parent / "run")

@@ -9,8 +9,8 @@ import pytest
 
 from reports.blocks import FIGURES, Report
 from reports.figures.figure import draw_figures
+from reports.finished_run import read_run
 from reports.pdf import write_pdf
-from reports.run.reading import read_run
 from reports.tables import make_tables
 from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, row, run_folder, sheet, write_mesh
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.figures import plotting, values
-from reports.figures.over_time import training_curves
+from reports import finished_run
+from reports.figures import charts, plotting
+from reports.figures.charts import dots, training_curves
 from reports.figures.plotting import file_name, printable
-from reports.figures.values import dots
-from reports.run import reading
-from reports.run.finished_run import shown_seeds
-from reports.run.reading import read_run_with_trainings
+from reports.finished_run import read_run_with_trainings, shown_seeds
 from tests.reports.report_folder import row, run_folder, run_of, write_model
 
 
@@ -58,7 +56,7 @@ def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
     write_model(folder.models / "snug-seed0.safetensors", "snug", strain=0.1)
     write_model(folder.models / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
     read = []
-    monkeypatch.setattr(reading, "read_history", lambda path, method: read.append(path))
+    monkeypatch.setattr(finished_run, "read_history", lambda path, method: read.append(path))
     assert read_run_with_trainings(folder).histories == []
     assert [path.name for path in read] == ["snug-seed0.safetensors"]
 
@@ -129,9 +127,9 @@ def test_checks_are_drawn_by_their_tolerances_in_order():
         "tolerance": 2.0,
     }
     rows = [row(f"case {k}", value=v, **more) for k, v in enumerate((1.0, 0.5, 0.0))]
-    (drawing,) = values.known_answers(run_of(rows))
+    (drawing,) = charts.known_answers(run_of(rows))
     heights = drawing.canvas.axes[0].get_lines()[0].get_ydata()
-    assert list(heights) == [values.LOWEST, 0.25, 0.5]
+    assert list(heights) == [charts.LOWEST, 0.25, 0.5]
 
 
 def test_the_first_seed_that_came_to_its_end_is_shown():

@@ -17,8 +17,7 @@ from reference_sim import Trajectory
 from reports.blocks import FIGURES
 from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH
-from reports.run.finished_run import Run
-from reports.run.stored_files import History, RollOuts
+from reports.finished_run import History, RollOuts, Run
 from tests.reports.report_folder import mesh, row, run_of, sheet
 
 LEAST = 4.0  # [cm] that a panel is wide and high on paper

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from reports.figures.costs import break_even, error_of_page_one
+from reports.figures.charts import break_even, error_of_page_one
 from reports.figures.figure import Drawing, save_drawing
 from reports.statistics.pareto import (
     indistinct,

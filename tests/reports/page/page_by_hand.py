@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.results.run_folder import RunFolder
 from reports.blocks import Report
+from reports.finished_run import read_run
 from reports.page.write_page import write_page
-from reports.run.reading import read_run
 from reports.tables import make_tables
 from tests.reports.report_folder import row, run_folder, sheet, skipped, write_mesh
 

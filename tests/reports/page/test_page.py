@@ -11,9 +11,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from reports.finished_run import read_run
 from reports.page.embedded_roll_outs import groups
 from reports.page.write_page import table_data
-from reports.run.reading import read_run
 from reports.statistics.effects import EXCESS, RATIO, Effect
 from reports.tables.table import Column, Table
 from tests.reports.page.page_by_hand import (

@@ -8,8 +8,8 @@ import numpy as np
 
 from reports import rendering
 from reports.blocks import FIGURES
+from reports.finished_run import read_run
 from reports.pictures import SceneRollOuts, draw_side_by_side, failures, worst_failures
-from reports.run.reading import read_run
 from tests.reports.report_folder import FRAMES, Stored, mesh, row, run_folder, run_of, sheet
 
 

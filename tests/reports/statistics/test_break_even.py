@@ -6,9 +6,9 @@ import dataclasses
 
 import pytest
 
-from reports.figures.costs import break_even
+from reports.figures.charts import break_even
 from reports.statistics.pareto import Cost, compared_scenes, cost_of, crossing, rivals
-from reports.tables.costs import error_rivals
+from reports.tables.page_one import error_rivals
 from tests.reports.report_folder import row as any_row
 from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, row

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.run.finished_run import Run
+from reports.finished_run import Run
 from reports.statistics import outcomes
 from reports.statistics.outcomes import DEFAULT, published_beside
 from tests.reports import report_folder

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from reports.tables import make_tables
-from reports.tables.costs import error_rivals, reference_uncertainty
+from reports.tables.page_one import error_rivals, reference_uncertainty
 from tests.reports.report_folder import run_of
 from tests.reports.speed_rows import SCENES, all_rows, row
 

@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
+from reports.finished_run import make_run
 from reports.pdf import lay_out_table
-from reports.run.finished_run import make_run
 from reports.sentences import endings
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import Mean, mean_of, pair

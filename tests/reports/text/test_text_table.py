@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.metric import Metric
 from benchmarks.results.row import Row
-from reports.run.finished_run import make_run
+from reports.finished_run import make_run
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.table import METHOD, Column, Table, metric_column

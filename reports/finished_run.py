@@ -1,18 +1,122 @@
-"""A finished run: its rows as one table, and the metrics, methods and cases that run.json declares."""
+"""A finished run: its rows, declarations, stored roll-outs and trainings, as its folder holds them."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
-from benchmarks.results.protocol import is_member
-from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, Row
-from reports.run.stored_files import History, RollOuts
+from benchmarks.results import run_folder
+from benchmarks.results.protocol import is_member, one_protocol
+from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, ResultsError, Row
+from benchmarks.results.run_folder import RunFolder, model_path
+from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
+from reference_sim.trajectory import Trajectory, TrajectoryError
+
+STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
+
+
+@dataclass(frozen=True)
+class RollOuts:
+    """Stored roll-outs of a run's folder, none without one.
+
+    One that cannot be read adds a sentence to `problems`.
+    """
+
+    folder: RunFolder | None = None
+    problems: list[str] = field(default_factory=list)
+
+    def cloth(self, scene: str, method: str, seed: int) -> Trajectory | None:
+        """Return a method's roll-out of the scene, None where there is none to be read."""
+        return self._read(self.folder.trajectory_path(scene, method, seed)) if self.folder else None
+
+    def body(self, scene: str) -> Trajectory | None:
+        """Return the moving body of the scene, None where there is none to be read."""
+        return self._read(self.folder.trajectory_path(scene, "body")) if self.folder else None
+
+    def rest_areas(self, scene: str) -> np.ndarray | None:
+        """Return areas (F,) [m^2] at rest of the faces of the scene's garment, None where unknown."""
+        try:
+            return read_array(self.folder.rest_areas_path(scene)) if self.folder else None
+        except ArrayFileError:
+            return None
+
+    def _read(self, path: Path) -> Trajectory | None:
+        """Return the trajectory in a file with the curves that lie beside it, None without one."""
+        try:
+            if not path.is_file():
+                return None
+            trajectory = Trajectory.load(path)
+            if (curves := path.with_suffix(".npz")).is_file():
+                trajectory = replace(trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves))
+            if trajectory.frames:
+                return trajectory
+            problem = f"{path}: holds no whole frame"
+        except (TrajectoryError, ValueError, OSError) as error:
+            problem = str(error)
+        problem = without_folder(self.folder, problem)
+        if problem not in self.problems:  # the page reads again what was drawn
+            self.problems.append(problem)
+        return None
+
+
+def without_folder(folder: RunFolder | None, problem: object) -> str:
+    """Return the sentence with paths as seen from the folder of the run."""
+    return str(problem).replace(f"{folder.path}/", "") if folder else str(problem)
+
+
+# By the unit of the loss, of the energies and of simulated vertices: their squares, or two bands of them.
+PANELS = {
+    "J": "physics loss [J per frame]",
+    "cm²": "vertex loss [cm²]",
+    "cm": "vertex loss of two bands [cm]",
+}
+
+
+@dataclass(frozen=True)
+class History:
+    """Loss of one model over its training.
+
+    unit: of the loss. rows: for every few steps, step, seconds, loss and terms, at some the value on held-out
+    motions.
+    """
+
+    method: str
+    unit: str
+    rows: list[dict[str, float]]
+    garment: str = ""
+
+    @property
+    def panel(self) -> str:
+        """Title of the panel of this kind of loss."""
+        return PANELS.get(self.unit, f"loss [{self.unit}]")
+
+    def column(self, name: str) -> np.ndarray:
+        """Return one number of every logged step (N,), nan where it was not logged."""
+        return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
+
+
+def read_history(path: Path, method: str) -> History | None:
+    """Return the history in a model file, None without one. Raises ValueError for a broken file."""
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, "numpy") as stored:
+            header: Any = json.loads((stored.metadata() or {}).get("snug", "{}"))
+    except (OSError, ValueError, RecursionError, SafetensorError) as error:
+        raise ValueError(f"{path}: no safetensors header ({error})") from None
+    if not isinstance(header, dict):
+        raise ValueError(f"{path}: its entry 'snug' is a {type(header).__name__}, no table")
+    rows = header.get("history") or []
+    return History(method, header.get("unit", ""), rows) if len(rows) > 1 else None
+
 
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster
 SUITES = ("garments", "speed", "validation", "extremes", "shapes")  # that have tables of their own
@@ -197,3 +301,58 @@ def _cases(frame: pd.DataFrame, declared: Mapping[str, Any]) -> list[str]:
     places = {(case.get("scene") or name, case.get("metric") or ""): name for name, case in declared.items()}
     pairs = zip(frame["scene"], frame["metric"])
     return [places.get(pair) or places.get((pair[0], "")) or "" for pair in pairs]
+
+
+def read_run_with_trainings(folder: RunFolder) -> Run:
+    """Read a run and how its networks were trained. Raises ResultsError for a folder that holds no run."""
+    run = read_run(folder)
+    return replace(run, histories=_read_histories(folder, run))
+
+
+def read_run(folder: RunFolder) -> Run:
+    """Read rows and declarations of a run; its roll-outs are read when they are asked for.
+
+    Raises:
+        ResultsError: when run.json or results.csv is absent, broken or of an earlier version, or rows are of
+            two protocols, which no table may mix.
+
+    >>> run = read_run(RunFolder("reports/runs/first"))  # doctest: +SKIP
+    """
+    if not folder.path.is_dir():
+        raise ResultsError(f"{folder.path}: no such folder")
+    config, rows = folder.read_config(), folder.read_rows()
+    if not rows:
+        raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
+    run = make_run(config, rows, folder.changed(config))
+    return replace(
+        run,
+        protocol=one_protocol(run.frame["protocol"], folder.rows_path),
+        frame_energies=_read_frame_energies(folder.frame_energies_path),
+        roll_outs=RollOuts(folder, run.problems),
+    )
+
+
+def _read_frame_energies(path: Path) -> pd.DataFrame:
+    """Return the lines of run_folder.csv, none without the file. Raises ResultsError."""
+    if not path.is_file():
+        return pd.DataFrame()
+    columns, lines = run_folder.read(path)
+    return pd.DataFrame(lines, columns=columns)
+
+
+def _read_histories(folder: RunFolder, run: Run) -> list[History]:
+    """Read the training of every network in the run's folder, garment by garment."""
+    histories: list[History] = []
+    networks = run.frame[run.frame["garment"] != ""][["garment", "method", "seed"]].drop_duplicates()
+    for garment, rows in networks.groupby("garment", sort=False):
+        for _, method, seed in rows.itertuples(index=False):
+            path = model_path(folder.models_of(str(garment)), method, seed)
+            if not path.is_file():
+                continue
+            try:
+                history = read_history(path, method)
+            except ValueError as error:
+                run.problems.append(without_folder(folder, error))
+            else:
+                histories += [replace(history, garment=str(garment))] if history else []
+    return histories
