@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Iterator, Sequence
-from io import StringIO
 from pathlib import Path
 
 from reference_sim.command_line import Parser, command
@@ -17,15 +15,12 @@ ROOT = Path(__file__).resolve().parents[1]
 def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
     """Yield (path, text, text with its generated parts made anew) of README, docs/ and the page of entries.
 
-    The CSV file of docs/ on the clips of the library is generated as a whole, where it exists.
-
     Raises:
         ValueError: for a part of no known form or without an end; names the document.
     """
     from reports.entries import ENTRIES, PAGE, page_of
     from reports.statistics.outcomes import DEFAULT, PUBLISHED, read_published
     from reports.text.published_parts import fill, published_part  # loads pandas
-    from snug.motion.library import clip_rows
 
     for path in sorted([root / "README.md", *(root / "docs").rglob("*.md")]):
         text = path.read_text(encoding="utf-8")
@@ -33,11 +28,6 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
             yield path, text, fill(text, published_part)
         except (ValueError, LookupError) as error:
             raise ValueError(f"{path}: {error}") from None
-    if (path := root / "docs" / "library_clips.csv").is_file():
-        lines = StringIO()
-        cells = ([cell.strip("`") for cell in row] for row in clip_rows())
-        csv.writer(lines, lineterminator="\n").writerows(cells)
-        yield path, path.read_text(encoding="utf-8"), lines.getvalue()
     if (entries := root / ENTRIES).is_dir():
         path = entries / PAGE
         page = page_of(entries, DEFAULT, read_published(PUBLISHED / DEFAULT))

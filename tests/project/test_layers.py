@@ -45,7 +45,6 @@ EXCEPTIONS = {
     ("reports/text/code_parts.py", "benchmarks.plan.study.read_study"),
     ("reports/text/code_parts.py", "benchmarks.presets.PRESETS"),
     ("reports/text/code_parts.py", "snug.named_recipes.RECIPES"),
-    ("reports/docs.py", "snug.motion.library.clip_rows"),
     ("reports/text/code_parts.py", "snug.motion.library.source_rows"),
 }
 # Headline geometry must not share an error with the physics.

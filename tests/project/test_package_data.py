@@ -15,7 +15,11 @@ SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 def data_files() -> list[Path]:
     """Return the files of the packages that are no source, as paths below the root."""
     files = [path for layer in LAYERS for path in (ROOT / layer).rglob("*") if path.is_file()]
-    data = [path for path in files if path.suffix not in SOURCE and "__pycache__" not in path.parts]
+    data = [
+        path
+        for path in files
+        if path.suffix not in SOURCE and not {"__pycache__", "published"} & {*path.parts}
+    ]
     return [path.relative_to(ROOT) for path in data]
 
 
