@@ -11,6 +11,7 @@ from benchmarks.assets import read_inputs
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.method import installed
 from benchmarks.methods import METHODS, find_method
+from benchmarks.metrics import declared
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.choose_cells import ReadStudy, choose_cells
@@ -61,8 +62,8 @@ def make_plan(
     >>> [scene.name for scene in make_plan(study).scenes]
     ['flag']
     """
-    check_machines(study, scheduler)
     folder = choose_folder(folder)
+    check_machines(study, folder, scheduler)
     states = choose_states(only, fresh=fresh)
     workers = min(WORKERS, usable_cores()) if workers is None else workers
     if workers < 1:
@@ -86,7 +87,7 @@ def make_plan(
         fresh=fresh,
         workers=workers,
         scheduler=scheduler,
-        trained=check_trained(study, folder, scheduler),
+        trained=study.trained,
         command=command,
         study=study.written,
     )
@@ -149,15 +150,10 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
 
 def choose_metrics(study: Study) -> tuple[str, ...]:
     """Return the modules of metrics that are not the project's. Raises ValueError."""
-    if not study.metrics:
-        return ()
-    from benchmarks.metrics import declared  # loads numpy
-
     names, metrics = user_files.resolve(user_files.METRICS, study.metrics)
-    for name in names:
-        if name not in {metric.name for metric in metrics}:
-            what = f"{study.place('metrics')}: {name}: is no file"
-            raise StudyError(f"{what}; those of the project are measured without it")
+    for name in set(names) - {metric.name for metric in metrics}:
+        what = f"{study.place('metrics')}: {name}: is no file"
+        raise StudyError(f"{what}; those of the project are measured without it")
     homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
     declared(homes)  # each name stands once
     return homes
@@ -191,40 +187,27 @@ def choose_states(states: Sequence[str], *, fresh: bool) -> frozenset[str]:
     return frozenset(states or DEFAULT_ONLY)
 
 
-def check_machines(study: Study, scheduler: str) -> None:
-    """Raise ValueError for a device that this machine lacks, or for what a cluster cannot do."""
+def check_machines(study: Study, folder: Path, scheduler: str) -> None:
+    """Raise ValueError for a device that this machine lacks, for networks of no folder, or of the run's own.
+
+    Where a cluster works, also for files that lie on this machine alone.
+    """
     if study.device == "cuda":
         from snug.training.device import find_device  # loads torch
 
         find_device(study.device)
-    if not scheduler:
-        return
-    if study.device != "cpu":
-        raise StudyError(
-            f"{study.place('device')}: on a cluster networks train on cpu; leave out --scheduler"
-        )
-    if study.rollouts:
-        raise StudyError(
-            f"{study.place('rollouts')}: its files lie on this machine alone; leave out --scheduler"
-        )
-
-
-def check_trained(study: Study, folder: Path, scheduler: str) -> Path | None:
-    """Return the folder of pretrained networks, None without one.
-
-    Raises:
-        StudyError: it is no folder, or the run's own, where networks of another training are removed.
-    """
-    if study.trained is None:
-        return None
-    what = f"{study.place('trained')} {study.trained}"
-    if not study.trained.is_dir():
-        raise StudyError(f"{what}: no such folder; without DIR the package's are taken")
-    if study.trained.resolve() == folder.resolve():
-        raise StudyError(f"{what}: the folder of this run itself: give another by --out")
-    if scheduler:
-        raise StudyError(f"{what}: its files lie on this machine alone; leave out --scheduler")
-    return study.trained
+    trained, place = study.trained, f"{study.place('trained')} {study.trained}"
+    if trained and not trained.is_dir():
+        raise StudyError(f"{place}: no such folder; without DIR the package's are taken")
+    if trained and trained.resolve() == folder.resolve():  # where networks of another training are removed
+        raise StudyError(f"{place}: the folder of this run itself: give another by --out")
+    for field in ("rollouts", "trained") if scheduler else ():
+        if getattr(study, field):
+            here = "its files lie on this machine alone"
+            raise StudyError(f"{study.place(field)}: {here}; leave out --scheduler")
+    if scheduler and study.device != "cpu":
+        what = f"{study.place('device')}: on a cluster networks train on cpu"
+        raise StudyError(f"{what}; leave out --scheduler")
 
 
 def choose_folder(folder: Path | None) -> Path:
@@ -241,7 +224,10 @@ def choose_folder(folder: Path | None) -> Path:
     elif folder.exists() and not folder.is_dir():
         raise StudyError(f"--out {folder}: is a file; name a folder")
     elif RunFolder(folder).config_path.is_file():
-        _check_run(folder)
+        try:
+            RunFolder(folder).read_config()
+        except ResultsError as error:
+            raise StudyError(f"--out {error}; name another folder") from None
     elif folder.is_dir() and any(folder.iterdir()):
         raise StudyError(f"--out {folder}: is not empty and holds no run; name a new folder")
     try:
@@ -249,10 +235,3 @@ def choose_folder(folder: Path | None) -> Path:
     except ValueError as error:
         raise StudyError(f"--out {error}") from None
     return folder
-
-
-def _check_run(folder: Path) -> None:
-    try:
-        RunFolder(folder).read_config()
-    except ResultsError as error:
-        raise StudyError(f"--out {error}; name another folder") from None

@@ -1,11 +1,4 @@
-"""The folder of a run: the place of each of its files; run.json and results.csv read and written.
-
-frame_energies.csv of a run: the energy of each judged frame by term, of garments in whole motions.
-
-A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their sum. A
-term that a scene does not have is left empty. It holds what the paper draws over time: the reference,
-baselines and networks. Curves of all else lie beside their trajectories; they are too large to be published.
-"""
+"""The folder of a run: the place of each of its files; run.json, results.csv and frame_energies.csv."""
 
 from __future__ import annotations
 
@@ -31,50 +24,35 @@ OF_SCENES = ("preset", "preset_values", "body", "garment")
 MOST_SECONDS = 1e12  # that a stage may say it took
 
 
+TEXT, NAME, NUMBER = (str, type(None)), str, (int, float)
+_EXPECTED: dict[str, tuple[Any, str]] = {  # entry -> types: {...: of each}, {name: type}, [of each]
+    "metrics": (
+        {...: dict.fromkeys(("title", "definition", "table", "unit"), TEXT)}, "metric -> what it declares"
+    ),
+    "methods": ({...: {"label": TEXT}}, "method -> what it declares"),
+    "scenes": ({...: {}}, "scene -> what it declares"),
+    "cases": ({...: {"scene": TEXT, "metric": TEXT}}, "case -> what it declares"),
+    "digests": ({...: TEXT}, "file -> digest"),
+    "stages": ([{"name": NAME, "seconds": NUMBER}], "a list of names and seconds"),
+    "earlier": ([object], "a list of earlier runs"),
+    "test_looks": ([{"rows": TEXT}], "a list of looks at the test motions"),
+}  # fmt: skip
+
+
 def check_types(path: Path, config: Mapping[str, Any]) -> None:
     """Raise ResultsError for an entry of run.json that is not of the type that its readers take it for."""
-    for name, (shape, expected) in _EXPECTED.items():
-        if config.get(name) is not None and not _fits(config[name], shape):
+    for name, (types, expected) in _EXPECTED.items():
+        if config.get(name) is not None and not _fits(config[name], types):
             raise ResultsError(f"{path}: '{name}' should be {expected}")
 
 
-def _fits(value: Any, shape: Any) -> bool:
-    """Return whether a value fits a test, [shape of each], {...: shape of each} or name -> shape."""
-    if callable(shape):
-        return shape(value)
-    if not isinstance(value, type(shape)):
-        return False
-    if isinstance(shape, list):
-        return all(_fits(each, shape[0]) for each in value)
-    shapes = dict.fromkeys(value, shape[...]) if ... in shape else shape
-    return all(_fits(value.get(name), inner) for name, inner in shapes.items())
-
-
-def _is_name(value: Any) -> bool:
-    return isinstance(value, str)
-
-
-def _is_text(value: Any) -> bool:
-    return value is None or isinstance(value, str)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and abs(value) < MOST_SECONDS
-
-
-_EXPECTED: dict[str, tuple[Any, str]] = {
-    "metrics": (
-        {...: dict.fromkeys(("title", "definition", "table", "unit"), _is_text)},
-        "metric -> what it declares",
-    ),
-    "methods": ({...: {"label": _is_text}}, "method -> what it declares"),
-    "scenes": ({...: {}}, "scene -> what it declares"),
-    "cases": ({...: {"scene": _is_text, "metric": _is_text}}, "case -> what it declares"),
-    "digests": ({...: _is_text}, "file -> digest"),
-    "stages": ([{"name": _is_name, "seconds": _is_number}], "a list of names and seconds"),
-    "earlier": ([lambda value: True], "a list of earlier runs"),
-    "test_looks": ([{"rows": _is_text}], "a list of looks at the test motions"),
-}
+def _fits(value: Any, types: Any) -> bool:
+    if isinstance(types, list):
+        return isinstance(value, list) and all(_fits(each, types[0]) for each in value)
+    if isinstance(types, dict):
+        types = dict.fromkeys(value, types[...]) if ... in types and isinstance(value, dict) else types
+        return isinstance(value, dict) and all(_fits(value.get(name), types[name]) for name in types)
+    return isinstance(value, types) and (types is not NUMBER or abs(value) < MOST_SECONDS)
 
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
@@ -83,64 +61,31 @@ def model_path(models: Path, kind: str, seed: int) -> Path:
 
 
 class RunFolder:
-    """The files of one run under `path`. Making the object creates nothing."""
+    """The files of one run under `path`. Making the object creates nothing.
+
+    Attributes:
+        path: the folder.
+        config_path: run.json, the configuration.
+        rows_path: results.csv, one measured number a line.
+        frame_energies_path: frame_energies.csv.
+        report_path: the report as a PDF; page_path: as an interactive page.
+        tables, figures: folders of the report.
+        models: folder of trained networks.
+        trajectories: folder of trajectories, and of arrays beside them.
+        cache: folder of the outcomes of tasks.
+    """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = Path(path)
-
-    @property
-    def config_path(self) -> Path:
-        """run.json: the configuration."""
-        return self.path / "run.json"
-
-    @property
-    def rows_path(self) -> Path:
-        """results.csv: one measured number a line."""
-        return self.path / "results.csv"
-
-    @property
-    def frame_energies_path(self) -> Path:
-        """frame_energies.csv, see benchmarks.results.run_folder."""
-        return self.path / "frame_energies.csv"
-
-    @property
-    def report_path(self) -> Path:
-        """The report as a PDF."""
-        return self.path / "report.pdf"
-
-    @property
-    def page_path(self) -> Path:
-        """The report as an interactive page."""
-        return self.path / "report.html"
-
-    @property
-    def tables(self) -> Path:
-        """Folder of tables."""
-        return self.path / "tables"
-
-    @property
-    def figures(self) -> Path:
-        """Folder of figures."""
-        return self.path / "figures"
-
-    @property
-    def models(self) -> Path:
-        """Folder of trained networks."""
-        return self.path / "models"
+        self.path = folder = Path(path)
+        self.config_path, self.rows_path = folder / "run.json", folder / "results.csv"
+        self.frame_energies_path = folder / "frame_energies.csv"
+        self.report_path, self.page_path = folder / "report.pdf", folder / "report.html"
+        self.tables, self.figures, self.models = folder / "tables", folder / "figures", folder / "models"
+        self.trajectories, self.cache = folder / "trajectories", folder / "cache"
 
     def models_of(self, garment: str) -> Path:
         """Return the folder of networks of that garment: of the T-shirt, the usual one, `models` itself."""
         return self.models if garment in ("", "tshirt") else self.models / garment
-
-    @property
-    def trajectories(self) -> Path:
-        """Folder of trajectories, and of arrays beside them."""
-        return self.path / "trajectories"
-
-    @property
-    def cache(self) -> Path:
-        """Folder of the outcomes of tasks."""
-        return self.path / "cache"
 
     def relative(self, path: Path) -> str:
         """Return the name of a file inside the folder, as the cache keeps it."""
@@ -251,7 +196,13 @@ ENERGY = "energy/"
 
 
 def write(folder: RunFolder, rows: Iterable[Row]) -> None:
-    """Write the file, whole or not at all, of all cells that take part; none where none does."""
+    """Write frame_energies.csv, whole or not at all: the energy of each evaluated frame by term.
+
+    A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their sum.
+    A term that a scene does not have is left empty. It holds what the paper draws over time, whole motions in
+    garments by reference, baselines and networks; without any there is no file. Curves of all else lie beside
+    their trajectories: they are too large to be published.
+    """
     import pandas as pd
 
     cells = dict.fromkeys(

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from benchmarks import methods as methods
 from benchmarks import run
 from benchmarks.methods import METHODS
-from benchmarks.plan.make_plan import choose_folder, make_plan
-from benchmarks.plan.study import StudyError
+from benchmarks.plan.make_plan import make_plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from reference_sim.files.array_file import array_names
@@ -54,56 +51,6 @@ def test_the_list_has_the_scenes_that_the_study_measures(capsys):
     names = measured.splitlines()[1].split("speed", 1)[1].strip().split(", ")
     assert names == [scene.name for scene in planned("smoke:speed").scenes]
     assert len(measured.splitlines()) == 2
-
-
-# --- wrong words -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("options", "hint"),
-    [
-        (["--scenes", "hanging_sheets"], "did you mean hanging_sheet"),
-        (["--scenes", "tshirt/walk"], "see test_motions"),
-        (["--methods", "sung"], "did you mean snug"),
-        (["--motions", "nowhere"], "nowhere"),
-        (["--motions", "empty.amc"], "empty.amc"),
-        (["--motions", "broken.npz"], "broken.npz"),
-        (["--motions", "folder"], "folder"),
-        (["--motions", "back.npz", "--set", "motion_files.up=z"], "on its back or side: it stands along y"),
-        (["--test-motions", "wlak"], "did you mean walk"),
-        (["--seeds", "-1"], "--seeds"),
-        (["--set", "device=tpu"], "cpu, cuda"),
-        (["--out", "broken.npz"], "is a file"),
-        (["--out", "full"], "holds no run"),
-        (["--out", "torn"], "torn/run.json: not readable"),
-        (["--only", "finished"], "failed, stale, missing"),
-        (["--only", "failed", "--fresh"], "leave out"),
-        (["--workers", "0"], "1 or more"),
-        (["--frobnicate"], "--frobnicate"),
-        (["default:shapes"], "no such scene meets such a method in part shapes"),
-        (["--list", "full:garment"], "it has garments"),
-    ],
-)
-def test_a_wrong_word_is_one_line_and_leaves_nothing(options, hint, tmp_path, monkeypatch, refused):
-    (tmp_path / "empty.amc").write_text("")
-    (tmp_path / "broken.npz").write_bytes(b"PK no zip")
-    np.savez(tmp_path / "back.npz", poses=np.zeros((3, 72)), trans=np.zeros((3, 3)), fps=30)
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "note.txt").write_text("mine")
-    (tmp_path / "torn").mkdir()
-    (tmp_path / "torn" / "run.json").write_text('{"command": ')
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(
-        "benchmarks.runner.execute_plan.execute", lambda *_, **__: pytest.fail("the run was begun")
-    )
-    refused(hint, run.main, options)
-
-
-def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda *_: False)
-    with pytest.raises(StudyError, match="cannot be written"):
-        choose_folder(tmp_path / "new")
 
 
 # --- a run -----------------------------------------------------------------------------------------------

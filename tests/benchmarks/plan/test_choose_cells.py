@@ -11,7 +11,7 @@ from benchmarks.metrics import measured_in
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motions import Motions, split_motions
-from benchmarks.plan.study import Study, StudyError
+from benchmarks.plan.study import Study, StudyError, read_study
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
 from snug.motion.library import DYNAMIC_TEST
@@ -198,16 +198,12 @@ def test_motions_are_divided_as_help_says():
             divided(clips, **fields)
 
 
-def test_own_clips_that_are_cut_are_named_and_more_frames_are_measured_where_they_are_set(tmp_path):
-    import numpy as np
+def test_a_recipe_is_never_chosen_by_the_test_motions():
+    from snug.motion.library import TEST, VALIDATION
 
-    poses = np.zeros((200, 24, 3))
-    np.savez(
-        tmp_path / "long.npz", poses=poses.reshape(200, 72), trans=np.zeros((200, 3)), mocap_framerate=30.0
-    )
-
-    def plan_of(*words: str):
-        return planned("--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *words)
-
-    assert plan_of().cut_motions == {"long": "the first 150 of 200 frames"}
-    assert plan_of("--set", "sizes.frames=200").cut_motions == {}
+    ablations = read_study("ablations")
+    assert ablations.split == "validation" and not ablations.test_motions
+    motions = split_motions(ablations)
+    assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
+    with pytest.raises(StudyError, match="'dance_turn' is a test motion"):
+        divided(validation_motions="dance_turn", split="validation")

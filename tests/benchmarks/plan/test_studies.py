@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import run
-from benchmarks.plan.options import OF_SCENES, REPLACED, SHORT
-from benchmarks.plan.study import Study, StudyError, line_of, parse_setting, read_study, study_names
+from benchmarks.plan.options import OF_SCENES, SHORT
+from benchmarks.plan.study import Study, line_of, parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from benchmarks.publish import published_studies
 from reports.blocks import FIGURES
@@ -89,87 +88,6 @@ def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word(text, table):
     assert parse_setting(text).table == table
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("seeds = [", "not readable as TOML"),
-        ("sedes = [0]", "study.toml: line 1: sedes: no field is called 'sedes'; did you mean seeds"),
-        ("question = 1", "study.toml: line 1: question: 1: give text"),
-        ("\nseeds = ['a']", "study.toml: line 2: seeds: 'a': give a whole number"),
-        ("seeds = []", "study.toml: line 1: seeds: '': give at least one whole number"),
-        ("seeds = [-1]", "study.toml: line 1: seeds: '-1': give at least one whole number"),
-        ("self_contact = 1", "study.toml: line 1: self_contact: 1: give true or false"),
-        ("split = 'tset'", "study.toml: line 1: split: 'tset': choose from test, validation"),
-        ("device = 'tpu'", "study.toml: line 1: device: 'tpu': choose from cpu, cuda"),
-        ("body = 3", "study.toml: line 1: body: 3: give a path"),
-        (
-            "sizes = 'huge'",
-            "study.toml: line 1: sizes.base: unknown preset 'huge'; choose from smoke, quick, paper",
-        ),
-        (
-            "[sizes]\nbase = 'smoke'\nframe = 3",
-            "study.toml: line 3: sizes.frame: no field is called 'frame'; did you mean",
-        ),
-        ("[sizes]\nframes = 2", "study.toml: line 2: sizes.frames: 2: give 3 or more"),
-        (
-            "[parts.garmnts]",
-            "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, speed, "
-            "validation, extremes, shapes, or give it a question",
-        ),
-        (
-            "[parts.speed]\nscenes = ['flagg']",
-            "study.toml: line 2: parts.speed.scenes: unknown scene 'flagg'; did you mean",
-        ),
-        (
-            "[parts.speed]\nmethods = ['sung']",
-            "study.toml: line 2: parts.speed.methods: unknown method 'sung'; did you",
-        ),
-        (
-            "[parts.validation]\ncases = ['patch']",
-            "study.toml: line 2: parts.validation.cases: unknown case 'patch'",
-        ),
-        ("parts = 3", "study.toml: line 1: parts: 3: give a table"),
-        ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
-        ("garment = { path = 'a b.obj' }", "'a b' cannot name scenes"),
-        (
-            "[rollouts]\nm = { path = 'a', unit = 'cm' }",
-            "study.toml: line 2: rollouts.m: unknown word 'unit'; there are",
-        ),
-        ("like = 'smok'", "no study 'smok'"),
-        ("like = 'study.toml'", "is like itself"),
-        ("[show]\nfilms = 'a.gif'", "study.toml: line 2: show.films: 'a.gif': give a table"),
-    ],
-)
-def test_a_wrong_field_is_refused_with_its_line(text, message, tmp_path, monkeypatch, refused):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.toml").write_text(text)
-    refused(message, run.main, ["study.toml", "-o", "out"])
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (
-            ["dfault"],
-            "no study 'dfault': name one, or a file or folder with study.toml; did you mean default",
-        ),
-        (["full:garment"], "study full: no part 'garment'; it has garments, speed"),
-        (["--set", "seeds"], "--set seeds: give field=value"),
-        (["--set", "sizes.frames=2"], "--set sizes.frames=2: 2: give 3 or more"),
-        (["--seeds", "one"], "--seeds: 'one': give a whole number"),
-        (["--rollout", "mine"], "mine: give NAME=FILE"),
-    ],
-)
-def test_a_wrong_option_is_refused_by_its_name(words, message, tmp_path, monkeypatch, refused):
-    monkeypatch.chdir(tmp_path)
-    refused(message, run.main, [*words, "-o", "out"])
-
-
-@pytest.mark.parametrize("option", REPLACED)
-def test_a_former_option_is_answered_with_the_field(option, refused):
-    refused(f"{option} is no option any more: ", run.main, [option, "x"])
-
-
 def test_lines_of_fields_are_those_of_their_tables():
     field = ("parts", "speed", "methods")
     assert line_of("a = 1\n[parts.speed]\n\nmethods = 1", field) == 4
@@ -201,9 +119,3 @@ def test_published_pictures_are_those_that_reports_draw():
     for name in published_studies():
         for picture in read_study(name).show.pictures:
             assert any(fnmatch(f"{picture}.png", pattern) for pattern in patterns), picture
-
-
-def test_a_study_error_keeps_the_field_until_its_place_is_known():
-    with pytest.raises(StudyError, match="give at least one") as refused:
-        Study(seeds=())
-    assert refused.value.field == ("seeds",) and Study().place("sizes", "frames") == "sizes.frames"

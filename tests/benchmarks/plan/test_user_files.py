@@ -16,7 +16,6 @@ from benchmarks.methods import METHODS
 from benchmarks.methods.outside import program
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Plan
 from benchmarks.provenance import digest
@@ -168,106 +167,14 @@ def test_a_study_brings_known_answers_of_its_own(tmp_path):
     assert "half,1,0.5,0.5,0.1" in (RunFolder(out).tables / "validation.csv").read_text()
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "message"),
-    [("no_answers.py", "x = 1\n", "no_answers.py: declares no known answer, a function with @known_answer"),
-     ("taken_answers.py", ANSWERS.replace("third", CASES[0].name),
-      f"known answer '{CASES[0].name}' is declared twice")],
-)  # fmt: skip
-def test_a_file_of_answers_that_cannot_be_meant_is_one_line(name, text, message, tmp_path, refused):
-    (tmp_path / name).write_text(text)
-    (tmp_path / "study.toml").write_text(STUDY.format(name))
-    refused(message, run.main, [str(tmp_path), "-o", str(tmp_path / "out")])
-
-
-# --- refusals ----------------------------------------------------------------------------------------------
-
-HEAD = "from benchmarks.method import MethodEntry\n"
-ENTRY = "METHODS = (MethodEntry({}),)\n"
-MAKE = "def make(**options): pass\n"
-PLAIN = 'name="a", description="b"'
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x = 1\ny = )\n", "bad.py: line 2: unmatched ')'"),
-        ("x = 1\n", "bad.py: declares no METHODS, a tuple of MethodEntry"),
-        ("METHODS = (1,)\n", "bad.py: declares no METHODS, a tuple of MethodEntry"),
-        ("METHODS = ()\n", "bad.py: METHODS is empty"),
-        ("def f():\n    return 1 / 0\nf()\n", "bad.py: line 2: ZeroDivisionError: division by zero"),
-        ("import sys\nsys.exit(3)\n", "bad.py: line 2: SystemExit: 3"),
-        ("\nraise KeyboardInterrupt\n", "bad.py: line 2: KeyboardInterrupt"),
-        ("import nothing_there\n", "bad.py: line 1: ModuleNotFoundError"),
-        (HEAD + ENTRY.format('name="a", lable="b"'), "bad.py: line 2: TypeError"),
-        (HEAD + ENTRY.format(PLAIN), "bad.py: has no function make"),
-        (HEAD + ENTRY.format(PLAIN + ', module="no.where"'), "method 'a': no module no.where"),
-        (HEAD + ENTRY.format(PLAIN + ', files=("gone.pt",)') + MAKE, "gone.pt: no such file"),
-        (HEAD + ENTRY.format(PLAIN + ', trained="zz"') + MAKE, "no training is called 'zz'"),
-        (HEAD + ENTRY.format('name="a b", description="c"') + MAKE, "method 'a b': use letters"),
-        (HEAD + ENTRY.format('name="snug", description="c"') + MAKE,
-         "method 'snug' is declared twice, by the project itself and by "),
-        (HEAD + ENTRY.format(PLAIN + ', files="gone.pt"') + MAKE, "files='gone.pt': give a tuple of strings"),
-        (HEAD + ENTRY.format(PLAIN + ', options={"at": open}') + MAKE, "method 'a': options: cannot tell"),
-        (HEAD + ENTRY.format('name="body", description="c"') + MAKE, "method 'body': files of the project"),
-        (HEAD + ENTRY.format(f'name="{"a" * 151}", description="c"') + MAKE, "more than 150 bytes"),
-        (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-b'))\n" + MAKE,
-         "free_fall x a-b and free_fall x a/b would have the same files: rename one"),
-        (HEAD + "from random_helper import f\n", "bad.py: line 2: ModuleNotFoundError"),
-        ("\udcff", "bad.py: line 1: (unicode error) 'utf-8' codec can't decode"),
-    ],
-)  # fmt: skip
-def test_a_file_that_cannot_be_meant_is_one_line(text, message, tmp_path, monkeypatch, refused):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.py").write_text(text, errors="surrogateescape")
-    refused(message, run.main, ["--scenes", "free_fall", "--methods", "bad.py", "-o", "out"])
-
-
-@pytest.mark.parametrize(
-    ("option", "word", "message"),
-    [
-        ("--methods", "gone.py", "gone.py: no such file"),
-        ("--set", "metrics=energy", "energy: is no file"),
-        (
-            "--set",
-            "metrics=twice.py",
-            "metric 'energy/total' is declared twice, by the project itself and by ",
-        ),
-        ("--set", "metrics=bare.py", "metric 'mine/x' has no unit"),
-        ("--scenes", "taken.py", "a case of the project has this name"),
-        ("--scenes", "worn.py", "no garment is called 'toga'; there are tshirt, "),
-        ("--methods", "random.py", "Python knows random as"),
-    ],
-)
-def test_a_word_that_cannot_be_meant_is_one_line(option, word, message, tmp_path, monkeypatch, refused):
-    monkeypatch.chdir(tmp_path)
-    text = METRIC_FILE.replace("height/highest", "energy/total")
-    (tmp_path / "twice.py").write_text(text)
-    (tmp_path / "bare.py").write_text(text.replace("energy/total", "mine/x").replace('unit="m"', 'unit=""'))
-    (tmp_path / "taken.py").write_text(SCENE_FILE.replace('"lift", d', '"membrane/uniaxial", d'))
-    worn = SCENE_FILE.replace('"lift", d', '"worn", garment="toga", motion="kick", d')
-    (tmp_path / "worn.py").write_text(worn)
-    (tmp_path / "random.py").write_text("METHODS = ()\n")
-    with monkeypatch.context() as patch:
-        case = dataclasses.replace(CASES[0], name="membrane/uniaxial")
-        patch.setitem(make_plan.__globals__, "CASES", (case,))
-        refused(message, run.main, ["default:speed", "--scenes", "free_fall", option, word, "-o", "out"])
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ('metrics=("energies",)', "scene 'lift': metrics=('energies',): choose from energy, "),
-        ('metrics="energy"', "scene 'lift': metrics='energy': give a tuple of strings"),
-        ('start_of="free_fal"', "scene 'lift': start_of='free_fal': name another scene"),
-        ('start_of="lift"', "scene 'lift': start_of='lift': name another scene"),
-        ('garment="tshirt", motion="wlak"', "no motion is called 'wlak'; did you mean walk?"),
-    ],
-)
-def test_what_a_scene_names_and_nobody_knows_is_one_line(fields, message, tmp_path, monkeypatch, refused):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "named.py").write_text(SCENE_FILE.replace('sizes=("sheet_frames",)', fields))
-    refused(message, run.main, ["--scenes", "named.py", "-o", "out"])
+def test_a_known_answer_has_a_name_of_its_own(tmp_path, refused):
+    (tmp_path / "taken.py").write_text(ANSWERS.replace("third", CASES[0].name))
+    (tmp_path / "study.toml").write_text(STUDY.format("taken.py"))
+    out = ["-o", str(tmp_path / "out")]
+    refused(f"known answer '{CASES[0].name}' is declared twice", run.main, [str(tmp_path), *out])
+    (tmp_path / "none.py").write_text("x = 1\n")
+    (tmp_path / "study.toml").write_text(STUDY.format("none.py"))
+    refused("declares no known answer, a function with @known_answer", run.main, [str(tmp_path), *out])
 
 
 def test_a_scene_whose_file_has_changed_is_done_again(files):

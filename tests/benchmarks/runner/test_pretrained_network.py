@@ -11,7 +11,7 @@ import torch
 
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.make_plan import check_trained
+from benchmarks.plan.make_plan import check_machines
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import make_parser, study_of
 from benchmarks.plan.plan import Network, Plan
@@ -166,11 +166,11 @@ def test_the_option_takes_the_package_or_a_folder(tmp_path):
     assert folder() is None and folder("--trained") == trained.FOLDER
     assert folder("--trained", str(tmp_path)) == tmp_path
     with pytest.raises(StudyError, match="no such folder"):
-        check_trained(Study(trained=tmp_path / "none"), tmp_path / "run", "")
+        check_machines(Study(trained=tmp_path / "none"), tmp_path / "run", "")
     with pytest.raises(StudyError, match="leave out --scheduler"):
-        check_trained(Study(trained=tmp_path), tmp_path / "run", "tcp://there")
+        check_machines(Study(trained=tmp_path), tmp_path / "run", "tcp://there")
     with pytest.raises(StudyError, match="the folder of this run itself: give another by --out"):
-        check_trained(Study(trained=tmp_path), tmp_path / "deeper" / "..", "")
+        check_machines(Study(trained=tmp_path), tmp_path / "deeper" / "..", "")
 
 
 def test_networks_of_a_run_become_those_of_the_package(made, tmp_path, monkeypatch):

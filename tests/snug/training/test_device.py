@@ -243,6 +243,6 @@ def test_the_harness_hands_the_device_on(tmp_path):
     dressed, motion = tube_dress(), swaying(12)
     task = training("snug", motion.name, steps=2, device="cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
-        check_machines(replace(read_study("smoke"), device="cuda"), "")
+        check_machines(replace(read_study("smoke"), device="cuda"), tmp_path, "")
     with pytest.raises(DeviceError, match="--device cuda"):
         task.run(context(tmp_path, assets_of(dressed, motion)), {})

@@ -1,0 +1,131 @@
+"""A body, a garment and motions of the user's own in a plan: what takes part, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import run
+from benchmarks.plan.study import StudyError
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.schedule import Schedule
+from reference_sim.material import Material
+from snug.body.parametric_body import Body
+from snug.garments.templates import find_template
+from snug.motion.motion import MotionError
+from tests.benchmarks.assets.test_inputs import write_motions
+from tests.benchmarks.plan.planned import planned
+from tests.snug.garments.garment_files import own_chart, saved
+from tests.snug.training.dressing import tube_dress
+
+WORDS = ("smoke:garments", "--methods", "skinning")
+
+
+@pytest.fixture(scope="session")
+def tube():
+    """150 vertices, made in milliseconds."""
+    return tube_dress().garment
+
+
+def test_scenes_of_other_body_shapes_need_a_body_that_has_shapes(tmp_path):
+    body, path = Body.load(), tmp_path / "mine.npz"
+    table = np.stack([np.maximum(body.parents, 0), np.arange(24)])
+    np.savez(
+        path, v_template=body.template, f=body.faces, weights=body.skinning_weights, kintree_table=table,
+        J_template=body.joint_template,
+    )  # fmt: skip
+    options = ("--body", str(path), "-o", str(tmp_path / "run"))
+    for part, scene, count in (("shapes", "shapes/1", 10), ("extremes", "out_of_distribution/height_+5", 1)):
+        with pytest.raises(StudyError, match=r"mine\.npz: has 0 body shapes .*'shapedirs'") as refused:
+            planned(f"full:{part}", *options)
+        assert f"scene {scene} needs {count}" in str(refused.value) and "\n" not in str(refused.value)
+    assert planned("smoke", *options).inputs.body is not None
+
+
+def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, tube):
+    path, out = saved(tmp_path, tube), str(tmp_path / "run")
+    plan = planned("smoke", "--garment", str(path), "-o", out)
+    worn = {scene.garment for scene in plan.scenes if scene.dressed}
+    assert worn == {"mine"} and {network.garment for network in plan.networks} == {"mine"}
+    names = {scene.name for scene in plan.scenes}
+    assert {"mine/01_01_a", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
+    with pytest.raises(StudyError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
+        planned("--garment", str(path), "--scenes", "dependence/mesh/500", "-o", out)
+
+
+def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, tube):
+    path, out = saved(tmp_path, tube), str(tmp_path / "run")
+
+    def inputs(words="", path=path):
+        plan = planned(*WORDS, "--garment", f"{path}{words}", "-o", out)
+        return Schedule(plan).cell(plan.cells[0]).inputs
+
+    first = inputs()
+    assert inputs() == first != inputs(",shift=0 0.001 0")
+    (tmp_path / "elsewhere").mkdir()
+    moved = path.rename(tmp_path / "elsewhere" / path.name)
+    assert inputs(path=moved) == first
+    (tmp_path / "silk.json").write_text('{"density": 300.0}')
+    assert inputs(f",material={tmp_path}/silk.json", moved) != first
+    moved.write_text(moved.read_text() + "# a remark\n")
+    assert inputs(path=moved) == first  # the garment as read is what counts
+    saved(moved.parent, tube, positions=1.001 * tube.rest_positions)
+    assert inputs(path=moved) != first
+
+
+@pytest.mark.slow
+def test_a_garment_of_ones_own_goes_through_a_run(tmp_path):
+    shirt = find_template("tshirt").tailor(Body.load(), vertices=300)
+    path = saved(tmp_path, shirt, uv=own_chart(shirt.rest_positions, shirt.faces))
+    out = tmp_path / "run"
+    options = ["smoke:garments", "--methods", "simulation,skinning,snug", "--garment", f"{path},rest=uv"]
+    assert run.main([*options, "-o", str(out), "--workers", "1"]) == 0
+    folder = RunFolder(out)
+    rows = [row for row in folder.read_rows() if row.metric == "energy/strain"]
+    assert {row.scene for row in rows} == {"mine/push_recovery"} and all(row.status == "ok" for row in rows)
+    assert folder.read_config()["garments"]["mine"]["material"] == asdict(Material())
+    assert (folder.models_of("mine") / "snug-seed0.safetensors").is_file()
+
+
+@pytest.mark.parametrize("name", ["walk  slow", "walk ", " walk", "walk,slow"])
+def test_a_name_that_rows_or_options_cannot_have_is_refused(name, tmp_path):
+    folder = write_motions(tmp_path / "clips", name)
+    with pytest.raises(MotionError, match="without a comma, without spaces side by side") as refused:
+        planned(*WORDS, "--motions", folder, "-o", str(tmp_path / "run"))
+    assert f"{folder}/{name}.npz" in str(refused.value) and "\n" not in str(refused.value)
+
+
+def subject(folder: Path, *clips: str) -> str:
+    """A subject of AMASS: its shape lies beside its clips."""
+    path = write_motions(folder, *clips)
+    np.savez(folder / "shape.npz", gender=np.array("male"), betas=np.zeros(16))
+    return path
+
+
+def test_a_file_of_a_body_shape_beside_clips_is_left_out(tmp_path, refused):
+    out = ("-o", str(tmp_path / "run"))
+    folder = subject(tmp_path / "01", "01_01", "a b")
+    plan = planned(*WORDS, "--motions", folder, *out)
+    assert set(plan.inputs.motions) == {"01_01", "a b"}
+    write_motions(tmp_path / "02", "shape")  # a motion of that name is one
+    assert set(planned(*WORDS, "--motions", f"{tmp_path}/02", *out).inputs.motions) == {"shape"}
+    shapes = subject(tmp_path / "shapes")
+    (tmp_path / "01" / "b.npz").write_bytes(b"PK")
+    # A shape that is named by itself was meant to be a motion.
+    for path, hint in ((f"{folder}/shape.npz", "no array of a motion"), (shapes, "no array of a motion"),
+                       (folder, "b.npz")):  # fmt: skip
+        refused(hint, run.main, [*WORDS, "--motions", path, *out])
+
+
+def test_own_clips_that_are_cut_are_named_and_more_frames_are_measured_where_they_are_set(tmp_path):
+    poses = np.zeros((200, 72))
+    np.savez(tmp_path / "long.npz", poses=poses, trans=np.zeros((200, 3)), mocap_framerate=30.0)
+
+    def plan_of(*words: str):
+        return planned("--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *words)
+
+    assert plan_of().cut_motions == {"long": "the first 150 of 200 frames"}
+    assert plan_of("--set", "sizes.frames=200").cut_motions == {}

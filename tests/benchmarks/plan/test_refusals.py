@@ -1,0 +1,174 @@
+"""What cannot be meant is one line, with status 2, and leaves nothing: fields, options, files of a user."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+
+import numpy as np
+import pytest
+
+from benchmarks import run
+from benchmarks.plan.make_plan import choose_folder, make_plan
+from benchmarks.plan.options import REPLACED
+from benchmarks.plan.study import Study, StudyError
+from benchmarks.validation.registry import CASES
+from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE_FILE, as_before
+
+_as_before = pytest.fixture(autouse=True)(as_before)
+
+FIELDS = [  # study.toml -> line, field, and what is near it
+    ("seeds = [", "not readable as TOML"),
+    ("sedes = [0]", "study.toml: line 1: sedes: no field is called 'sedes'; did you mean seeds"),
+    ("question = 1", "study.toml: line 1: question: 1: give text"),
+    ("\nseeds = ['a']", "study.toml: line 2: seeds: 'a': give a whole number"),
+    ("seeds = []", "study.toml: line 1: seeds: '': give at least one whole number"),
+    ("seeds = [-1]", "study.toml: line 1: seeds: '-1': give at least one whole number"),
+    ("self_contact = 1", "study.toml: line 1: self_contact: 1: give true or false"),
+    ("split = 'tset'", "study.toml: line 1: split: 'tset': choose from test, validation"),
+    ("body = 3", "study.toml: line 1: body: 3: give a path"),
+    ("sizes = 'huge'", "line 1: sizes.base: unknown preset 'huge'; choose from smoke, quick, paper"),
+    ("[sizes]\nbase = 'smoke'\nframe = 3", "line 3: sizes.frame: no field is called 'frame'; did you mean"),
+    ("[sizes]\nframes = 2", "study.toml: line 2: sizes.frames: 2: give 3 or more"),
+    ("[parts.garmnts]", "line 1: parts.garmnts: no part is called so; choose from garments, speed, "),
+    ("[parts.speed]\nscenes = ['flagg']", "line 2: parts.speed.scenes: unknown scene 'flagg'; did you mean"),
+    ("[parts.speed]\nmethods = ['sung']", "line 2: parts.speed.methods: unknown method 'sung'; did you"),
+    ("[parts.validation]\ncases = ['patch']", "line 2: parts.validation.cases: unknown case 'patch'"),
+    ("parts = 3", "study.toml: line 1: parts: 3: give a table"),
+    ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
+    ("garment = { path = 'a b.obj' }", "'a b' cannot name scenes"),
+    ("garment = { path = 'tshirt.obj' }", "the project has scenes of that name: give the file another"),
+    ("[rollouts]\nm = { path = 'a', unit = 'cm' }", "line 2: rollouts.m: unknown word 'unit'; there are"),
+    ("like = 'smok'", "no study 'smok'"),
+    ("like = 'study.toml'", "is like itself"),
+    ("[show]\nfilms = 'a.gif'", "study.toml: line 2: show.films: 'a.gif': give a table"),
+]
+WORDS = [
+    ("dfault", "no study 'dfault': name one, or a file or folder with study.toml; did you mean default"),
+    ("full:garment", "study full: no part 'garment'; it has garments, speed"),
+    ("default:shapes", "no such scene meets such a method in part shapes"),
+    ("--set seeds", "--set seeds: give field=value"),
+    ("--set sizes.frames=2", "--set sizes.frames=2: 2: give 3 or more"),
+    ("--set device=tpu", "cpu, cuda"),
+    ("--seeds one", "--seeds: 'one': give a whole number"),
+    ("--rollout mine", "mine: give NAME=FILE"),
+    ("--scenes hanging_sheets", "did you mean hanging_sheet"),
+    ("--scenes tshirt/walk", "see test_motions"),
+    ("--methods sung", "did you mean snug"),
+    ("--test-motions wlak", "did you mean walk"),
+    ("--motions nowhere", "nowhere"),
+    ("--motions empty.amc", "empty.amc"),
+    ("--motions broken.npz", "broken.npz"),
+    ("--motions folder", "folder"),
+    ("--motions back.npz,up=z", "on its back or side: it stands along y"),
+    ("--out broken.npz", "is a file"),
+    ("--out full", "holds no run"),
+    ("--out torn", "torn/run.json: not readable"),
+    ("--only finished", "failed, stale, missing"),
+    ("--only failed --fresh", "leave out"),
+    ("--workers 0", "1 or more"),
+    ("--frobnicate", "--frobnicate"),
+    ("--methods gone.py", "gone.py: no such file"),
+    ("--set metrics=energy", "energy: is no file"),
+    ("--set metrics=twice.py", "metric 'energy/total' is declared twice, by the project itself and by "),
+    ("--set metrics=bare.py", "metric 'mine/x' has no unit"),
+    ("--scenes taken.py", "a case of the project has this name"),
+    ("--scenes worn.py", "no garment is called 'toga'; there are tshirt, "),
+    ("--methods random.py", "Python knows random as"),
+    *((option, f"{option} is no option any more: ") for option in REPLACED),
+]
+HEAD = "from benchmarks.method import MethodEntry\n"
+PLAIN, MAKE = 'name="a", description="b"', "def make(**options): pass\n"
+
+
+def entry(fields: str, after: str = MAKE) -> str:
+    return f"{HEAD}METHODS = (MethodEntry({fields}),)\n{after}"
+
+
+METHOD_FILES = [
+    ("x = 1\ny = )\n", "bad.py: line 2: unmatched ')'"),
+    ("METHODS = (1,)\n", "bad.py: declares no METHODS, a tuple of MethodEntry"),
+    ("METHODS = ()\n", "bad.py: METHODS is empty"),
+    ("def f():\n    return 1 / 0\nf()\n", "bad.py: line 2: ZeroDivisionError: division by zero"),
+    ("import sys\nsys.exit(3)\n", "bad.py: line 2: SystemExit: 3"),
+    (entry('name="a", lable="b"'), "bad.py: line 2: TypeError"),
+    (entry(PLAIN, ""), "bad.py: has no function make"),
+    (entry(PLAIN + ', module="no.where"'), "method 'a': no module no.where"),
+    (entry(PLAIN + ', files=("gone.pt",)'), "gone.pt: no such file"),
+    (entry(PLAIN + ', files="gone.pt"'), "files='gone.pt': give a tuple of strings"),
+    (entry(PLAIN + ', options={"at": open}'), "method 'a': options: cannot tell"),
+    (entry(PLAIN + ', trained="zz"'), "no training is called 'zz'"),
+    (entry('name="a b", description="c"'), "method 'a b': use letters"),
+    (entry('name="snug", description="c"'), "method 'snug' is declared twice, by the project itself and by "),
+    (entry('name="body", description="c"'), "method 'body': files of the project"),
+    (entry(f'name="{"a" * 151}", description="c"'), "more than 150 bytes"),
+    (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-b'))\n" + MAKE,
+     "free_fall x a-b and free_fall x a/b would have the same files: rename one"),
+    ("\udcff", "bad.py: line 1: (unicode error) 'utf-8' codec can't decode"),
+]  # fmt: skip
+SCENE_FIELDS = [
+    ('metrics=("energies",)', "scene 'lift': metrics=('energies',): choose from "),
+    ('metrics="energy"', "scene 'lift': metrics='energy': give a tuple of strings"),
+    ('start_of="free_fal"', "scene 'lift': start_of='free_fal': name another scene"),
+    ('start_of="lift"', "scene 'lift': start_of='lift': name another scene"),
+    ('garment="tshirt", motion="wlak"', "no motion is called 'wlak'; did you mean walk?"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with files of a user, and folders that are no runs; no run may begin in it."""
+    twice = METRIC_FILE.replace("height/highest", "energy/total")
+    worn = SCENE_FILE.replace('"lift", d', '"worn", garment="toga", motion="kick", d')
+    texts = {
+        "empty.amc": "", "full/note.txt": "a", "torn/run.json": '{"command": ', "random.py": "METHODS = ()\n",
+        "broken.npz": "PK no zip", "folder/a.txt": "", "twice.py": twice, "worn.py": worn,
+        "bare.py": twice.replace("energy/total", "mine/x").replace('unit="m"', 'unit=""'),
+        "taken.py": SCENE_FILE.replace('"lift", d', '"membrane/uniaxial", d'),
+    }  # fmt: skip
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    np.savez(tmp_path / "back.npz", poses=np.zeros((3, 72)), trans=np.zeros((3, 3)), fps=30)
+    monkeypatch.chdir(tmp_path)
+    begun = "benchmarks.runner.execute_plan.execute"
+    monkeypatch.setattr(begun, lambda *_, **__: pytest.fail("the run was begun"))
+    return tmp_path
+
+
+@pytest.mark.parametrize(("text", "message"), FIELDS)
+def test_a_wrong_field_is_refused_with_its_line(text, message, folder, refused):
+    (folder / "study.toml").write_text(text)
+    refused(message, run.main, ["study.toml", "-o", "out"])
+
+
+@pytest.mark.parametrize(("words", "message"), WORDS)
+def test_a_wrong_word_is_refused_by_its_option(words, message, folder, monkeypatch, refused):
+    case = dataclasses.replace(CASES[0], name="membrane/uniaxial")
+    with monkeypatch.context() as patch:
+        patch.setitem(make_plan.__globals__, "CASES", (*CASES, case) if "taken" in words else CASES)
+        refused(message, run.main, words.split())
+
+
+@pytest.mark.parametrize(("text", "message"), METHOD_FILES)
+def test_a_file_that_cannot_be_meant_is_one_line(text, message, folder, refused):
+    (folder / "bad.py").write_text(text, errors="surrogateescape")
+    refused(message, run.main, ["--scenes", "free_fall", "--methods", "bad.py", "-o", "out"])
+
+
+@pytest.mark.parametrize(("fields", "message"), SCENE_FIELDS)
+def test_what_a_scene_names_and_nobody_knows_is_one_line(fields, message, folder, refused):
+    (folder / "named.py").write_text(SCENE_FILE.replace('sizes=("sheet_frames",)', fields))
+    refused(message, run.main, ["--scenes", "named.py", "-o", "out"])
+
+
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(StudyError, match="cannot be written"):
+        choose_folder(tmp_path / "new")
+
+
+def test_a_study_error_keeps_the_field_until_its_place_is_known():
+    with pytest.raises(StudyError, match="give at least one") as error:
+        Study(seeds=())
+    assert error.value.field == ("seeds",) and Study().place("sizes", "frames") == "sizes.frames"
