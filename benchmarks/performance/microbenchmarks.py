@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.assets import embedded_motions
 from benchmarks.methods.declared_networks import TRAININGS
+from benchmarks.meshes import lying, rectangle
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_penalty import ContactPenalty
@@ -40,16 +41,6 @@ VERTICES = (1000, 4400)  # of the T-shirt, about
 MOTIONS = TRAIN[:3]
 
 
-def regular_sheet(n: int) -> Cloth:
-    """Return a 1 m square of n x n vertices, pinned at two corners."""
-    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
-    h = 1.0 / (n - 1)
-    positions = np.stack([h * i.ravel(), np.zeros(n * n), h * j.ravel()], axis=1)
-    a = (i[:-1, :-1] * n + j[:-1, :-1]).ravel()
-    faces = np.concatenate([np.stack([a, a + 1, a + n], 1), np.stack([a + 1, a + n + 1, a + n], 1)])
-    return Cloth(positions, faces, Material(), pins=[0, n - 1])
-
-
 def dressed_body(vertices: int) -> DressedBody:
     """Return the body in a T-shirt of about so many vertices."""
     body = Body.load()
@@ -63,7 +54,8 @@ class SolverStep:
 
     def setup(self, side: int, method: str) -> None:
         """Make the sheet, flat but for noise."""
-        cloth = regular_sheet(side)
+        points, faces = rectangle("right", side - 1, side - 1, 1.0, 1.0)
+        cloth = Cloth(lying(points), faces[:, ::-1], Material(), pins=[0, side - 1])
         terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
         self.stepper = TimeStepper(cloth, terms, dt=DT, method=method)
         x = cloth.rest_positions + np.random.default_rng(0).normal(0, NOISE, cloth.rest_positions.shape)
@@ -108,14 +100,9 @@ class TrainingStep:
         training, dressed, motions = TRAININGS[network], dressed_body(vertices), embedded_motions(MOTIONS)
         targets = {motion.name: dressed.skinned(motion) for motion in motions} if training.simulated else None
         self.trainer = Trainer(
-            training.kind,
-            dressed,
-            motions,
-            steps=10_000,
-            seed=0,
-            recipe=training.recipe,
+            training.kind, dressed, motions, steps=10_000, seed=0, recipe=training.recipe,
             trajectories=targets,
-        )
+        )  # fmt: skip
         self.numbers = itertools.count()
 
     def time_step(self, network: str, vertices: int) -> None:
