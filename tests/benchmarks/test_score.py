@@ -23,11 +23,7 @@ from benchmarks.runner.measurements import measured
 from benchmarks.runner.schedule import Schedule
 from reference_sim import Trajectory
 from tests.benchmarks.plan.planned import planned, study_with
-from tests.benchmarks.runner.tasks_by_hand import (
-    run_in_this_process,
-    small_scene,
-    thirds,
-)
+from tests.benchmarks.runner.tasks_by_hand import run_in_this_process, small_scene, thirds
 
 SMOKE = find_preset("smoke")
 
@@ -226,10 +222,7 @@ REFUSED = {
     "both": (["mine.npz", "--scene", "flag", "--reference", "a", "--no-reference"], "not allowed"),
     "shape": (["mine.npz", "--scene", "flag"], "has 5 vertices, the cloth of flag 49"),
     "taken": (["snug=mine.npz", "--scene", "flag"], "NAME=FILE"),
-    "taken by the file": (
-        ["snug.npz", "--scene", "flag"],
-        "snug=snug.npz: a method is called snug",
-    ),
+    "taken by the file": (["snug.npz", "--scene", "flag"], "snug=snug.npz: a method is called snug"),
     "name": (["a b=mine.npz", "--scene", "flag"], "the name 'a b' has other than letters"),
     "long": (["mine.npz", "--scene", "flag", "--reference", "a" * 300 + ".npz"], "a" * 300),
     "pattern": (["mine.npz", "--scene", "flag", "--reference", "r_{scene}.npz"], "r_flag.npz: no such file"),

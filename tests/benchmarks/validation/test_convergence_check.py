@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.validation import convergence_check
-from benchmarks.validation.convergence_check import (
-    check_result,
-    optimality_of,
-    solve_and_check,
-)
+from benchmarks.validation.convergence_check import check_result, optimality_of, solve_and_check
 from benchmarks.validation.extreme_steps import sheet_step
 from reference_sim import Result, minimise
 from reference_sim.energies import StretchStVK
