@@ -327,14 +327,3 @@ def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_
         file.create_dataset("VTKHDF/Points", (10**12, 3), chunks=(10**4, 3), dtype="f8")
     with pytest.raises(RollOutFileError, match="more than its file can hold"):
         read_roll_out(tmp_path / "a.vtkhdf")
-
-
-def test_a_pickle_that_would_run_code_does_not(tmp_path):
-    class Wicked:
-        def __reduce__(self):
-            return (Path.touch, (tmp_path / "ran",))
-
-    (tmp_path / "mine.pkl").write_bytes(pickle.dumps({"pred": Wicked()}))
-    with pytest.raises(RollOutFileError, match=r"mine\.pkl"):
-        read_roll_out(tmp_path / "mine.pkl")
-    assert not (tmp_path / "ran").exists()
