@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.assets import embedded_motions
-from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.meshes import lying, rectangle
+from benchmarks.methods.declared_networks import TRAININGS
 from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_penalty import ContactPenalty
