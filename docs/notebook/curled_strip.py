@@ -30,7 +30,7 @@ def planar_shape(curvature: float, gamma: float, s: np.ndarray, y: np.ndarray):
 
 
 def smallest(curvature: float, gamma: float, shape, torsion: float, edge: float) -> float:
-    """Return the smallest eigenvalue of the second variation at a planar shape, see bend_twist.py."""
+    """Return the smallest eigenvalue of the second variation at a planar shape (curved_strips.py)."""
     z, weights = legendre.leggauss(POINTS)
     s, weights = (z + 1) / 2, weights / 2
     theta, kappa = shape.sol(s)
