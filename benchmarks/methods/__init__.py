@@ -28,7 +28,6 @@ FURTHER_METHODS = (
     *declared_networks.HANDLES,
     *declared_networks.FLOORS,
     *declared_networks.RECIPES,
-    *warm_started("snug-dynamic", "SNUG, dynamic", "lbfgs"),
     *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs"),
     *declared_networks.POST_PROCESSED,
     MethodEntry(

@@ -147,11 +147,8 @@ FLOORS = (
 
 POST_PROCESSED = tuple(
     post_processed(network(name, label, ""))
-    for name, label in (
-        ("snug", "SNUG"), ("pbns", "PBNS"), ("supervised", "Supervised"),
-        ("santesteban2019", "Santesteban 2019"), ("tailornet", "TailorNet"),
-    )
-)  # fmt: skip
+    for name, label in (("snug", "SNUG"), ("supervised", "Supervised"))
+)
 
 
 _LABELS = {

@@ -8,40 +8,32 @@ from benchmarks.method import MethodEntry, Reporting
 from benchmarks.results.protocol import MEMBERS
 
 SHIFTS = (1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4)  # [m]
-_SIMULATION = "benchmarks.methods.simulation:make_simulation"
-# Newton: every iteration is a factorisation of the true Hessian, or several. L-BFGS: the preconditioner
-# (mass over dt^2, a cotangent Laplacian, contacts) is factorised once a step; an iteration then costs one
-# evaluation of the energies and three triangular solves. Without memory it is preconditioned gradient
-# descent, in the manner of projective dynamics: one constant matrix, a line search, nothing learned from one
-# iteration to the next.
-# A few iterations of Newton begin with all negative curvature taken out: moving cloth needs that in nearly
-# every first one, and five Hessians would be assembled to find it out.
-_NEWTON: dict[str, Any] = {
-    "module": _SIMULATION,
-    "counted": "max_iterations",
-    "method": "newton",
-    "start_projected": True,
-}
-_LBFGS: dict[str, Any] = {
-    "module": _SIMULATION,
-    "counted": "max_iterations",
-    "method": "lbfgs",
-    "finish": False,
-}
+FAST = "reference_sim.minimise.compiled_lbfgs:CompiledLBFGS"
+
+
+def _reference_variant(
+    name: str, label: str, description: str, family: str, level: float | None = None, *, timed: bool = False,
+    module: str = "benchmarks.methods.simulation:make_simulation", **options: Any,
+) -> MethodEntry:  # fmt: skip
+    return MethodEntry(
+        name=f"simulation-{name}", label=f"Simulation{label}", description=f"the reference{description}",
+        module=module, options=options, role="reference-variant", timed=timed,
+        reporting=Reporting(family=f"simulation-{family}", level=level),
+    )  # fmt: skip
 
 
 def _truncated(
-    family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *, module: str,
-    counted: str = "iterations", dtype: str = "float64", **options: Any,
+    family: str, label: str, unit: str, description: str, counts: tuple[int, ...], *,
+    dtype: str = "float64", **options: Any,
 ) -> tuple[MethodEntry, ...]:  # fmt: skip
-    """Declare one entry for each number of iterations, which is the option `counted` of the module."""
+    """Declare one entry for each number of iterations."""
     return tuple(
         MethodEntry(
             name=f"{family}-{count}",
             label=f"{label}, {_counted(count, unit)}",
             description=description.format(_counted(count, unit)),
-            module=module,
-            options={counted: count, **options},
+            module="benchmarks.methods.simulation:make_simulation",
+            options={"max_iterations": count, **options},
             dtype=dtype,
             truncated=True,
             role="solver",
@@ -82,52 +74,29 @@ _LABELS = {"newton": "Newton", "lbfgs": "L-BFGS", "fast-lbfgs": "fast L-BFGS"}
 
 SOLVERS = (
     *(
-        MethodEntry(
-            name=f"simulation-1e-{power}",
-            label=f"Simulation to 1e-{power}",
-            description=f"the reference, minimised to tolerance 1e-0{power}",
-            module=_SIMULATION,
-            options={"tolerance": float(f"1e-{power}")},
-            role="reference-variant",
-            reporting=Reporting(family="simulation-tolerance", level=float(f"1e-{power}")),
+        _reference_variant(
+            f"1e-{power}", f" to 1e-{power}", f", minimised to tolerance 1e-0{power}", "tolerance",
+            tolerance := float(f"1e-{power}"), tolerance=tolerance,
             timed=f"simulation-1e-{power}" not in MEMBERS,  # nobody asks for the time of the ensemble
         )
         for power in (2, 4, 8)
     ),
     *(
-        MethodEntry(
-            name=f"simulation-dt/{substeps}",
-            label=f"Simulation, step dt/{substeps}",
-            description=f"the reference with {substeps} time steps a frame",
-            module=_SIMULATION,
-            options={"substeps": substeps},
-            role="reference-variant",
-            reporting=Reporting(family="simulation-dt", level=substeps),
-        )
+        _reference_variant(f"dt/{substeps}", f", step dt/{substeps}", f" with {substeps} time steps a frame",
+                           "dt", substeps, timed=True, substeps=substeps)
         for substeps in (2, 4, 8)
     ),
     *(
-        MethodEntry(
-            name=f"simulation-perturbed-{shift:.0e}".replace("e-0", "e-"),
-            label=f"Simulation, perturbed by {shift * 1e3:g} mm",
-            description=f"the reference from a start perturbed by {shift:g} m: how far apart both end",
-            module="benchmarks.methods.reference_variants:make_perturbed_start",
-            options={"shift": shift},
-            role="reference-variant",
-            reporting=Reporting(family="simulation-perturbed", level=shift),
-            timed=False,
+        _reference_variant(
+            f"perturbed-{shift:.0e}".replace("e-0", "e-"), f", perturbed by {shift * 1e3:g} mm",
+            f" from a start perturbed by {shift:g} m: how far apart both end", "perturbed", shift,
+            module="benchmarks.methods.reference_variants:make_perturbed_start", shift=shift,
         )
         for shift in SHIFTS
     ),
-    MethodEntry(
-        name="simulation-refrozen",
-        label="Simulation, planes searched twice",
-        description="the reference, each step solved again with contact planes searched at its end",
-        module=_SIMULATION,
-        options={"refreeze": 1},
-        role="reference-variant",
-        reporting=Reporting(family="simulation-refrozen"),
-        timed=False,
+    _reference_variant(
+        "refrozen", ", planes searched twice",
+        ", each step solved again with contact planes searched at its end", "refrozen", refreeze=1,
     ),
     # A variant of the physics, set beside its base: a "reference-variant" would be read as an uncertainty of
     # the reference, and a "solver" as an approximation of it.
@@ -147,30 +116,38 @@ SOLVERS = (
             ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
         )
     ),
+    # Newton: every iteration is a factorisation of the true Hessian, or several. A few iterations begin with
+    # all negative curvature taken out: moving cloth needs that in nearly every first one, and five Hessians
+    # would be assembled to find it out.
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
-        (1, 2, 4, 8), **_NEWTON,
+        (1, 2, 4, 8), method="newton", start_projected=True,
     ),
+    # L-BFGS: the preconditioner (mass over dt^2, a cotangent Laplacian, contacts) is factorised once a step;
+    # an iteration then costs one evaluation of the energies and three triangular solves. Without memory it is
+    # preconditioned gradient descent, in the manner of projective dynamics: one constant matrix, a line
+    # search, nothing learned from one iteration to the next.
     *_truncated(
         "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}",
-        (5, 10, 20, 40), **_LBFGS, memory=10,
+        (5, 10, 20, 40), method="lbfgs", finish=False, memory=10,
     ),
     *_truncated(
         "fast-lbfgs", "Fast L-BFGS", "iteration",
         "L-BFGS compiled as a whole, float32, stopped after {}", (5, 10, 20, 40),
-        module="benchmarks.methods.simulation:make_fast_lbfgs", dtype="float32",
+        dtype="float32", method=FAST,
     ),
     *_truncated(
         "gradient-descent", "Gradient descent", "iteration",
-        "preconditioned gradient descent, stopped after {}", (10, 40), **_LBFGS, memory=0,
+        "preconditioned gradient descent, stopped after {}", (10, 40),
+        method="lbfgs", finish=False, memory=0,
     ),
     *_truncated(
         "vbd", "Vertex block descent", "sweep", "vertex block descent on our energies, {} a step",
-        (5, 20, 80), module="benchmarks.methods.sweeps:make_block_descent",
+        (5, 20, 80), method="benchmarks.methods.sweeps:VertexBlockDescent",
     ),
     *_truncated(
         "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
-        (10, 40, 160), module="benchmarks.methods.sweeps:make_xpbd",
+        (10, 40, 160), method="benchmarks.methods.sweeps:XPBD",
     ),
     *warm_started("skinning", "Skinning", "lbfgs"),
     *warm_started("skinning", "Skinning", "newton"),

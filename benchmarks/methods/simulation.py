@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.declarations import load_function
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
 from reference_sim.time_loop import simulate_with
@@ -61,12 +62,10 @@ class Simulation(Method):
 
 
 def make_simulation(*, models: Path, seed: int, **options: Any) -> Simulation:
-    """Make a simulation with the reference's tolerance and time step, or with those in the options."""
+    """Make a simulation with the reference's tolerance and time step, or with those in the options.
+
+    method: as of a TimeStepper, or "module:class" of a minimiser.
+    """
+    if ":" in options.get("method", ""):
+        options["method"] = load_function(options["method"], "")
     return Simulation(options=options)
-
-
-def make_fast_lbfgs(*, models: Path, seed: int, iterations: int) -> Simulation:
-    """Make a simulation whose every step is `iterations` of compiled L-BFGS."""
-    from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS  # what no other solver loads
-
-    return Simulation(options={"method": CompiledLBFGS, "max_iterations": iterations})

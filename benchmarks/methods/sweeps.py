@@ -1,13 +1,8 @@
 """Vertex block descent and XPBD: solvers that sweep over a mesh a given number of times.
 
-Sweeps over vertices and over constraints, with the kernels of the terms as arguments.
-
-See reference_sim.kernels.fast_kernels for the kernels.
-
-Vertex block descent (Chen et al. 2024) on the energies of reference_sim.
-
-One sweep visits the free vertices one after the other. Each takes a Newton step of its own three coordinates,
-all others held still:
+The kernels of the terms are arguments of a sweep (reference_sim.kernels.fast_kernels). One sweep of vertex
+block descent (Chen et al. 2024) visits the free vertices one after the other. Each takes a Newton step of its
+own three coordinates, all others held still:
 
     x_i <- x_i - H_ii^-1 g_i,    g_i, H_ii: gradient and 3 x 3 block of the whole step's potential
 
@@ -16,8 +11,7 @@ left out). So it minimises exactly the potential that Newton minimises, and a ve
 a stationary point of it. On one core a sweep in the order of the mesh needs no colours. As in the paper there
 is no line search; its guess and its Chebyshev acceleration are left out: all solvers start alike here.
 
-Extended position-based dynamics (Macklin et al. 2016) with constraints whose energies are ours, exactly.
-
+Extended position-based dynamics (Macklin et al. 2016) has constraints whose energies are ours, exactly.
 Each element is a constraint C(x) (a vector for the membrane) with energy C . K C / 2:
 
     strain      C = (G00, G11, G01),  K = A [[l + 2 mu, l, 0], [l, l + 2 mu, 0], [0, 0, 4 mu]], l = lambda
@@ -39,11 +33,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.methods.simulation import Simulation
 from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE, step_terms
 from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit, with_types_resolved
 from reference_sim.minimise.descent import Descent, Result, Stop, iterate
@@ -206,11 +198,6 @@ def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np
     return first, corners[np.argsort(owner, kind="stable")]
 
 
-def make_block_descent(*, models: Path, seed: int, iterations: int) -> Simulation:
-    """Make a simulation whose every step is `iterations` sweeps of vertex block descent."""
-    return Simulation(options={"method": VertexBlockDescent, "max_iterations": iterations})
-
-
 class XPBD(SweepSolver):
     """Extended position-based dynamics for one potential, of which it finds no minimum in general.
 
@@ -239,8 +226,3 @@ class XPBD(SweepSolver):
         terms = tuple(zip(self._kernels, frozen))
         run.swept, run.sweep = x, with_types_resolved(sweep_constraints, x, self._inverse, terms)
         return None
-
-
-def make_xpbd(*, models: Path, seed: int, iterations: int) -> Simulation:
-    """Make a simulation whose every step is `iterations` sweeps of XPBD."""
-    return Simulation(options={"method": XPBD, "max_iterations": iterations})

@@ -15,7 +15,7 @@ from benchmarks.results.row import ResultsError
 NUMBER = "1.0"
 # Part of the protocol -> digest of its definitions. tests/benchmarks/test_protocol.py holds the code to them.
 DIGESTS = {
-    "scenes": "8cd13eb7226f2e79",
+    "scenes": "88c6128b67b3dd78",
     "materials": "37f8eb4aecad748b",
     "motions": "dc71f7b3a0e629a9",
     "metrics": "6c8c0bedc30f0122",

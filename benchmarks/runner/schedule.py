@@ -46,13 +46,13 @@ RUNS = (
     SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
     "benchmarks/runner/isolated_process.py", "benchmarks/runner/cells.py",
 )  # fmt: skip
-SOLVERS = "benchmarks/methods/simulation.py"
+SOLVERS = ("benchmarks/methods/simulation.py", "benchmarks/methods/sweeps.py")
 METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "snug")
 CASES = (
     "benchmarks/runner/cells.py",
     "benchmarks/validation",
     "benchmarks/assets.py",
-    SOLVERS,
+    *SOLVERS,
     *METRICS,
     *RUNS,
 )
@@ -136,7 +136,7 @@ def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
     file = find_module(entry.module)
     code = users_code(file, entry.declared_in) or (file,)
     if isinstance(entry, MethodEntry):
-        code = (*code, SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
+        code = (*code, *SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
     return code
 
 

@@ -2,10 +2,10 @@
 
 | module | scenes |
 | --- | --- |
-| hanging_sheet, sheet_on_sphere, flag, twisted_strip, free_fall | small ones without a body, in SCENES |
+| sheets | small ones without a body, in SCENES |
 | dressed_body | "<garment>/<motion>": a body in a garment, by GARMENT_SCENES |
 | variations | declarations of FURTHER_SCENES: out of distribution, very long, other meshes and steps |
-| out_of_distribution, long_motion, dependence | their build() |
+| hard_motions | out of distribution, very long |
 | from_roll_out | the scene that a stored roll-out brings itself |
 
 >>> [scene.name for scene in SCENES][:2]
@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from benchmarks.declarations import DeclarationError, by_name
 from benchmarks.presets import PRESETS
 from benchmarks.scene import Scene
-from benchmarks.scenes.variations import DRAPES, OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
+from benchmarks.scenes.variations import OUT_OF_DISTRIBUTION, meshes_and_steps, shapes, there_and_back
 
 
 def _sheet(name: str, description: str, *, obstacle: bool = False) -> Scene:
@@ -33,13 +33,11 @@ SCENES = (
     _sheet("sheet_on_sphere", "a square sheet dropped onto a resting sphere; contact without a body",
            obstacle=True),
     _sheet("flag", "a flag whose pole is swung to and fro; handles that move, no obstacle"),
-    _sheet("twisted_strip", "a strip whose two ends turn against each other, one turn in all; no obstacle"),
     _sheet("free_fall", "a thrown sheet with no pins and its weight alone; the exact answer is known"),
 )  # fmt: skip
 FURTHER_SCENES = (
     *OUT_OF_DISTRIBUTION,
     *{scene.name: scene for preset in PRESETS for scene in meshes_and_steps(preset.dependence)}.values(),
-    *DRAPES,
 )
 
 

@@ -1,6 +1,6 @@
-"""Scenes of a sheet without a body: hanging, on a sphere, flag, twisted strip, free fall.
+"""Scenes of a sheet without a body: hanging, on a sphere, a flag, free fall. No assets are needed.
 
-Scene of a thrown sheet under its weight alone: backward Euler's own discrete answer is exact.
+In free fall backward Euler's own discrete answer is exact,
 
     x_n = x_0 + n dt v_0 + g dt^2 n (n+1)/2
 
@@ -13,12 +13,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.meshes import in_space, rectangle, sheet, sphere, square_sheet
+from benchmarks.meshes import sphere, square_sheet
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.material import GRAVITY, Material
+
+DT = 1.0 / 30.0  # [s]
+SIZE = 0.4  # [m]
+VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s] of the fall
+SWING, PERIOD = 0.15, 1.0  # [m] to either side, [s] of the flag's pole
+RADIUS, DRAPED_SIZE, GAP = 0.12, 0.5, 0.02  # [m] of the sphere, of the sheet on it, between both at the start
 
 
 def _cloth_energies(cloth: Cloth) -> tuple[Energy, ...]:
@@ -29,24 +35,20 @@ def _cloth_energies(cloth: Cloth) -> tuple[Energy, ...]:
     return StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)
 
 
-VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s]
-
-
 def build_free_fall(
     scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int
 ) -> BuiltScene:
-    """Build the scene with its exact answer; no assets are needed."""
-    positions, faces = square_sheet(sheet_cells, 0.4)
+    """Build the scene of a thrown sheet, with its exact answer."""
+    positions, faces = square_sheet(sheet_cells, SIZE)
     cloth = Cloth(positions, faces, Material())
-    dt, frames = 1.0 / 30.0, sheet_frames
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
         energies=(Gravity(cloth),),
-        dt=dt,
-        frames=frames,
+        dt=DT,
+        frames=sheet_frames,
         settle=lambda: np.stack([positions, np.broadcast_to(VELOCITY, positions.shape)]),
-        exact=exact_fall(positions, VELOCITY, dt, frames),
+        exact=exact_fall(positions, VELOCITY, DT, sheet_frames),
     )
 
 
@@ -63,14 +65,11 @@ def exact_fall(start: np.ndarray, velocity: np.ndarray, dt: float, frames: int) 
     return start + n * dt * velocity + fall
 
 
-HANGING_SIZE = 0.4  # [m]
-
-
 def build_hanging_sheet(
     scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int
 ) -> BuiltScene:
-    """Build the scene; no assets are needed."""
-    positions, faces = square_sheet(sheet_cells, HANGING_SIZE)
+    """Build the scene of a square sheet pinned at two corners and let go from the horizontal."""
+    positions, faces = square_sheet(sheet_cells, SIZE)
     # Tilted by half a degree: a flat sheet hanging flat is a saddle, from which symmetry alone would choose.
     positions[:, 1] += 0.01 * positions[:, 0]
     cloth = Cloth(positions, faces, Material(), pins=(0, sheet_cells))
@@ -78,117 +77,52 @@ def build_hanging_sheet(
         name=scene.name,
         cloth=cloth,
         energies=_cloth_energies(cloth),
-        dt=1.0 / 30.0,
+        dt=DT,
         frames=sheet_frames,
         settle=lambda: cloth.rest_positions,
     )
 
 
-FLAG_SIZE = 0.4  # [m]
-SWING = 0.15  # [m] to either side
-PERIOD = 1.0  # [s]
-
-
 def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
-    """Build the scene; no assets are needed."""
-    flat, faces = square_sheet(sheet_cells, FLAG_SIZE)
+    """Build the scene of a flag whose pole is swung to and fro: its pinned edge alone moves it."""
+    flat, faces = square_sheet(sheet_cells, SIZE)
     positions = np.stack([flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1)  # upright, in the plane of x and y
     pole = np.arange(sheet_cells + 1)  # the edge at the smallest x
     cloth = Cloth(positions, faces, Material(), pins=pole)
-    dt = 1.0 / 30.0
 
     def handles(frame: int) -> np.ndarray:
         """Return the pole in a frame, (P,3) [m]: it starts from rest, so that the first frame has no jolt."""
-        phase = 2.0 * np.pi * frame * dt / PERIOD
+        phase = 2.0 * np.pi * frame * DT / PERIOD
         return positions[pole] + [0.0, 0.0, SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0]
 
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
         energies=_cloth_energies(cloth),
-        dt=dt,
+        dt=DT,
         frames=sheet_frames,
         settle=lambda: positions,
         pin_positions=handles,
     )
 
 
-RADIUS = 0.12  # [m]
-DRAPED_SIZE = 0.5  # [m]
-GAP = 0.02  # [m] between sphere and sheet at the start
-
-
 def build_sheet_on_sphere(
-    scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int, family: str = ""
+    scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int
 ) -> BuiltScene:
-    """Build the scene; no assets are needed.
-
-    family: of triangles, as `rectangle` has them; such a sheet lies on the sphere and is held at its middle,
-    so that it drapes and does not slide off.
-    """
+    """Build the scene of a square sheet dropped onto a resting sphere: contact without a body."""
     from reference_sim.energies.contact_penalty import ContactPenalty
     from reference_sim.obstacle import Obstacle
 
-    if family:
-        flat, faces = rectangle(family, sheet_cells, sheet_cells, DRAPED_SIZE, DRAPED_SIZE)
-        positions = in_space(flat - DRAPED_SIZE / 2)[:, [1, 2, 0]]  # faces up
-        gap, pins = 0.0, [int(np.argmin(np.linalg.norm(positions, axis=1)))]
-    else:
-        positions, faces = square_sheet(sheet_cells, DRAPED_SIZE)
-        gap, pins = GAP, []
+    positions, faces = square_sheet(sheet_cells, DRAPED_SIZE)
     # Off the sphere's axis by a little: centred, it would balance on a symmetry.
-    positions += [0.004, RADIUS + gap, 0.002]
-    cloth = Cloth(positions, faces, Material(), pins=pins)
-    points, triangles = sphere(RADIUS, 24)
-    frames = sheet_frames
-    obstacle = Obstacle(points, triangles)
+    positions += [0.004, RADIUS + GAP, 0.002]
+    cloth = Cloth(positions, faces, Material())
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
         energies=(*_cloth_energies(cloth), ContactPenalty(cloth)),
-        dt=1.0 / 30.0,
-        frames=frames,
+        dt=DT,
+        frames=sheet_frames,
         settle=lambda: positions,
-        obstacle=obstacle,
-    )
-
-
-LENGTH, WIDTH = 0.4, 0.12  # [m]
-TURN = np.pi  # of each end, against the other
-CLOSER = 0.1  # share of the length by which the ends approach, so that the strip may fold
-
-
-def build_twisted_strip(
-    scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int
-) -> BuiltScene:
-    """Build the scene; no assets are needed."""
-    across = max(2, sheet_cells // 2)
-    positions, faces = sheet((round(across * LENGTH / WIDTH), across), (LENGTH, WIDTH))
-    ends = np.flatnonzero(np.abs(np.abs(positions[:, 0]) - LENGTH / 2) < 1e-9)
-    cloth = Cloth(positions, faces, Material(), pins=ends)
-    side = np.sign(positions[ends, 0])
-    frames = sheet_frames
-
-    def handles(frame: int) -> np.ndarray:
-        """Return both ends in a frame, turned about the strip's axis and moved together, smoothly."""
-        share = 0.5 - 0.5 * np.cos(np.pi * frame / (frames - 1))
-        angle = TURN * share * side
-        rest = positions[ends]
-        return np.stack(
-            [
-                rest[:, 0] * (1.0 - CLOSER * share),
-                rest[:, 1] * np.cos(angle) - rest[:, 2] * np.sin(angle),
-                rest[:, 1] * np.sin(angle) + rest[:, 2] * np.cos(angle),
-            ],
-            axis=1,
-        )
-
-    return BuiltScene(
-        name=scene.name,
-        cloth=cloth,
-        energies=_cloth_energies(cloth),
-        dt=1.0 / 30.0,
-        frames=frames,
-        settle=lambda: positions,
-        pin_positions=handles,
+        obstacle=Obstacle(*sphere(RADIUS, 24)),
     )

@@ -137,24 +137,6 @@ def _dependence(name: str, description: str, **options: int) -> Scene:
     )
 
 
-# How much the bending of a drape is the mesh's: by size, on a regular and on an unstructured mesh.
-DRAPES = tuple(
-    Scene(
-        name=f"dependence/drape/{family}/{count}",
-        description=f"a sheet of about {count} vertices draped over a sphere, {title}",
-        module="benchmarks.scenes.sheets:build_sheet_on_sphere",
-        sizes=("sheet_frames",),
-        options={"sheet_cells": round(count**0.5) - 1, "family": family},
-        obstacle=True,
-        metrics=("energy", "curvature", "mesh"),
-    )
-    for family, title in (
-        ("union_jack", "alternating diagonals"), ("delaunay", "jittered Delaunay triangles"),
-    )
-    for count in (500, 1000, 4000, 16_000)
-)  # fmt: skip
-
-
 def there_and_back(motion: str, garment: str = "tshirt") -> Scene:
     """Declare a motion forwards and backwards for a thousand frames."""
     return Scene(

@@ -152,14 +152,14 @@ def test_a_file_in_a_package_counts_with_the_package_and_one_installed_without_w
 
 # What tasks import and what decides no result: names, files and their formats, origin, sizes that are inputs.
 CARRYING = (
-    "benchmarks/plan/plan.py", "benchmarks/declarations.py",
+    "benchmarks/plan/cell.py", "benchmarks/plan/plan.py", "benchmarks/declarations.py",
     "benchmarks/presets.py", "benchmarks/provenance.py", "benchmarks/results", "benchmarks/runner/task.py",
     "benchmarks/training.py", "snug/trained", *provenance.NO_RESULT,
 )  # fmt: skip
 TASKS = {
-    "simulation": ("benchmarks/runner/ground_truth.py", *schedule.RUNS, schedule.SOLVERS,
+    "simulation": ("benchmarks/runner/ground_truth.py", *schedule.RUNS, *schedule.SOLVERS,
                    *schedule.NETWORKS),
-    "network": ("benchmarks/methods", *schedule.RUNS, schedule.SOLVERS, *schedule.NETWORKS),
+    "network": ("benchmarks/methods", *schedule.RUNS, *schedule.SOLVERS, *schedule.NETWORKS),
     "training": schedule.TRAINING,
     "metrics": ("benchmarks/runner/measurements.py", *schedule.METRICS, *schedule.RUNS,
                 *schedule.DRESSING),

@@ -14,7 +14,6 @@ from benchmarks.presets import Dependence, find_preset
 from benchmarks.runner.measurements import measured
 from benchmarks.scenes import dressed_body as module
 from benchmarks.scenes import find_scene
-from benchmarks.scenes.variations import DRAPES
 from snug.body.parametric_body import Body
 from tests.benchmarks.plan.planned import planned
 
@@ -87,28 +86,11 @@ def test_a_study_asks_for_the_meshes_and_steps_of_its_sizes(study):
     assert {cell.scene.name for cell in plan.cells} == {
         *(f"dependence/mesh/{count}" for count in sizes.meshes),
         *(f"dependence/dt/{30 * count}" for count in sizes.substeps[1:]),
-        *(scene.name for scene in DRAPES if further),
     }
     printed = {"simulation-printed-bending"} if further else set()
     assert {cell.method for cell in plan.cells} == {"simulation", "skinning", "newton-1"} | printed
     assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
     assert not planned("default:validation").cells
-
-
-def test_drapes_of_each_size_and_family_run_where_they_are_named():
-    methods = ("simulation", "simulation-printed-bending")
-    cells = planned("--scenes", "dependence/drape/*", "--methods", ",".join(methods)).cells
-    assert {(cell.scene.name, cell.method) for cell in cells} == {
-        (scene.name, method) for scene in DRAPES for method in methods
-    }
-    for scene in DRAPES[::4]:
-        made = scene.at(find_preset("smoke")).build()
-        x, faces = made.cloth.rest_positions, made.cloth.faces
-        assert abs(len(x) - int(scene.name.rpartition("/")[2])) < 0.05 * len(x)
-        normals = np.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]])
-        assert (normals[:, 1] > 0).all() and made.cloth.areas.sum() == pytest.approx(0.25)
-        inner = np.ptp(made.cloth.areas)
-        assert (inner < 1e-12) == ("union_jack" in scene.name)
 
 
 def test_no_network_meets_a_garment_that_it_was_not_trained_for():
