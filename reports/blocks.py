@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import shorten
 
 from reports.figures.charts import (
     break_even,
@@ -24,7 +25,7 @@ from reports.finished_run import Run
 from reports.pictures import failures, side_by_side
 from reports.tables.table import Cell, Table
 
-ROWS, LETTERS = 12, 90  # of a printed table and of a text in its cells; the CSV has all
+ROWS, LETTERS = 12, 90  # of a printed table, and of a reason at the end of its rows; the CSV has all
 
 
 @dataclass(frozen=True)
@@ -74,14 +75,11 @@ class TableBlock:
         chosen = sorted(line for _, line in sorted(order)[: self.most])
         more = len(table.rows) - len(chosen)
         rest = f"{more} more rows are in tables/{table.name}.csv. " if more else ""
-        kept = tuple(tuple(map(_cut, rows[line])) for line in chosen)
-        return replace(table, rows=kept, note=(rest + table.note).strip())
-
-
-def _cut(cell: Cell) -> Cell:
-    """Return the cell, a text of at most LETTERS letters."""
-    long = isinstance(cell, str) and len(cell) > LETTERS
-    return f"{str(cell)[: LETTERS - 1].rstrip()}…" if long else cell
+        reason = next((k for k, column in enumerate(table.columns) if column.name == "reason"), None)
+        kept = (rows[line] for line in chosen)
+        if reason is not None:
+            kept = ((*row[:reason], shorten(str(row[reason]), LETTERS, placeholder="…")) for row in kept)
+        return replace(table, rows=tuple(kept), note=(rest + table.note).strip())
 
 
 BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
