@@ -1,6 +1,4 @@
-"""Configuration of a run as names and values, for the report's page on its protocol.
-
-Content of the PDF, as values that the template lays out: the report blocks and what stands around them.
+"""The PDF: its content as values that the template lays out, report blocks and what stands around them.
 
 It is to be read in minutes: what is long stands in tables/ and in report.html, as the protocol says.
 """
@@ -12,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import pandas as pd
@@ -24,55 +23,28 @@ from reports.figures.figure import Figure, Picture
 from reports.figures.plotting import printable
 from reports.finished_run import Run
 from reports.sentences import headline
-from reports.tables.table import DASH, CellText, Column, Table, column_texts, duration, number, remarks_below
+from reports.tables.table import DASH, CellText, Column, Table, column_texts, remarks_below
 
-# Declarations and files: not how the rows were made. run.json has it all.
-NOT_SHOWN = (
-    "format", "metrics", "cases", "earlier", "digests", "tasks", "cells", "outdated", "scenes", "methods",
-    "motion_sources", "stages", "body", "garment",
+# Of run.json, which has all.
+SHOWN = (
+    "command", "preset", "protocol", "split", "seeds", "clock", "workers", "commit", "started", "finished",
+    "hardware", "versions",
 )  # fmt: skip
-UNITS = {" gb": "GB", " mb": "MB", " seconds": "s"}  # endings of names
 MOST_LETTERS = 420  # letters of a value
 
 
 def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[list[str]]:
-    """Return names and values of run.json, whatever it holds, each value a text; motions are the rows'."""
-    config = {**config, "motions": sorted(set(frame["motion"]) - {""})}
-    pairs = {
-        _title(name): _text(value)
-        for name, value in config.items()
-        if name not in NOT_SHOWN and value not in (None, "", [], {})
-    }
-    start, end = moment(config.get("started")), moment(config.get("finished"))
-    if start and end and (start.tzinfo is None) == (end.tzinfo is None):
-        pairs["Wall time"] = duration((end - start).total_seconds())
-    for name in ("dtype", "threads", "hardware"):
-        pairs[f"{_title(name)} of the rows"] = ", ".join(sorted(set(frame[name].astype(str)) - {""})) or DASH
-    return [
-        [title, text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}…"]
-        for title, text in pairs.items()
-    ]
+    """Return names and values of what run.json says of how a run was made; motions are the rows'."""
+    pairs = {name.capitalize(): _text(config[name]) for name in SHOWN if config.get(name)}
+    pairs["Motions"] = ", ".join(sorted(set(frame["motion"]) - {""}))
+    pairs["Numbers"] = ", ".join(sorted(set(frame["dtype"]) - {""}))
+    return [[title, shorten(text, MOST_LETTERS, placeholder="…")] for title, text in pairs.items() if text]
 
 
 def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return number(value, 4, trim=True)
-    if isinstance(value, list | tuple):
-        return ", ".join(_text(item) for item in value) or DASH
     if isinstance(value, dict):
-        return "; ".join(f"{_title(name).lower()} {_text(item)}" for name, item in value.items()) or DASH
-    return DASH if value is None else str(value)
-
-
-def _title(name: str) -> str:
-    """Turn "memory_gb" into "Memory [GB]"."""
-    title = name.replace("_", " ")
-    for ending, unit in UNITS.items():
-        if title.endswith(ending):
-            title = f"{title.removesuffix(ending)} [{unit}]"
-    return title[:1].upper() + title[1:]
+        return "; ".join(f"{name.replace('_', ' ')} {_text(item)}" for name, item in value.items())
+    return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
 def moment(text: object) -> datetime | None:
@@ -164,31 +136,27 @@ DEFINED = ("energies", "curvature", "cost", "overview")  # tables whose metrics 
 
 def content(report: Report) -> dict[str, Any]:
     """Return everything the template needs, as JSON-ready values."""
-    run = report.run
-    sections = _sections(report)
-    return {
-        "title": "Neural garments versus a reference solver",
-        "subtitle": report.subtitle,
-        "changed": changed_files(run),
-        "size": _size(run.config),
-        "sentences": headline(run),
-        "first": sections[0]["blocks"],
-        "workers": _side_by_side(run.config),
-        "configuration": configuration(run.config, run.frame),
-        "sections": [section for section in sections[1:] if section["blocks"]],
-        "definitions": _definitions(report),
-    }
-
-
-def _sections(report: Report) -> list[dict[str, Any]]:
-    """Return the blocks by heading, those of page one first."""
-    sections: list[dict[str, Any]] = [{"title": "", "blocks": []}]
+    run, config = report.run, report.run.config
+    sections: list[dict[str, Any]] = [{"title": "", "blocks": []}]  # page one has no heading
     for block in BLOCKS:
         if isinstance(block, Heading):
             sections.append({"title": block.title, "blocks": []})
         else:
             sections[-1]["blocks"] += lay_out(report, block)
-    return sections
+    workers = config.get("workers") or 1
+    return {
+        "title": "Neural garments versus a reference solver",
+        "subtitle": report.subtitle,
+        # That of a smoke test says that its numbers mean nothing.
+        "size": str((config.get("preset_values") or {}).get("description") or ""),
+        "changed": changed_files(run),
+        "sentences": headline(run),
+        "first": sections[0]["blocks"],
+        "workers": f"up to {workers} side by side" if workers > 1 else "one after another",
+        "configuration": configuration(config, run.frame),
+        "sections": [section for section in sections[1:] if section["blocks"]],
+        "definitions": _definitions(report),
+    }
 
 
 def changed_files(run: Run) -> str:
@@ -197,21 +165,6 @@ def changed_files(run: Run) -> str:
         return ""
     more = f" and {len(run.changed) - FILES} more" if len(run.changed) > FILES else ""
     return f"Not as the run wrote them: {', '.join(run.changed[:FILES])}{more}. This report is of them."
-
-
-def _size(config: Mapping[str, Any]) -> str:
-    """Return the preset's description; that of a smoke test says that its numbers mean nothing."""
-    values = config.get("preset_values")
-    description = values.get("description") if isinstance(values, dict) else None
-    return f"{description}" if description else ""
-
-
-def _side_by_side(config: Mapping[str, Any]) -> str:
-    count = config.get("workers")
-    if not count:
-        return "one thread each."
-    together = "one after another" if count == 1 else f"up to {count} side by side"
-    return f"{together}, one thread each."
 
 
 def _definitions(report: Report) -> list[list[str]]:

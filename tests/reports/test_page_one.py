@@ -172,7 +172,7 @@ def test_sections_exist_only_for_what_ran():
     assert made["first"] == made["definitions"] == [] and set(report.tables) == {"validation", "endings"}
     (block,) = made["sections"][0]["blocks"]
     assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
-    assert made["workers"] == "up to 4 side by side, one thread each."
+    assert made["workers"] == "up to 4 side by side"
 
 
 def test_every_metric_of_a_printed_table_is_defined_and_no_number_is_infinite_or_nan():
