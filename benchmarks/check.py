@@ -6,7 +6,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -26,12 +26,12 @@ from benchmarks.plan.plan import STATES, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.cells import CellTask, RunCell
+from benchmarks.runner.cells import compute_cell, scene_of
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import Context, Outcome, RunStopped, Task
+from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import SCENES, all_scenes, find_scene, of_garment
 from benchmarks.timing import one_thread
@@ -144,11 +144,7 @@ def check_file(
     plan = replace(plan, cells=tuple(cell for cell in plan.cells if cell not in unfit))
     sheets = [cell for cell in plan.cells if cell not in users]
     wanted = {cell.metrics_id for cell in sheets}
-    tasks = [
-        CheckedCell(**{f.name: getattr(task, f.name) for f in fields(task)}) if task.kind == "cell" else task
-        for task in tasks_of(plan)
-        if task.kind in KINDS or task.id in wanted
-    ]
+    tasks = [checked(task) for task in tasks_of(plan) if task.kind in KINDS or task.id in wanted]
     outcomes = early | (outcomes_of(tasks, plan, assets) if tasks else {})
     for cell in users:
         name = f"{cell.method} in {cell.scene.name}" if cell.entry.declared_in else cell.scene.name
@@ -211,45 +207,41 @@ def located(cell: Cell) -> Iterator[None]:
         raise ContractError(f"{one_line(error)}{f' ({where})' if where else ''}") from None
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PrepareCell(CellTask):
-    """A user's scene, built, or method, prepared, before anything is simulated: no garment has settled."""
-
-    kind = "prepare"
-    stage = "preparing"
-
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Check the scene; make and prepare the method."""
-        entry, scene = self.cell.entry, self.cell.scene
-        with located(self.cell):
-            if scene.declared_in:
-                check_scene(scene, context.assets)
-            if entry.declared_in:
-                built = scene.build(context.assets)
-                method = entry.make(models=context.folder.models, seed=self.cell.seed)
-                method.prepare(replace(built, settle=lambda: built.cloth.rest_positions))
-        return Outcome()
-
-
-def preparation(cell: Cell) -> PrepareCell:
-    """Return the task that prepares a cell."""
-    return PrepareCell(
-        name=cell.name, label=cell.label, cell=cell, inputs={}, code=("benchmarks/check.py",),
-        deadline=SIZES.cell_seconds,
+def preparation(cell: Cell) -> Task:
+    """Return the task that prepares a cell, before anything is simulated: no garment has settled."""
+    return Task(
+        kind="prepare", name=cell.name, label=cell.label, stage="preparing", run=partial(prepare, cell),
+        code=("benchmarks/check.py",), deadline=SIZES.cell_seconds,
     )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CheckedCell(RunCell):
-    """The run of a cell, and a check of what its method does."""
+def prepare(cell: Cell, context: Context, needed: Needed) -> Outcome:
+    """Build a user's scene and check it; make a user's method and prepare it."""
+    entry, scene = cell.entry, cell.scene
+    with located(cell):
+        if scene.declared_in:
+            check_scene(scene, context.assets)
+        if entry.declared_in:
+            built = scene.build(context.assets)
+            method = entry.make(models=context.folder.models, seed=cell.seed)
+            method.prepare(replace(built, settle=lambda: built.cloth.rest_positions))
+    return Outcome()
 
-    def _run(self, context: Context) -> Outcome:
-        entry, models = self.cell.entry, context.folder.models_of(self.cell.scene.garment)
-        with located(self.cell):
-            outcome = super()._run(context)
-            if entry.declared_in and not outcome.failed:
-                check_method(entry, self.scene(context), partial(entry.make, models=models), self.cell.seed)
-        return outcome
+
+def run_checked(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
+    """Run a cell, and check what its method does."""
+    entry, models = cell.entry, context.folder.models_of(cell.scene.garment)
+    with located(cell):
+        outcome = compute_cell(cell, least, context)
+        if entry.declared_in and not outcome.failed:
+            check_method(entry, scene_of(cell, context), partial(entry.make, models=models), cell.seed)
+    return outcome
+
+
+def checked(task: Task) -> Task:
+    """Return the task that checks what it runs in place of one that runs a cell."""
+    assert isinstance(task.run, partial)
+    return replace(task, run=partial(run_checked, *task.run.args)) if task.kind == "cell" else task
 
 
 if __name__ == "__main__":

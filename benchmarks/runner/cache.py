@@ -48,7 +48,12 @@ class Cached:
 
 def dependencies(task: Task) -> dict[str, str]:
     """Return name -> digest or version of each input, folder of code and package of a task."""
-    return {name: digest(value) for name, value in task.inputs.items()} | software(*task.code)
+    return digests_of(task.inputs) | software(*task.code)
+
+
+def digests_of(inputs: Mapping[str, Any]) -> dict[str, str]:
+    """Return name -> digest of each input."""
+    return {name: digest(value) for name, value in inputs.items()}
 
 
 class Cache:
@@ -88,8 +93,8 @@ class Cache:
         text = _text(entry | {"digest": digest(_text(entry).encode())})
         with replacing(self.path(task)) as temporary:
             temporary.write_text(text, encoding="utf-8")
-        state = "failed" if outcome.failed else "finished"
-        return Cached(state, _why(outcome), outcome, _content(entry), wanted=False)
+        state, why = ("failed", outcome.ending) if outcome.failed else ("finished", "")
+        return Cached(state, why, outcome, _content(entry), wanted=False)
 
     def forget_all(self) -> None:
         """Remove all entries and checkpoints: everything is missing from now on."""
@@ -118,7 +123,7 @@ class Cache:
         changed += [name for name in read | needs if needs.get(name) != read.get(name)]
         if changed:
             return "stale", ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), entry
-        return ("failed", _why(outcome), entry) if outcome.failed else ("finished", "", entry)
+        return ("failed", outcome.ending, entry) if outcome.failed else ("finished", "", entry)
 
 
 def read_entry(path: Path) -> dict[str, Any] | None:
@@ -145,10 +150,6 @@ def _needs(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
         outdated = other.wanted or other.state == "stale"
         contents[" ".join(id)] = "out of date" if outdated else other.content
     return contents
-
-
-def _why(outcome: Outcome) -> str:
-    return f"{outcome.status}: {outcome.reason}" if outcome.failed else ""
 
 
 def _content(entry: Mapping[str, Any]) -> str:

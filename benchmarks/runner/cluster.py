@@ -18,7 +18,6 @@ import time
 import uuid
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
 from contextlib import suppress
-from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,10 +25,9 @@ from benchmarks import provenance
 from benchmarks.assets import Assets
 from benchmarks.provenance import damaged, digest_of_file, software
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cells import CellTask
-from benchmarks.runner.executor import Needed, TaskProcess, begin_tasks
-from benchmarks.runner.isolated_process import one_line
-from benchmarks.runner.task import Context, Outcome, RunRefused, RunStopped, Task, failure
+from benchmarks.runner.executor import TaskProcess, Told
+from benchmarks.runner.isolated_process import one_line, tell_nobody
+from benchmarks.runner.task import Needed, Outcome, RunRefused, RunStopped, Task, failure
 from benchmarks.timing import one_thread
 
 if TYPE_CHECKING:
@@ -85,9 +83,10 @@ class Cluster:
         self.address, self.folder = address, folder.path.resolve()
         self.assets = self.folder / f".assets-{uuid.uuid4().hex}.part"  # see RunFolder.remove_parts
         self.assets.write_bytes(pickle.dumps(assets))
-        self.progress: list[float] = []
-        self.client.subscribe_topic(self.assets.name, lambda event: self.progress.append(event[1]))
-        self.dismiss()
+        self._workers: dict[str, str] = {}  # batch -> address of the one that did its last task
+        self._futures: set[Future] = set()
+        self._stopped = False
+        self.rest()
         self._threads, self._looked = sum(self.client.nthreads().values()), time.monotonic()
         if not self._threads:
             print(f"waiting for workers: dask worker {address} --nthreads 1", file=sys.stderr)
@@ -101,11 +100,48 @@ class Cluster:
             self._looked = time.monotonic()
         return max(1, self._threads)
 
-    def worker(self) -> ClusterThread:
-        """Return what does the tasks of a batch."""
-        return ClusterThread(self)
+    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
+        """Return the task's outcome, those of a batch by one process where its worker lives.
 
-    def dismiss(self) -> None:
+        Raises RunStopped where the cluster is gone or cannot do it. Progress is told at the end.
+        """
+        work = dataclasses.replace(task, skip="", begin=None)
+        arguments = self.assets, batch, pickle.dumps((work, needed, software_of(task)))
+        while not self._stopped:
+            near = self._workers.get(batch)
+            future = self.client.submit(
+                do_task, *arguments, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
+                workers=[near] if near else None, allow_other_workers=bool(near),
+            )  # fmt: skip
+            self._futures.add(future)
+            try:
+                outcome, self._workers[batch] = future.result()
+            except RunStopped:
+                raise
+            except Exception as error:
+                if self.client.status == "closed":
+                    lost = f"the scheduler {self.address} is gone and was not back in {PATIENCE:g} s"
+                    raise RunStopped(lost) from None
+                if isinstance(error, CancelledError):  # the scheduler died: another one is asked
+                    continue
+                if type(error).__name__ == "KilledWorker":
+                    return Outcome("failed", _died(error), failed=True)
+                raise RunStopped(f"{self.address}: {task.title}: {one_line(error)}") from None
+            finally:
+                self._futures.discard(future)
+            if damage := damaged(self.folder, outcome.digests):
+                raise RunStopped(f"{damage}, seen from here, since worker {self._workers[batch]} wrote it")
+            told(task.seconds)
+            return outcome
+        return Outcome("failed", "stopped", failed=True)
+
+    def stop(self) -> None:
+        """Cancel all tasks, from another thread."""
+        self._stopped = True
+        for future in list(self._futures):
+            future.cancel()
+
+    def rest(self) -> None:
         """End the processes of the run's folder on all workers, those of a command that was killed too."""
         if self.client.status == "running":
             with suppress(OSError):  # no scheduler: its workers end by themselves
@@ -113,57 +149,9 @@ class Cluster:
 
     def close(self) -> None:
         """End everything that was begun on the cluster."""
-        self.dismiss()
+        self.rest()
         self.client.close()
         self.assets.unlink(missing_ok=True)
-
-
-class ClusterThread:
-    """One task after another on the cluster, those of a batch by one process where its worker lives."""
-
-    def __init__(self, cluster: Cluster) -> None:
-        self._cluster, self._stopped = cluster, False
-        self._future: Future | None = None
-        self._worker = ""  # address of the one that did the last task
-
-    def do(self, task: Task, needed: Needed, batch: str) -> Outcome:
-        """Return the task's outcome. Raises RunStopped where the cluster is gone or cannot do it."""
-        cluster, work = self._cluster, pickle.dumps((task, needed, software_of(task)))
-        while not self._stopped:
-            try:
-                self._future = cluster.client.submit(
-                    do_task, cluster.assets, batch, work, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
-                    workers=[self._worker] if self._worker else None, allow_other_workers=bool(self._worker),
-                )  # fmt: skip
-                outcome, self._worker = self._future.result()
-            except RunStopped:
-                raise
-            except Exception as error:
-                if cluster.client.status == "closed":
-                    lost = f"the scheduler {cluster.address} is gone and was not back in {PATIENCE:g} s"
-                    raise RunStopped(lost) from None
-                if isinstance(error, CancelledError):  # the scheduler died: another one is asked
-                    continue
-                if type(error).__name__ == "KilledWorker":
-                    return Outcome("failed", _died(error), failed=True)
-                raise RunStopped(f"{cluster.address}: {task.title}: {one_line(error)}") from None
-            if damage := damaged(cluster.folder, outcome.digests):
-                raise RunStopped(f"{damage}, seen from here, since worker {self._worker} wrote it")
-            return outcome
-        return Outcome("failed", "stopped", failed=True)
-
-    def told(self) -> float:
-        """Return the progress of all threads since the last call, in seconds that it was expected to take."""
-        progress, seconds = self._cluster.progress, 0.0
-        while progress:
-            seconds += progress.pop()
-        return seconds
-
-    def stop(self) -> None:
-        """Cancel the task, from another thread."""
-        self._stopped = True
-        if self._future is not None:
-            self._future.cancel()
 
 
 def _died(error: BaseException) -> str:
@@ -173,23 +161,15 @@ def _died(error: BaseException) -> str:
 
 def software_of(task: Task) -> dict[str, str]:
     """Return name -> digest or version of all that computes an outcome, files of a user's method included."""
-    files = task.cell.entry.files if isinstance(task, CellTask) else ()
+    method = task.inputs.get("method")
+    files = method["files"] if isinstance(method, dict) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
     return software("benchmarks/runner", *task.code) | digests | {"package Python": platform.python_version()}
 
 
 # --- in a worker -------------------------------------------------------------------------------------------
 
-
-class _Process(TaskProcess):
-    """The process of one thread of a worker, for tasks of one run."""
-
-    def __init__(self, assets: Path) -> None:
-        super().__init__(_begin, assets)
-        self.assets = assets
-
-
-_processes: dict[int, _Process] = {}  # of each thread
+_processes: dict[int, tuple[Path, TaskProcess]] = {}  # of each thread: the assets that it has, and it
 
 
 def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
@@ -211,23 +191,13 @@ def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
         problem = one_line(error)
     if problem:
         raise RunStopped(f"worker {worker.address}: {problem}")
-    # A nanny makes its worker a daemon, which may have no processes. Ours end with it by themselves.
-    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
-    one_thread()
-    process = _processes.get(threading.get_ident())
-    if process is None or process.assets != assets:
-        if process is not None:
-            process.process.close()
-        process = _processes[threading.get_ident()] = _Process(assets)
+    process = _process_of(assets)
     with ThreadPoolExecutor(1) as thread:
-        future, done = thread.submit(process.do, task, needed, batch), False
-        while not done:
-            done = bool(wait([future], WATCH).done)
-            if seconds := process.told():
-                worker.log_event(assets.name, seconds)
+        future = thread.submit(process.do, task, needed, batch, tell_nobody)
+        while not wait([future], WATCH).done:
             state = worker.state.tasks.get(key)
             if state is None or state.state == "cancelled":  # by the command, or as it died
-                process.stop()
+                process.process.stop()
     try:
         outcome = future.result()
         digests = {name: digest_of_file(assets.parent / name) for name in outcome.files}
@@ -235,6 +205,21 @@ def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
         outcome, digests = failure(error), {}
     hardware = provenance.hardware_line(provenance.hardware())
     return dataclasses.replace(outcome, digests=digests, origin={"hardware": hardware}), worker.address
+
+
+def _process_of(assets: Path) -> TaskProcess:
+    """Return the process of this thread for tasks of the run that has these assets."""
+    # A nanny makes its worker a daemon, which may have no processes. Ours end with it by themselves.
+    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
+    one_thread()
+    thread = threading.get_ident()
+    known, process = _processes.get(thread, (None, None))
+    if process is None or known != assets:
+        if process is not None:
+            process.process.close()
+        process = TaskProcess(RunFolder(assets.parent), pickle.loads(assets.read_bytes()))
+        _processes[thread] = assets, process
+    return process
 
 
 def _unfit(assets: Path, here: dict[str, str], expected: dict[str, str]) -> str:
@@ -253,12 +238,7 @@ def _unfit(assets: Path, here: dict[str, str], expected: dict[str, str]) -> str:
 
 def end_processes(folder: Path) -> None:
     """Kill all processes of a run's folder."""
-    for thread, process in list(_processes.items()):
-        if process.assets.parent == folder:
-            process.stop()
+    for thread, (assets, process) in list(_processes.items()):
+        if assets.parent == folder:
+            process.process.stop()
             _processes.pop(thread, None)
-
-
-def _begin(assets: Path, progress: SimpleQueue[float]) -> None:
-    """Begin a process that does tasks."""
-    begin_tasks(Context(RunFolder(assets.parent), pickle.loads(assets.read_bytes())), progress)

@@ -11,90 +11,28 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from multiprocessing.queues import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
 
 from benchmarks.assets import Assets
-from benchmarks.plan.cell import TaskId
 from benchmarks.provenance import damaged
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.isolated_process import IsolatedProcess, WorkerDied, new_processes
-from benchmarks.runner.task import Context, Outcome, RunStopped, Task, failure, tell_nobody
+from benchmarks.runner.isolated_process import IsolatedProcess, WorkerDied, tell, tell_nobody
+from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task, failure
 from benchmarks.timing import give_back
 
 if TYPE_CHECKING:
     from tqdm import tqdm
 
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
+POLL = 0.2  # [s] between looks at what has ended
+MOST = 4096  # threads of this process, each of which waits for a worker
 
-Needed = Mapping[TaskId, Outcome]
-
-
-class TaskProcess:
-    """A process that does one untimed task after another, another process after one that was killed.
-
-    begin(*arguments, progress) is called first in each of them, see begin_tasks.
-    """
-
-    def __init__(self, begin: Callable[..., None], *arguments: Any) -> None:
-        self._begin = (begin, *arguments)
-        self._batch = ""
-        self._renew()
-
-    def _renew(self) -> None:
-        # A queue for each process: one that is killed while it reports leaves a lock that nobody opens.
-        self.progress = new_processes().SimpleQueue()
-        self.process = IsolatedProcess(*self._begin, self.progress)
-        self.warm: set[tuple[str, str]] = set()
-
-    def do(self, task: Task, needed: Needed, batch: str) -> Outcome:
-        """Return the task's outcome; what it leaves in the memo is there for the next of its batch."""
-        if batch != self._batch and self.process.alive:
-            try:
-                self.process.call(forget, seconds=None)
-            except WorkerDied:
-                self._renew()
-        self._batch = batch
-        outcome = self._warm(task) or call(self.process, perform, task, needed, seconds=task.deadline)
-        if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
-            self.process.close()
-        if not self.process.alive:
-            self._renew()
-        return outcome
-
-    def _warm(self, task: Task) -> Outcome | None:
-        """Return what went wrong before the first task of this kind and code, None where nothing did."""
-        if (task.kind, task.code[0]) in self.warm:
-            return None
-        trouble = call(self.process, task.warm_up, seconds=COMPILING)
-        if trouble is None:
-            self.warm.add((task.kind, task.code[0]))
-        return trouble
-
-    def stop(self) -> None:
-        """End the process from another thread: the task that it is at has died."""
-        self.process.stop()
-
-    def told(self) -> float:
-        """Return the progress since the last call, in seconds that it was expected to take."""
-        progress, seconds = self.progress, 0.0  # the worker may get another meanwhile
-        while not progress.empty():
-            seconds += progress.get()
-        return seconds
-
-
-def call(
-    process: IsolatedProcess, function: Callable[..., Any], *arguments: Any, seconds: float | None
-) -> Any:
-    """Call function(*arguments) in a process, which is ended at the deadline; a failure is an outcome."""
-    clock = time.perf_counter()
-    try:
-        return process.call(function, *arguments, seconds=seconds)
-    except Exception as error:
-        return dataclasses.replace(failure(error), seconds=time.perf_counter() - clock)
+Told = Callable[[float], None]  # is told of progress, in seconds that it was expected to take
+Batch = tuple[Sequence[Task], Needed]
+Done = tuple[Task, Outcome]
 
 
 # --- in the process ----------------------------------------------------------------------------------------
@@ -103,13 +41,11 @@ _context: Context
 _verified: set[tuple[str, str]] = set()  # files that this process has compared with their digests
 
 
-def begin_tasks(context: Context, progress: SimpleQueue[float] | None = None) -> None:
-    """Keep what a process knows. progress: a queue of expected seconds, None where nobody follows them."""
+def begin_tasks(folder: RunFolder, assets: Assets | None) -> None:
+    """Keep what a process knows. One bar for all that are side by side is enough."""
     global _context
-    tell: Callable[[float], None] = tell_nobody if progress is None else progress.put
-    if progress is not None:
-        os.environ["TQDM_DISABLE"] = "1"  # one bar for all that are side by side is enough
-    _context = dataclasses.replace(context, tell=tell, memo={})
+    os.environ["TQDM_DISABLE"] = "1"
+    _context = Context(folder, assets)
 
 
 def forget() -> None:
@@ -122,54 +58,83 @@ def forget() -> None:
         give_back()
 
 
-def begin_task(task: Task, needed: Needed) -> None:
+def begin_task(begin: Callable[[Context], None], needed: Needed) -> None:
     """Prepare a timed task before its turn."""
-    for outcome in needed.values():
-        _verify(outcome.digests)
+    _verify(needed)
     with suppress(Exception):  # it is raised again, and told, when it is the task's turn
-        task.begin(_context)
+        begin(_context)
 
 
-def perform(task: Task, needed: Needed) -> Outcome:
-    """Return the outcome of a task, done in this process."""
-    for outcome in needed.values():
-        _verify(outcome.digests)
-    each = task.expected_seconds / max(task.units, 1)
-    context = dataclasses.replace(_context, tell=lambda units: _context.tell(units * each))
+def perform(run: Callable[[Context, Needed], Outcome], needed: Needed, expected: float) -> Outcome:
+    """Return the outcome of a task, done in this process. expected: its duration [s], told as progress."""
+    _verify(needed)
+    shares = [0.0]
+
+    def tell_share(share: float) -> None:
+        shares.append(share)
+        tell(share * expected)
+
     clock = time.perf_counter()
     try:
-        outcome = task.run(context, needed)
+        outcome = run(dataclasses.replace(_context, tell=tell_share), needed)
     except Exception as error:
         outcome = failure(error)
+    tell_share(1.0 - sum(shares))
     return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
 
 
-def _verify(digests: Mapping[str, str]) -> None:
+def _verify(needed: Needed) -> None:
     """Raise RunStopped where a file is not as it was written: the next run makes it anew."""
-    if damage := damaged(_context.folder.path, dict(digests.items() - _verified)):
-        raise RunStopped(f"{damage} since this run wrote it")
-    _verified.update(digests.items())
+    for outcome in needed.values():
+        if damage := damaged(_context.folder.path, dict(outcome.digests.items() - _verified)):
+            raise RunStopped(f"{damage} since this run wrote it")
+        _verified.update(outcome.digests.items())
 
 
-POLL = 0.2  # [s] between looks at the progress
-MOST = 4096  # threads of this process, each of which waits for a worker
-
-Batch = tuple[Sequence[Task], Needed]
-Done = tuple[Task, Outcome]
-Ready = Callable[[], Batch | None]
+# --- around the process ------------------------------------------------------------------------------------
 
 
-class Worker(Protocol):
-    """Does one untimed task after another; what a task leaves in the memo is there for its batch alone."""
+def call(
+    process: IsolatedProcess,
+    function: Callable[..., Any],
+    *arguments: Any,
+    seconds: float | None,
+    told: Told = tell_nobody,
+) -> Any:
+    """Call function(*arguments) in a process, which is ended at the deadline; a failure is an outcome."""
+    clock = time.perf_counter()
+    try:
+        return process.call(function, *arguments, seconds=seconds, told=told)
+    except Exception as error:
+        return dataclasses.replace(failure(error), seconds=time.perf_counter() - clock)
 
-    def do(self, task: Task, needed: Needed, batch: str) -> Outcome:
-        """Return the outcome of a task, however it ends."""
 
-    def told(self) -> float:
-        """Return the progress since the last call, in seconds that it was expected to take."""
+class TaskProcess:
+    """A process that does one untimed task after another, another process after one that was killed."""
 
-    def stop(self) -> None:
-        """End the task from another thread: `do` comes back."""
+    def __init__(self, folder: RunFolder, assets: Assets | None) -> None:
+        self.process, self.folder = IsolatedProcess(begin_tasks, folder, assets), folder
+        self._batch = ""
+        self._warm: set[Any] = set()
+
+    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
+        """Return the task's outcome; what it leaves in the memo is there for the next of its batch."""
+        if batch != self._batch and self.process.alive:
+            with suppress(WorkerDied):
+                self.process.call(forget, seconds=None)
+        self._batch = batch
+        if not self.process.alive:
+            self._warm.clear()
+        if task.warm_up is not None and task.code[0] not in self._warm:
+            if trouble := call(self.process, task.warm_up, seconds=COMPILING):
+                return trouble
+            self._warm.add(task.code[0])
+        outcome = call(
+            self.process, perform, task.run, needed, task.seconds, seconds=task.deadline, told=told
+        )
+        if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
+            self.process.close()
+        return outcome
 
 
 class BackEnd(Protocol):
@@ -179,11 +144,17 @@ class BackEnd(Protocol):
     def slots(self) -> int:
         """Number of tasks that are done at once."""
 
-    def worker(self) -> Worker:
-        """Return a further worker."""
+    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
+        """Return the outcome of a task, however it ends; each thread does one after another.
 
-    def dismiss(self) -> None:
-        """End all processes; others begin where they are needed."""
+        What a task leaves in the memo is there for its batch alone.
+        """
+
+    def stop(self) -> None:
+        """End what is at work, from another thread: each `do` comes back."""
+
+    def rest(self) -> None:
+        """End all processes, none of which is at work; others begin where they are needed."""
 
     def close(self) -> None:
         """End everything that was begun."""
@@ -193,20 +164,27 @@ class LocalProcesses:
     """Single-threaded processes of this machine, of which `slots` are at work side by side."""
 
     def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:
-        self._context, self.slots = Context(folder, assets), slots
-        self._processes: list[TaskProcess] = []
+        self._begin, self.slots = (folder, assets), slots
+        self._processes: dict[int, TaskProcess] = {}  # of each thread
 
-    def worker(self) -> TaskProcess:
-        """Return a further process."""
-        self._processes.append(TaskProcess(begin_tasks, self._context))
-        return self._processes[-1]
+    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
+        """Return the outcome of a task, done by the process of this thread."""
+        thread = threading.get_ident()
+        if thread not in self._processes:
+            self._processes[thread] = TaskProcess(*self._begin)
+        return self._processes[thread].do(task, needed, batch, told)
 
-    def dismiss(self) -> None:
+    def stop(self) -> None:
+        """Kill all processes."""
+        for process in list(self._processes.values()):
+            process.process.stop()
+
+    def rest(self) -> None:
         """End all processes."""
         while self._processes:
-            self._processes.pop().process.close()
+            self._processes.popitem()[1].process.close()
 
-    close = dismiss
+    close = rest
 
 
 class Executor:
@@ -221,7 +199,6 @@ class Executor:
     ) -> None:
         self.folder, self.assets, self.workers = folder, assets, workers
         self.back_end = back_end or LocalProcesses(folder, assets, workers)
-        self._crew: list[Worker] = []
         self._named: dict[str, IsolatedProcess] = {}
         self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
 
@@ -230,91 +207,88 @@ class Executor:
         """The number of untimed tasks that are expected to be at work at once."""
         return self.back_end.slots
 
-    def together(self, ready: Ready, bar: tqdm) -> Iterator[Done]:
+    def together(self, ready: Callable[[], Batch | None], bar: tqdm) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
 
         ready: the next batch that can begin, None where there is none before further outcomes are known.
         bar: is told of progress.
         """
-        finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
+        events: queue.SimpleQueue[Done | float] = queue.SimpleQueue()
         stopped = threading.Event()
 
-        def do(worker: Worker, batch: Batch) -> None:
+        def do(batch: Batch) -> None:
             tasks, needed = batch
             key = uuid.uuid4().hex
             for task in tasks:
-                outcome = worker.do(task, dict(needed), key)
-                if stopped.is_set():  # the process was killed at it, and would be started for the next
+                outcome = self.back_end.do(task, dict(needed), key, events.put)
+                if stopped.is_set():  # the process was killed at it
                     return
-                finished.put((task, outcome))
+                events.put((task, outcome))
 
-        at_work: dict[Future[None], Worker] = {}
+        at_work: set[Future[None]] = set()
         with ThreadPoolExecutor(MOST) as threads:  # one waits for each worker
             try:
                 while True:
-                    ended = [future for future in at_work if future.done()]
-                    for worker in at_work.values():
-                        bar.update(min(worker.told(), bar.total - bar.n))
-                    for future in ended:
+                    for future in [future for future in at_work if future.done()]:
                         future.result()
-                        del at_work[future]
+                        at_work.remove(future)
                     while len(at_work) < self.back_end.slots and (batch := ready()):
-                        worker = self._idle(at_work.values())
-                        at_work[threads.submit(do, worker, batch)] = worker
-                    if not finished.empty():
-                        yield finished.get()
-                    elif at_work:
-                        wait(at_work, timeout=POLL, return_when=FIRST_COMPLETED)
+                        at_work.add(threads.submit(do, batch))
+                    try:
+                        event = events.get(timeout=POLL if at_work else 0.0)
+                    except queue.Empty:
+                        if not at_work:
+                            break
+                        continue
+                    if isinstance(event, tuple):
+                        yield event
                     else:
-                        break
+                        bar.update(min(event, bar.total - bar.n))
             except BaseException as error:
                 stopped.set()
-                _end(at_work)
-                self._dismiss()
-                if not isinstance(error, GeneratorExit):  # what was finished by then is kept
-                    while not finished.empty():
-                        yield finished.get()
+                while at_work := {f for f in at_work if not (f.cancel() or f.done())}:
+                    self.back_end.stop()
+                    wait(at_work, timeout=POLL)
+                while not (events.empty() or isinstance(error, GeneratorExit)):
+                    if isinstance(event := events.get(), tuple):  # what was finished by then is kept
+                        yield event
                 raise
-
-    def _idle(self, at_work: Collection[Worker]) -> Worker:
-        """Return a worker that does nothing, a new one where all are at work."""
-        for worker in self._crew:
-            if worker not in at_work:
-                return worker
-        self._crew.append(self.back_end.worker())
-        return self._crew[-1]
+            finally:
+                self.back_end.rest()
 
     def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
         """Prepare timed tasks side by side, each in the process that it names.
 
         One that dies of it has that outcome at its turn.
         """
-        self._dismiss()
         with ThreadPoolExecutor(self.workers) as threads:
             begun = {
                 task.process: threads.submit(
-                    call, self._process(task), begin_task, task, needed, seconds=task.deadline
+                    call, self._process(task), begin_task, task.begin, needed, seconds=task.deadline
                 )
                 for task, needed in tasks
+                if task.begin is not None
             }
             try:
                 self._troubles |= {name: died for name, future in begun.items() if (died := future.result())}
             except BaseException:
-                _end({future: self._named[name] for name, future in begun.items()})
+                while left := {n: f for n, f in begun.items() if not (f.cancel() or f.done())}:
+                    for name in left:
+                        self._named[name].stop()
+                    wait(left.values(), timeout=POLL)
                 raise
 
     def alone(self, task: Task, needed: Needed) -> Outcome:
         """Return the outcome of a timed task, done with nothing at work beside it."""
-        self._dismiss()
         if trouble := self._troubles.pop(task.process, None):
             return trouble
-        return call(self._process(task), perform, task, needed, seconds=task.deadline)
+        return call(self._process(task), perform, task.run, needed, task.seconds, seconds=task.deadline)
 
     def _process(self, task: Task) -> IsolatedProcess:
         """Return the process that a timed task names."""
         if task.process not in self._named:
-            context = Context(self.folder, task.assets(self.assets))
-            self._named[task.process] = IsolatedProcess(begin_tasks, context)
+            assets = self.assets.only(task.motion) if self.assets and task.motion else None
+            self._named[task.process] = IsolatedProcess(begin_tasks, self.folder, assets)
         return self._named[task.process]
 
     def release(self, process: str) -> None:
@@ -324,20 +298,6 @@ class Executor:
 
     def close(self) -> None:
         """End all processes."""
-        self._dismiss()
         self.back_end.close()
         for name in list(self._named):
             self.release(name)
-
-    def _dismiss(self) -> None:
-        self._crew.clear()
-        self.back_end.dismiss()
-
-
-def _end(at_work: Mapping[Future[Any], Worker | IsolatedProcess]) -> None:
-    """Begin no other batch, and end the workers until none is left that a thread waits for."""
-    left = {future for future in at_work if not future.cancel()}
-    while left:
-        for future in left:
-            at_work[future].stop()
-        _, left = wait(left, timeout=POLL)

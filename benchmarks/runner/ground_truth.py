@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.method import MethodEntry
-from benchmarks.plan.cell import TaskId, flat
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import build_scene
-from benchmarks.runner.task import Context, Outcome, Task
+from benchmarks.runner.task import Context, Needed, Outcome
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.files.atomic_files import replacing
 
@@ -27,54 +24,33 @@ SLOW = 1.0
 TOLERANCE = 1e-4  # mean vertex weights: the hem is measured in millimetres
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _OfScene(Task):
-    """Base of a task that simulates once for each scene."""
+def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
+    """Write the garment settled in the first pose of a scene, the posed body and the areas at rest.
 
-    silent = True
-    unit_seconds = 0.07
-    scene: Scene
+    Where a scene has `start_of`, its start is what settled in that scene.
+    """
+    from reference_sim.files.array_file import read_array, write_array
 
-    @classmethod
-    def id_of(cls, scene: Scene) -> TaskId:
-        """Return the id of the task of a scene."""
-        return cls.kind, flat(scene.name)
+    built, run, shared = scene.build(context.assets), context.folder, scene.start_of
+    assert built.obstacle is not None
+    with replacing(run.body_path(scene.name)) as temporary:
+        write_array(temporary, built.obstacle.positions)
+    write_body(run, built)
+    with replacing(run.start_path(scene.name)) as temporary:
+        write_array(temporary, read_array(run.start_path(shared)) if shared else built.start_state)
+    with replacing(run.rest_areas_path(scene.name)) as temporary:
+        write_array(temporary, built.cloth.areas)
+    return Outcome(files=files_of_start(scene, run))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SettleStart(_OfScene):
-    """The garment settled in the first pose of a scene, or what settled in its `start_of`; the posed body."""
-
-    kind = "start"
-    stage = "ground truth"
-
-    def clear(self, folder: RunFolder) -> None:
-        """Remove the files of an earlier run of it."""
-        for path in self._paths(folder):
-            path.unlink(missing_ok=True)
-
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Write the settled start, the posed body and the areas at rest."""
-        from reference_sim.files.array_file import read_array, write_array
-
-        scene, run, shared = self.scene.build(context.assets), context.folder, self.scene.start_of
-        assert scene.obstacle is not None
-        with replacing(run.body_path(scene.name)) as temporary:
-            write_array(temporary, scene.obstacle.positions)
-        write_body(run, scene)
-        with replacing(run.start_path(scene.name)) as temporary:
-            write_array(temporary, read_array(run.start_path(shared)) if shared else scene.start_state)
-        with replacing(run.rest_areas_path(scene.name)) as temporary:
-            write_array(temporary, scene.cloth.areas)
-        context.tell(self.units)
-        return Outcome(files=tuple(map(run.relative, self._paths(run))))
-
-    def _paths(self, folder: RunFolder) -> tuple[Path, ...]:
-        name = self.scene.name
-        return (
-            folder.start_path(name), folder.body_path(name), folder.trajectory_path(name, "body"),
-            folder.rest_areas_path(name),
-        )  # fmt: skip
+def files_of_start(scene: Scene, run: RunFolder) -> tuple[str, ...]:
+    """Return the names of the files that `settle_start` writes."""
+    name = scene.name
+    paths = (
+        run.start_path(name), run.body_path(name), run.trajectory_path(name, "body"),
+        run.rest_areas_path(name),
+    )  # fmt: skip
+    return tuple(map(run.relative, paths))
 
 
 def write_body(run: RunFolder, scene: BuiltScene) -> None:
@@ -92,44 +68,27 @@ def write_body(run: RunFolder, scene: BuiltScene) -> None:
     ).save(run.trajectory_path(scene.name, "body"))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SimulateMotion(Task):
-    """The simulation of a training motion, settling included; networks learn from a whole one.
-
-    entry: the method that simulates.
-    """
-
-    kind = "data"
-    silent = True
-    stage = "ground truth"
-    unit_seconds = 0.07
-    scene: Scene
-    entry: MethodEntry
-
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Simulate the motion and write its trajectory."""
-        scene = self.scene.build(context.assets)
-        trajectory = simulated(scene, self.entry, context.folder)
-        path = context.folder.trajectory_path(scene.name, self.entry.name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Without what the clock showed: the same simulation has the same bytes wherever it is done.
-        replace(trajectory, frame_seconds=trajectory.frame_seconds[:0]).save(path)
-        context.tell(self.units)
-        result = {
-            "frames": trajectory.frames,
-            "whole": trajectory.frames == scene.frames,
-            "status": trajectory.status,
-            "reason": trajectory.reason,
-            "converged": trajectory.status == "converged",
-        }
-        return Outcome(result=result, files=(context.folder.relative(path),))
+def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: Needed) -> Outcome:
+    """Write the simulation of a training motion by a method, settling included; a whole one teaches."""
+    built, run = scene.build(context.assets), context.folder
+    trajectory = simulated(built, entry, run)
+    path = run.trajectory_path(scene.name, entry.name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # Without what the clock showed: the same simulation has the same bytes wherever it is done.
+    replace(trajectory, frame_seconds=trajectory.frame_seconds[:0]).save(path)
+    result = {
+        "frames": trajectory.frames,
+        "whole": trajectory.frames == built.frames,
+        "status": trajectory.status,
+        "reason": trajectory.reason,
+        "converged": trajectory.status == "converged",
+    }
+    return Outcome(result=result, files=(run.relative(path),))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SimulateClips(Task):
-    """Simulations of some of a garment's augmented clips, each settled and simulated like a motion.
-
-    Only clips that are whole and converged are kept.
+@dataclass(frozen=True, kw_only=True)
+class MixedClips:
+    """Some of a garment's augmented clips.
 
     Attributes:
         scene: that of any motion in the garment.
@@ -141,10 +100,6 @@ class SimulateClips(Task):
         swinging: see benchmarks.training.Simulated.
     """
 
-    kind = "clips"
-    silent = True
-    stage = "ground truth"
-    unit_seconds = 0.07
     scene: Scene
     entry: MethodEntry
     motions: tuple[str, ...]
@@ -152,51 +107,52 @@ class SimulateClips(Task):
     part: int
     swinging: bool = False
 
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Simulate the clips and write the vertices of those that are whole and converged."""
-        import numpy as np
 
-        from snug.training.augmentation import make_shared_clips
+def simulate_clips(mixed: MixedClips, context: Context, needed: Needed) -> Outcome:
+    """Write the vertices of those clips whose simulation, settled like a motion's, is whole and converged."""
+    import numpy as np
 
-        assets, run, garment = context.assets, context.folder, self.scene.garment
-        assert assets is not None
-        kept: dict[str, Any] = {}
-        left_out: dict[str, str] = {}
-        vertices = len(assets.garments[garment].rest_positions)
-        before, clips = (
-            make_shared_clips(assets.named(self.motions), share, vertices=vertices, swinging=self.swinging)
-            for share in (self.part, self.part + 1)
-        )
-        new = clips[len(before) :]
-        for clip in new:
-            positions, reason = self._simulated(clip, context)
-            if reason:
-                left_out[clip.name] = reason
-            else:
-                kept[clip.name] = positions.astype(np.float32)  # as networks see it
-            context.tell(self.units / len(new))
-        path = run.clips_path(self.clips, self.entry.name, self.part)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as temporary:
-            np.savez(temporary, **kept)
-        result = {"clips": list(kept), "left_out": left_out}
-        return Outcome(result=result, files=(run.relative(path),))
+    from snug.training.augmentation import make_shared_clips
 
-    def _simulated(self, clip: Motion, context: Context) -> tuple[np.ndarray, str]:
-        """Return positions (T,V,3) [m] of a clip, and why no network learns from them, or empty."""
-        import numpy as np
+    assets, run = context.assets, context.folder
+    assert assets is not None
+    kept: dict[str, Any] = {}
+    left_out: dict[str, str] = {}
+    vertices = len(assets.garments[mixed.scene.garment].rest_positions)
+    before, clips = (
+        make_shared_clips(assets.named(mixed.motions), share, vertices=vertices, swinging=mixed.swinging)
+        for share in (mixed.part, mixed.part + 1)
+    )
+    new = clips[len(before) :]
+    for clip in new:
+        positions, reason = simulated_clip(clip, mixed, context)
+        if reason:
+            left_out[clip.name] = reason
+        else:
+            kept[clip.name] = positions.astype(np.float32)  # as networks see it
+        context.tell(1.0 / len(new))
+    path = run.clips_path(mixed.clips, mixed.entry.name, mixed.part)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        np.savez(temporary, **kept)
+    return Outcome(result={"clips": list(kept), "left_out": left_out}, files=(run.relative(path),))
 
-        assets, garment = context.assets, self.scene.garment
-        assert assets is not None
-        alone = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
-        scene = replace(self.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(alone)
-        try:
-            trajectory = simulated(scene, self.entry, context.folder)
-        except RuntimeError as error:  # a pose that leaves the cloth no room
-            return np.empty(0), str(error) or type(error).__name__
-        done = trajectory.status == "converged" or self.entry.truncated
-        whole = trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all()
-        return trajectory.positions, "" if done and whole else f"{trajectory.status}: {trajectory.reason}"
+
+def simulated_clip(clip: Motion, mixed: MixedClips, context: Context) -> tuple[np.ndarray, str]:
+    """Return positions (T,V,3) [m] of a clip, and why no network learns from them, or empty."""
+    import numpy as np
+
+    assets, garment = context.assets, mixed.scene.garment
+    assert assets is not None
+    alone = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
+    scene = replace(mixed.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(alone)
+    try:
+        trajectory = simulated(scene, mixed.entry, context.folder)
+    except RuntimeError as error:  # a pose that leaves the cloth no room
+        return np.empty(0), str(error) or type(error).__name__
+    done = trajectory.status == "converged" or mixed.entry.truncated
+    whole = trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all()
+    return trajectory.positions, "" if done and whole else f"{trajectory.status}: {trajectory.reason}"
 
 
 def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:
@@ -206,31 +162,23 @@ def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Traje
     return method.run()
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SimulateQuasiStatic(_OfScene):
-    """Quasi-static solution of each frame of a scene: dynamics are measured against it."""
+def simulate_quasi_static(scene: Scene, context: Context, needed: Needed) -> Outcome:
+    """Write the quasi-static solution of each frame of a scene: dynamics are measured against it."""
+    import numpy as np
 
-    kind = "quasi-static"
-    stage = "quasi-static answers"
+    from reference_sim import simulate
 
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Simulate each frame held still and write the trajectory."""
-        import numpy as np
-
-        from reference_sim import simulate
-
-        scene = build_scene(self.scene, context)
-        path = context.folder.quasi_static_path(scene.name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        trajectory = simulate(
-            scene.cloth, scene.simulated_energies, dt=SLOW, frames=scene.frames, obstacle=scene.obstacle,
-            start=scene.start, quasi_static=True, tolerance=TOLERANCE, pin_positions=scene.pin_positions,
-        )  # fmt: skip
-        context.tell(self.units)
-        if trajectory.frames < scene.frames or not np.isfinite(trajectory.positions).all():
-            reason = f"ended after {trajectory.frames} of {scene.frames} frames: {trajectory.reason}"
-            return Outcome("diverged", reason, failed=True)
-        trajectory.save(path)
-        left = int((trajectory.frame_fields["converged"] == 0.0).sum())
-        result = {"status": trajectory.status, "frames_not_converged": left}
-        return Outcome(result=result, files=(context.folder.relative(path),))
+    built = build_scene(scene, context)
+    path = context.folder.quasi_static_path(scene.name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    trajectory = simulate(
+        built.cloth, built.simulated_energies, dt=SLOW, frames=built.frames, obstacle=built.obstacle,
+        start=built.start, quasi_static=True, tolerance=TOLERANCE, pin_positions=built.pin_positions,
+    )  # fmt: skip
+    if trajectory.frames < built.frames or not np.isfinite(trajectory.positions).all():
+        reason = f"ended after {trajectory.frames} of {built.frames} frames: {trajectory.reason}"
+        return Outcome("diverged", reason, failed=True)
+    trajectory.save(path)
+    left = int((trajectory.frame_fields["converged"] == 0.0).sum())
+    result = {"status": trajectory.status, "frames_not_converged": left}
+    return Outcome(result=result, files=(context.folder.relative(path),))

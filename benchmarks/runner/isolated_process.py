@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import forkserver
@@ -31,6 +32,10 @@ def one_line(error: BaseException) -> str:
     'ValueError: too long'
     """
     return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def tell_nobody(progress: float) -> None:
+    """Report progress to nobody."""
 
 
 PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
@@ -77,19 +82,30 @@ class IsolatedProcess:
         """True if the process that was last called is still there."""
         return self._process is not None
 
-    def call(self, function: Callable[..., Any], *arguments: Any, seconds: float | None) -> Any:
+    def call(
+        self,
+        function: Callable[..., Any],
+        *arguments: Any,
+        seconds: float | None,
+        told: Callable[[float], None] = tell_nobody,
+    ) -> Any:
         """function(*arguments) in the worker; both sides must be picklable.
 
-        Raises what the function raises, and WorkerDied after `seconds` (None: no deadline) or where the
-        process ended.
+        `told` is called here with what the function passes to `tell` there. Raises what the function raises,
+        and WorkerDied after `seconds` (None: no deadline) or where the process ended.
         """
         if self._process is None:
             self._start()
+        end = None if seconds is None else time.monotonic() + seconds
         try:
             self._pipe.send((function, arguments))
-            if not self._pipe.poll(seconds):
-                raise WorkerDied(f"no answer within {seconds:g} s", "timeout")
-            fine, answer = self._pipe.recv()
+            fine = None
+            while fine is None:
+                if not self._pipe.poll(None if end is None else max(0.0, end - time.monotonic())):
+                    raise WorkerDied(f"no answer within {seconds:g} s", "timeout")
+                fine, answer = self._pipe.recv()
+                if fine is None:
+                    told(answer)
         except (EOFError, ConnectionError):
             self._process.join()
             code = self._process.exitcode
@@ -179,7 +195,18 @@ def _follow(parent: int) -> None:
     os._exit(1)
 
 
+_pipe: Connection | None = None  # to the one who called this process
+
+
+def tell(seconds: float) -> None:
+    """Report, from a worker, progress in seconds that it was expected to take."""
+    if _pipe is not None:
+        _pipe.send((None, seconds))
+
+
 def _serve(pipe: Connection, begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+    global _pipe
+    _pipe = pipe
     lead_a_group()
     if begin is not None:
         begin(*arguments)

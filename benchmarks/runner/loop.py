@@ -6,16 +6,14 @@ Dry run, resume, failures, what an interrupt leaves and exclusive timing are dec
 from __future__ import annotations
 
 import dataclasses
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import nullcontext
-from itertools import groupby
 from typing import TYPE_CHECKING
 
 from benchmarks.plan.cell import TaskId
 from benchmarks.runner.cache import Cache, Cached
 from benchmarks.runner.executor import Batch, Executor
-from benchmarks.runner.task import Outcome, Task, failure
+from benchmarks.runner.task import Needed, Outcome, Task, failure
 
 if TYPE_CHECKING:
     from typing import Never
@@ -53,51 +51,38 @@ class Runner:
     # --- running -------------------------------------------------------------------------------------------
 
     def run(self, executor: Executor, log: RunLog | None = None) -> None:
-        """Do all tasks: the timed ones one by one, the others side by side before, between and after them.
+        """Do all tasks: untimed ones side by side until the others wait for timed ones, and these one by one.
 
         log: follows the stages.
         """
-        left = self.tasks
         try:
-            while left:
-                _, group = next(groupby(left, key=lambda task: task.stage if task.process else ""))
-                tasks = tuple(group)
+            while left := [task for task in self.tasks if task.id not in self.outcomes]:
+                tasks = _able(left, timed=False) or _able(left, timed=True)
                 with log.stage(_titles(tasks)) if log else nullcontext():
-                    if tasks[0].process:
-                        self._alone(tasks, executor)
-                    else:
-                        later = [task for task in left[len(tasks) :] if not task.process]
-                        self._side_by_side(tasks, later, executor)
-                left = tuple(task for task in left if task.id not in self.outcomes)
+                    (self._alone if tasks[0].process else self._side_by_side)(tasks, executor)
         finally:
             executor.close()
 
-    def _side_by_side(self, tasks: Sequence[Task], later: Sequence[Task], executor: Executor) -> None:
-        """Do tasks, each as soon as its needs have outcomes; a worker that would wait begins later ones."""
+    def _side_by_side(self, tasks: Sequence[Task], executor: Executor) -> None:
+        """Do tasks, each as soon as its needs have outcomes."""
         for task in tasks:
             if self._is_ready([task]):
                 self.decide(task)
-        expected = sum(task.expected_seconds for task in tasks if task.id not in self.outcomes)
+        waiting = _batches([task for task in tasks if task.id not in self.outcomes])
+        expected = sum(task.seconds for batch in waiting for task in batch)
         with _bar(tasks, expected, executor.side_by_side) as bar:
-            waiting, left = [*_batches(tasks), *_batches(later)], deque(tasks)
 
             def ready() -> Batch | None:
-                while left and left[0].id in self.outcomes:
-                    left.popleft()
-                if not left:
-                    return None
                 for batch in list(waiting):
                     if self._is_ready(batch):
                         waiting.remove(batch)
                         if wanted := [task for task in batch if self.decide(task)]:
                             if executor.side_by_side > 1 and len(wanted) > 1 and not waiting:
                                 half = (len(wanted) + 1) // 2  # of the last batch: the others would wait
-                                wanted, rest = wanted[:half], wanted[half:]
-                                waiting.append(rest)
-                            if wanted[0] not in tasks:
-                                bar.total += sum(task.expected_seconds for task in wanted)
+                                waiting.append(wanted[half:])
+                                wanted = wanted[:half]
                             for task in wanted:
-                                task.clear(self.cache.folder)
+                                self._clear(task)
                             return wanted, self._needed(*wanted)
                 return None
 
@@ -113,18 +98,18 @@ class Runner:
     def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do timed tasks one by one; the next few begin together, each in its process."""
         begun: set[str] = set()  # processes
-        with _bar(tasks, sum(task.expected_seconds for task in tasks), 1) as bar:
+        with _bar(tasks, sum(task.seconds for task in tasks), 1) as bar:
             for place, task in enumerate(tasks):
                 if self.decide(task):
                     if task.process not in begun:
                         soon = self._soon(tasks[place:], begun)
                         executor.begin([(other, self._needed(other)) for other in soon])
                         begun |= {other.process for other in soon}
-                    task.clear(self.cache.folder)
+                    self._clear(task)
                     self._keep(task, executor.alone(task, self._needed(task)))
-                    bar.update(task.expected_seconds)
+                    bar.update(task.seconds)
                 else:
-                    bar.total -= task.expected_seconds  # no time was spent on it: it says nothing of the rest
+                    bar.total -= task.seconds  # no time was spent on it: it says nothing of the rest
                 if not any(self._comes(other, task.process) for other in tasks[place + 1 :]):
                     executor.release(task.process)
 
@@ -141,8 +126,14 @@ class Runner:
         """Return whether the task will want that process."""
         if task.process != process:
             return False
-        blocked = any(id in self.outcomes and id not in self._needed(task) for id in task.needs)
-        return not blocked and not task.skip(self._needed(task))
+        needed = self._needed(task)
+        blocked = any(id in self.outcomes and id not in needed for id in task.needs)
+        return not blocked and not _skipped(task, needed)
+
+    def _clear(self, task: Task) -> None:
+        """Remove the files of an earlier run of a task, so that nobody takes them for this one's."""
+        for name in task.files:
+            (self.cache.folder.path / name).unlink(missing_ok=True)
 
     def decide(self, task: Task) -> bool:
         """Return whether the task is to be run now; where not, its outcome is known."""
@@ -162,7 +153,7 @@ class Runner:
     def _verdict(self, task: Task) -> tuple[Outcome | None, Cached]:
         """Return the outcome of a task without running it, None where it has to run, and its cache entry."""
         needed = self._needed(task)
-        if reason := task.skip(needed):
+        if reason := _skipped(task, needed):
             return Outcome("skipped", reason), Cached("missing", wanted=False)
         entry = self.cache.find(task, self.cached)
         missing = next((id for id in task.needs if id not in needed), None)
@@ -180,14 +171,14 @@ class Runner:
             return Outcome("skipped", f"not built upon {title}, {other.remark}")
         if other.status == "skipped":
             return Outcome("skipped", f"{title}: {other.reason}")
-        reason = f"cannot be run: {title}: {other.status}: {other.reason}"
+        reason = f"cannot be run: {title}: {other.ending}"
         return Outcome("failed", reason, failed=True, result={BLOCKED: title})
 
     def _needed(self, *tasks: Task) -> dict[TaskId, Outcome]:
         """Return the outcomes that the tasks may build upon: successful and up to date."""
         ids = dict.fromkeys(id for task in tasks for id in (*task.needs, *task.reads))
         known = {id: self.outcomes[id] for id in ids if id in self.outcomes}
-        return {id: o for id, o in known.items() if not (o.failed or o.remark or o.status == "skipped")}
+        return {id: outcome for id, outcome in known.items() if outcome.usable}
 
     def _keep(self, task: Task, outcome: Outcome) -> None:
         """Write the outcome into the cache; one that cannot be written is a failure."""
@@ -230,10 +221,24 @@ class Runner:
     def broken(self) -> Mapping[str, str]:
         """Return title -> how it failed, of tasks that have no row."""
         return {
-            task.title: f"{outcome.status}: {outcome.reason}"
+            task.title: outcome.ending
             for task in self.tasks
             if (outcome := self.outcomes.get(task.id)) and outcome.failed and task.silent
         }
+
+
+def _able(tasks: Sequence[Task], *, timed: bool) -> list[Task]:
+    """Return the tasks that are timed, or are not, and wait for none of the others."""
+    others: set[TaskId] = set()
+    for task in tasks:
+        if bool(task.process) != timed or not others.isdisjoint((*task.needs, *task.reads)):
+            others.add(task.id)
+    return [task for task in tasks if task.id not in others]
+
+
+def _skipped(task: Task, needed: Needed) -> str:
+    """Return why there is nothing to do for a task, or empty."""
+    return task.skip if isinstance(task.skip, str) else task.skip(needed)
 
 
 def _titles(tasks: Sequence[Task]) -> str:
@@ -248,7 +253,7 @@ def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
     stages = list(dict.fromkeys(task.stage for task in tasks))
     return sorted(
         batches.values(),
-        key=lambda batch: (stages.index(batch[0].stage), -sum(task.expected_seconds for task in batch)),
+        key=lambda batch: (stages.index(batch[0].stage), -sum(task.seconds for task in batch)),
     )
 
 

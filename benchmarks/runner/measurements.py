@@ -6,7 +6,7 @@ import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,28 +15,27 @@ from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
-from benchmarks.results.run_folder import SECONDS, RunFolder
+from benchmarks.results.run_folder import SECONDS
 from benchmarks.runner.cells import build_scene
 from benchmarks.runner.isolated_process import one_line
-from benchmarks.runner.task import Context, Outcome, Task
+from benchmarks.runner.task import Context, Needed, Outcome
 from reference_sim.files.atomic_files import replacing
 
-if TYPE_CHECKING:
-    pass
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MeasureCell(Task):
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
     """Metrics of a cell's trajectory, compared with those of the reference and its variants.
 
-    cells: all of the scene, in the order of their roll-outs; those that `reads` names are compared with.
-    quasi_static: the simulator's answer to poses held still; counterpart: the same method in another scene.
-    outside: files of metrics that are not the project's, measured in every scene.
+    Attributes:
+        cell: the cell.
+        cells: all of the scene, in the order of their roll-outs; those whose outcomes are given are compared
+            with.
+        gap_samples: frames in which the energy gap is measured.
+        quasi_static: the simulator's answer to poses held still.
+        counterpart: the same method in another scene.
+        outside: files of metrics that are not the project's, measured in every scene.
     """
 
-    kind = "metrics"
-    stage = "metrics"
-    unit_seconds = 0.01
     cell: Cell
     cells: tuple[Cell, ...]
     gap_samples: int
@@ -44,57 +43,46 @@ class MeasureCell(Task):
     counterpart: Cell | None = None
     outside: tuple[str, ...] = ()
 
-    @staticmethod
-    def shares(begun: int) -> int:
-        """Return the units of a frame, for a cell that begins a batch of so many cells, or 0.
 
-        The first of a batch measures the body, the reference, and how all of them touch the body.
-        """
-        return 7 + 2 * begun // 5 if begun else 1
+def measure_cell(work: Measurement, context: Context, needed: Needed) -> Outcome:
+    """Measure the trajectory, and write energies of each frame and other curves beside it."""
+    if "roll-outs" not in context.memo:
+        context.memo["roll-outs"] = roll_outs_of(work, context, needed)
+    roll_out, folder = context.memo["roll-outs"][work.cell], context.folder
+    if work.counterpart is not None:
+        outcome = needed.get(work.counterpart.task_id)
+        if outcome is not None and outcome.status in USABLE:
+            roll_out.counterpart = _positions(folder.trajectory_path(*work.counterpart.key))
+    metrics, curves, (status, reason) = measured(roll_out, work.cell.scene.metrics, work.outside)
+    path = folder.curves_path(*work.cell.key)
+    if curves:
+        curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
+        curves[SECONDS][: roll_out.scene.warm_up] = np.nan
+    write_curves(path, curves, roll_out.trajectory.frames)
+    return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
 
-    def clear(self, folder: RunFolder) -> None:
-        """Remove the curves of an earlier measurement."""
-        folder.curves_path(*self.cell.key).unlink(missing_ok=True)
 
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Measure the trajectory, and write energies of each frame and other curves beside it."""
-        if "roll-outs" not in context.memo:
-            context.memo["roll-outs"] = self._roll_outs(context, needed)
-        roll_out, folder = context.memo["roll-outs"][self.cell], context.folder
-        if self.counterpart is not None:
-            outcome = needed.get(self.counterpart.task_id)
-            if outcome is not None and outcome.status in USABLE:
-                roll_out.counterpart = _positions(folder.trajectory_path(*self.counterpart.key))
-        metrics, curves, (status, reason) = measured(roll_out, self.cell.scene.metrics, self.outside)
-        path = folder.curves_path(*self.cell.key)
-        if curves:
-            curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
-            curves[SECONDS][: roll_out.scene.warm_up] = np.nan
-        write_curves(path, curves, roll_out.trajectory.frames)
-        context.tell(self.units)
-        return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
+def roll_outs_of(work: Measurement, context: Context, needed: Needed) -> dict[Cell, RollOut]:
+    """Return the roll-outs of the batch: they share search trees, and the energies of references."""
+    from reference_sim import Trajectory
 
-    def _roll_outs(self, context: Context, needed: Mapping[TaskId, Outcome]) -> dict[Cell, RollOut]:
-        """Those of the batch beside each other: they share search trees, and the energies of references."""
-        from reference_sim import Trajectory
-
-        folder = context.folder
-        group = SceneRollOuts(build_scene(self.cell.scene, context), gap_samples=self.gap_samples)
-        if self.quasi_static in needed:
-            group.quasi_static = _positions(folder.quasi_static_path(self.cell.scene.name))
-        roll_outs = {}
-        for cell in self.cells:
-            outcome = needed.get(cell.task_id)
-            if outcome is not None and outcome.files:
-                still = folder.quasi_static_path(*cell.key) if len(outcome.files) > 1 else None
-                roll_outs[cell] = RollOut(
-                    group, cell.entry, Trajectory.load(folder.trajectory_path(*cell.key)),
-                    status=outcome.status, suites=cell.suites,
-                    quasi_static=_positions(still) if still else None,
-                )  # fmt: skip
-                if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
-                    group.roll_outs.append(roll_outs[cell])
-        return roll_outs
+    folder = context.folder
+    group = SceneRollOuts(build_scene(work.cell.scene, context), gap_samples=work.gap_samples)
+    if work.quasi_static in needed:
+        group.quasi_static = _positions(folder.quasi_static_path(work.cell.scene.name))
+    roll_outs = {}
+    for cell in work.cells:
+        outcome = needed.get(cell.task_id)
+        if outcome is not None and outcome.files:
+            still = folder.quasi_static_path(*cell.key) if len(outcome.files) > 1 else None
+            roll_outs[cell] = RollOut(
+                group, cell.entry, Trajectory.load(folder.trajectory_path(*cell.key)),
+                status=outcome.status, suites=cell.suites,
+                quasi_static=_positions(still) if still else None,
+            )  # fmt: skip
+            if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
+                group.roll_outs.append(roll_outs[cell])
+    return roll_outs
 
 
 def measured(

@@ -6,15 +6,18 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.metrics import find_metric
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.plan import Plan, protocol_of, protocol_of_case
 from benchmarks.results.protocol import OWN, is_member, spread
 from benchmarks.results.row import DECLARED, PRETRAINED, Row
-from benchmarks.runner.networks import NAME, TrainNetwork
+from benchmarks.runner.networks import NAME
 from benchmarks.runner.task import Outcome, Task
+
+if TYPE_CHECKING:
+    from benchmarks.validation.case import Case
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
@@ -27,7 +30,7 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
     """Return the rows of all outcomes; cells first."""
     by_id = {task.id: task for task in tasks}
     cells = [row for cell in plan.cells for row in rows_of_cell(cell, plan, by_id, outcomes)]
-    others = [row for task in tasks for row in _rows_of_task(task, outcomes)]
+    others = [row for case in plan.cases for row in _rows_of_case(case, outcomes)]
     return [*with_uncertainty(cells, plan.metrics), *others]
 
 
@@ -170,7 +173,7 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
 def network_tasks(cell: Cell, tasks: Mapping[TaskId, Task]) -> tuple[TaskId | None, tuple[TaskId, ...]]:
     """Return the id of the training of a cell's network, None without one, and of its simulated data."""
     needs = tasks[cell.task_id].needs if cell.task_id in tasks else ()
-    trained = next((id for id in needs if id[0] == TrainNetwork.kind), None)
+    trained = next((id for id in needs if id[0] == "network"), None)
     return trained, tasks[trained].reads if trained else ()
 
 
@@ -229,16 +232,20 @@ def first_of(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _rows_of_task(task: Task, outcomes: Outcomes) -> Iterator[Row]:
-    """Yield the rows that a task gives by itself; one that --only leaves out has none."""
-    outcome = outcomes.get(task.id)
+def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
+    """Yield the row of a case, also of one that died or hung; one that --only leaves out has none.
+
+    A hang and a crash are failures of the solver: only one that ends by itself may call it a timeout.
+    """
+    outcome = outcomes.get(("case", case.name))
     if outcome is None or outcome.status == "skipped":
         return
-    for row in task.rows(outcome):
-        reason = "; ".join(filter(None, (row.reason, outcome.remark)))
-        unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
-        origin = _origin(outcome, protocol_of_case(row.scene, row.metric))
-        yield dataclasses.replace(row, **origin, reason=reason, unit=unit)
+    result = outcome.result
+    row = Row(**result) if result else case.row(status="failed", reason=outcome.reason)
+    reason = "; ".join(filter(None, (row.reason, outcome.remark)))
+    unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
+    origin = _origin(outcome, protocol_of_case(row.scene, row.metric))
+    yield dataclasses.replace(row, **origin, reason=reason, unit=unit)
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:

@@ -6,8 +6,8 @@ Loads nothing heavy: a dry run makes the same tasks as a run.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property, partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,15 +16,38 @@ from benchmarks import provenance
 from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
-from benchmarks.plan.cell import Cell, flat
+from benchmarks.plan.cell import Cell, TaskId, flat
 from benchmarks.plan.plan import Network, Plan, network_of, runs
-from benchmarks.provenance import digest, digest_of_file, find_module
-from benchmarks.runner.cache import dependencies
-from benchmarks.runner.cells import BatchCell, RepeatCell, RunCase, RunCell, RunUntimedCell
-from benchmarks.runner.ground_truth import SettleStart, SimulateClips, SimulateMotion, SimulateQuasiStatic
-from benchmarks.runner.measurements import MeasureCell
-from benchmarks.runner.networks import LONGEST, TakeNetwork, TrainNetwork, take_network, without_machine
-from benchmarks.runner.task import Task
+from benchmarks.provenance import digest, digest_of_file, find_module, software
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import dependencies, digests_of
+from benchmarks.runner.cells import (
+    begin_cell,
+    files_of,
+    repeat_cell,
+    run_case,
+    run_cell,
+    time_batch,
+    too_long,
+)
+from benchmarks.runner.ground_truth import (
+    MixedClips,
+    files_of_start,
+    settle_start,
+    simulate_clips,
+    simulate_motion,
+    simulate_quasi_static,
+)
+from benchmarks.runner.measurements import Measurement, measure_cell
+from benchmarks.runner.networks import (
+    LONGEST,
+    NetworkTraining,
+    pretrained_network,
+    take,
+    train,
+    without_machine,
+)
+from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
 from benchmarks.training import Simulated
@@ -146,6 +169,10 @@ def users_code(*homes: str) -> tuple[str, ...]:
     return (*own, *USERS_OWN) if own else ()
 
 
+FRAME = 0.07  # [s] expected of a simulated frame
+SIMULATION = 7.0  # [s] expected of a cell's simulation to convergence
+SHORT = 0.05  # of these, for a network or a simulation that is stopped early
+TRAINED = "training"  # the stage of networks that no file has
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 TASKS = "benchmarks/runner"
 
@@ -156,11 +183,12 @@ def tasks_of(plan: Plan) -> list[Task]:
 
 
 class Schedule:
-    """The tasks of one plan, each made once."""
+    """The tasks of one plan."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan, self.preset, self.inputs = plan, plan.preset, TaskInputs(plan)
-        self._networks: dict[Network, TrainNetwork] = {}
+        self.folder = RunFolder(plan.folder)
+        self._trainings: dict[Network, NetworkTraining] = {}
 
     def tasks(self) -> Iterator[Task]:
         """Yield the tasks in the order in which they are done."""
@@ -168,11 +196,11 @@ class Schedule:
         simulated = {scene.name: scene for scene in plan.scenes if scene.simulated}
         others = (self._settled_in(scene) for scene in simulated.values() if scene.start_of)
         yield from map(self.start, ({scene.name: scene for scene in others} | simulated).values())
-        networks = [self.obtained(network) for network in plan.networks]
-        trained = (n for n, task in zip(plan.networks, networks) if isinstance(task, TrainNetwork))
+        networks = {network: self.network(network) for network in plan.networks}
+        trained = (network for network, task in networks.items() if task.stage == TRAINED)
         taught = (task for network in trained for task in self.ground_truth(network))
         yield from {task.id: task for task in taught}.values()
-        yield from networks
+        yield from networks.values()
         for _, cells in groupby(plan.cells, key=lambda cell: cell.scene):
             timed = [cell for cell in cells if cell.timed]
             for first in range(0, len(timed), AT_ONCE):
@@ -184,16 +212,18 @@ class Schedule:
 
     # --- ground truth and training -------------------------------------------------------------------------
 
-    def start(self, scene: Scene) -> SettleStart:
+    def start(self, scene: Scene) -> Task:
         """Return the task that settles the garment of a scene."""
-        needs = (SettleStart.id_of(self._settled_in(scene)),) if scene.start_of else ()
-        return SettleStart(
-            name=flat(scene.name), label=scene.name, scene=scene, units=self.preset.settle_frames,
-            needs=needs, **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
+        return Task(
+            kind="start", name=flat(scene.name), label=scene.name, stage="ground truth", silent=True,
+            run=partial(settle_start, scene), files=files_of_start(scene, self.folder),
+            needs=(start_of(self._settled_in(scene)),) if scene.start_of else (),
+            seconds=FRAME * self.preset.settle_frames,
+            **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
         )  # fmt: skip
 
-    def ground_truth(self, network: Network) -> list[SimulateMotion | SimulateClips]:
-        """Return the simulations that a network learns from."""
+    def ground_truth(self, network: Network) -> list[Task]:
+        """Return the simulations that a network learns from: those of motions, then those of clips."""
         simulated = network.training.simulated if network.training else None
         if simulated is None:
             return []
@@ -203,74 +233,95 @@ class Schedule:
         clips = (self.clips(garment, simulated, motions, part) for part in range(simulated.mixed))
         return [*given, *clips]
 
-    def data(self, motion: str, garment: str, entry: MethodEntry) -> SimulateMotion:
+    def data(self, motion: str, garment: str, entry: MethodEntry) -> Task:
         """Return the task that simulates a training motion."""
         scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
-        return SimulateMotion(
-            name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry), scene=scene,
-            entry=entry, units=self.preset.settle_frames + self._frames(motion),
+        return Task(
+            kind="data", name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry),
+            stage="ground truth", silent=True, run=partial(simulate_motion, scene, entry),
+            seconds=FRAME * (self.preset.settle_frames + self._frames(motion)),
             **self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py")),
         )  # fmt: skip
 
-    def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> SimulateClips:
+    def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
         """Return the task that simulates one part of the augmented clips of these motions."""
         sort, entry = "swinging" if simulated.swinging else "mixed", find_method(simulated.method)
         clips = f"{garment}/{sort}-{len(motions)}"
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
         of_scene = self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"))
         mixed_of = {name: self.inputs.motion(name) for name in motions}
-        inputs = of_scene["inputs"] | {"part": part, "swinging": simulated.swinging, "motions": mixed_of}
-        return SimulateClips(
-            name=f"{flat(clips)}/{flat(entry.name)}-{part}",
+        mixed = MixedClips(
+            scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=simulated.swinging
+        )
+        return Task(
+            kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
             label=_label(f"{garment}, {sort} clips of {len(motions)} motions, part {part}", entry),
-            scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=simulated.swinging,
-            units=sum(map(self._frames, motions)),
-            **of_scene | {"inputs": inputs, "code": (*of_scene["code"], *MIXING)},
+            stage="ground truth", silent=True, run=partial(simulate_clips, mixed),
+            seconds=FRAME * sum(map(self._frames, motions)),
+            inputs=of_scene["inputs"] | {"part": part, "swinging": simulated.swinging, "motions": mixed_of},
+            code=(*of_scene["code"], *MIXING),
         )  # fmt: skip
 
-    def obtained(self, network: Network) -> TrainNetwork | TakeNetwork:
+    def network(self, network: Network) -> Task:
         """Return the task that trains a network, or takes it from a file where the plan wants no trainings.
 
         A network of a user's file is trained all the same, unless its file is there.
         """
-        task = self.network(network)
-        if self.plan.trained is None or task.chosen is None:
-            return task
-        taken = take_network(task, self.plan.trained)
-        return task if network.users_training and taken.source is None else taken
+        job = self.training(network)
+        fields: dict[str, Any] = {
+            "kind": "network", "name": network.task_id[1], "label": network.label, "silent": True,
+            "files": (self.folder.relative(job.path(self.folder)),),
+        }  # fmt: skip
+        if self.plan.trained is not None and job.chosen is not None:
+            pretrained = pretrained_network(job, self.plan.trained)
+            if pretrained.source is not None or not network.users_training:
+                content = digest_of_file(pretrained.source) if pretrained.source else ""
+                return Task(
+                    stage="pretrained networks", run=partial(take, pretrained), skip=pretrained.refusal,
+                    inputs={"file": content, "differing": pretrained.differing},
+                    code=("benchmarks/runner/networks.py", "snug/networks"), **fields,
+                )  # fmt: skip
+        return Task(
+            stage=TRAINED, run=partial(train, job), reads=job.reads, seconds=job.seconds,
+            inputs=self._inputs_of(network), code=(*TRAINING, *users_code(network.declared_in)), **fields,
+        )  # fmt: skip
 
-    def network(self, network: Network) -> TrainNetwork:
-        """Return the task that trains a network."""
-        if network not in self._networks:
-            self._networks[network] = self._network(network)
-        return self._networks[network]
+    def training(self, network: Network) -> NetworkTraining:
+        """Return how a network is trained."""
+        if network in self._trainings:
+            return self._trainings[network]
+        motions, held_out = self._learned(network)
+        truth = self.ground_truth(network)
+        ids = [task.id for task in truth if task.kind == "data"]
+        code = software(*TRAINING, *users_code(network.declared_in))
+        if truth:
+            code["simulations"] = digest([[t.title, without_machine(dependencies(t))] for t in truth])
+        self._trainings[network] = NetworkTraining(
+            training=network.name, chosen=network.training, home=network.declared_in, seed=network.seed,
+            garment=network.garment, steps=self._steps(network), motions=motions, held_out=held_out,
+            simulated=dict(zip((*motions, *held_out), ids)), device=self.plan.device,
+            clips=tuple(task.id for task in truth if task.kind == "clips"),
+            inputs=digests_of(self._inputs_of(network)), software=code,
+        )  # fmt: skip
+        return self._trainings[network]
 
-    def _network(self, network: Network) -> TrainNetwork:
-        chosen, (motions, held_out) = network.training, self._learned(network)
-        kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
-        steps = self.preset.steps_of(steps_of or network.name, kind)
-        steps *= LONGEST if chosen and chosen.converged else 1
-        inputs = self.inputs.machine(self.plan.device) | self.inputs.of_body(network.garment) | {
-            "training": [network.name, chosen],
+    def _inputs_of(self, network: Network) -> dict[str, Any]:
+        """Return the inputs of a training."""
+        motions, held_out = self._learned(network)
+        return self.inputs.machine(self.plan.device) | self.inputs.of_body(network.garment) | {
+            "training": [network.name, network.training],
             "seed": network.seed,
-            "steps": steps,
+            "steps": self._steps(network),
             "motions": {name: self.inputs.motion(name) for name in motions},
             "held out": {name: self.inputs.motion(name) for name in held_out},
         }  # fmt: skip
-        truth = self.ground_truth(network)
-        simulated = {task.scene.motion: task.id for task in truth if isinstance(task, SimulateMotion)}
-        clips = tuple(task.id for task in truth if isinstance(task, SimulateClips))
-        task = TrainNetwork(
-            name=network.task_id[1], label=network.label,
-            inputs=inputs, code=(*TRAINING, *users_code(network.declared_in)),
-            reads=(*simulated.values(), *clips), units=max(steps, 1), training=network.name, chosen=chosen,
-            home=network.declared_in, seed=network.seed, garment=network.garment, steps=steps,
-            motions=motions, held_out=held_out, simulated=simulated, clips=clips, device=self.plan.device,
-        )  # fmt: skip
-        parts = dependencies(task)
-        if truth:
-            parts["simulations"] = digest([[t.title, without_machine(dependencies(t))] for t in truth])
-        return dataclasses.replace(task, parts=parts)
+
+    def _steps(self, network: Network) -> int:
+        """Return the steps of a training, of one that converges the most."""
+        chosen = network.training
+        kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
+        steps = self.preset.steps_of(steps_of or network.name, kind)
+        return steps * (LONGEST if chosen and chosen.converged else 1)
 
     # --- cells ---------------------------------------------------------------------------------------------
 
@@ -282,43 +333,53 @@ class Schedule:
         for cell in cells:
             yield self.cell(cell)
             if cell.entry.batched and runs(cell):
-                yield self._same_process(BatchCell, cell, cell.batch_id[1])
+                yield self._timed(cell, cell.batch_id, time_batch)
         repeated = [cell for cell in cells if "speed" in cell.suites and runs(cell)]
         for number in range(1, self.preset.repeats):
             turn = number * len(repeated) // self.preset.repeats
             for cell in (*repeated[turn:], *repeated[:turn]):
-                yield self._same_process(
-                    RepeatCell, cell, cell.repeat_id(number)[1], longest=self.preset.repeat_seconds
-                )
+                yield self._timed(
+                    cell, cell.repeat_id(number), repeat_cell, seconds=0.5,
+                    skip=partial(too_long, self.preset.repeat_seconds),
+                )  # fmt: skip
 
-    def cell(self, cell: Cell) -> RunCell:
-        """Return the task that runs a cell."""
+    def cell(self, cell: Cell) -> Task:
+        """Return the task that runs a cell: alone where it is timed."""
         of_scene = self.inputs.of_scene(cell.scene, *code_behind(cell.entry))
-        inputs = of_scene["inputs"] | {"method": declared(cell.entry)}
+        inputs, entry = of_scene["inputs"] | {"method": declared(cell.entry)}, cell.entry
         if cell.timed:
             inputs["least"] = self._least(cell)
-        if cell.entry.seeded:
+        if entry.seeded:
             inputs["seed"] = cell.seed
-        needs = (SettleStart.id_of(cell.scene),) if cell.scene.simulated else ()
+        needs = (start_of(cell.scene),) if cell.scene.simulated else ()
         if network := network_of(cell):
             needs = (*needs, network.task_id)
-        kind, process = (RunCell, cell.name) if cell.timed else (RunUntimedCell, "")
-        return kind(
-            name=cell.name, label=cell.label, cell=cell, needs=needs, process=process,
-            batch="" if process else cell.scene.name, deadline=self.preset.cell_seconds,
-            least=self._least(cell),
-            **of_scene | {"inputs": inputs},
+        fields: dict[str, Any] = {
+            "skip": entry.skip(cell.scene) or "", "files": files_of(cell, self.folder),
+            "inputs": inputs, "code": of_scene["code"], "needs": needs,
+        }  # fmt: skip
+        if cell.timed:
+            return self._timed(cell, cell.task_id, run_cell, begin=partial(begin_cell, cell), **fields)
+        return Task(
+            kind="cell", name=cell.name, label=cell.label, stage="cells that are not timed",
+            run=partial(run_cell, cell, self._least(cell)), batch=cell.scene.name,
+            seconds=SIMULATION * (SHORT if entry.trained or entry.truncated else 1.0),
+            deadline=self.preset.cell_seconds, **fields,
         )  # fmt: skip
 
-    def _same_process(
-        self, kind: type[BatchCell] | type[RepeatCell], cell: Cell, name: str, **fields: Any
-    ) -> Task:
-        """Return a task that follows a timed cell in its process."""
+    def _timed(self, cell: Cell, id: TaskId, run: Callable[..., Outcome], **fields: Any) -> Task:
+        """Return the run of a timed cell, or a task that follows it in its process."""
         least = self._least(cell)
-        return kind(
-            name=name, label=cell.label, cell=cell, inputs={"least": least},
-            code=RUNS, needs=(cell.task_id,),
-            process=cell.name, deadline=self.preset.cell_seconds, least=least, **fields,
+        usual: dict[str, Any] = {
+            "inputs": {"least": least},
+            "code": RUNS,
+            "needs": (cell.task_id,),
+            "seconds": 2.0,
+        }
+        return Task(
+            kind=id[0], name=id[1], label=cell.label, stage="cells", run=partial(run, cell, least),
+            process=cell.name, motion=cell.scene.motion if cell.scene.dressed else "",
+            deadline=self.preset.cell_seconds, **usual | fields,
         )  # fmt: skip
 
     def _least(self, cell: Cell) -> float:
@@ -327,24 +388,26 @@ class Schedule:
 
     # --- measurements --------------------------------------------------------------------------------------
 
-    def quasi_static(self, scene: Scene) -> SimulateQuasiStatic:
+    def quasi_static(self, scene: Scene) -> Task:
         """Return the task that simulates each frame of a scene held still."""
-        return SimulateQuasiStatic(
-            name=flat(scene.name), label=scene.name, scene=scene, units=self._frames(scene.motion),
-            needs=(SettleStart.id_of(scene),), **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
+        return Task(
+            kind="quasi-static", name=flat(scene.name), label=scene.name, stage="quasi-static answers",
+            silent=True, run=partial(simulate_quasi_static, scene), needs=(start_of(scene),),
+            seconds=FRAME * self._frames(scene.motion),
+            **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
         )  # fmt: skip
 
-    def metrics(self, cell: Cell) -> MeasureCell:
+    def metrics(self, cell: Cell) -> Task:
         """Return the task that measures a cell, beside those that it is compared with."""
         scene, plan, entry = cell.scene, self.plan, cell.entry
         cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
         compared = (other for other in cells if other.entry.role in COMPARED_WITH)
         reads = tuple(other.task_id for other in compared if other != cell)
         if scene.simulated:
-            reads = (*reads, SettleStart.id_of(scene))  # the scene is built from it
+            reads = (*reads, start_of(scene))  # the scene is built from it
         quasi_static, counterpart = None, None
         if scene.dynamic:
-            quasi_static = SimulateQuasiStatic.id_of(scene)
+            quasi_static = ("quasi-static", flat(scene.name))
             reads = (*reads, quasi_static)
         if scene.counterpart:
             wanted = (scene.counterpart, cell.method, cell.seed)
@@ -358,27 +421,30 @@ class Schedule:
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
             "method": [
-                entry.role,
-                entry.reporting.family,
-                entry.reporting.level,
-                entry.static_known,
+                entry.role, entry.reporting.family, entry.reporting.level, entry.static_known,
                 entry.other_mesh,
             ],
             "metrics": scene.metrics,
-        }
-        return MeasureCell(
-            name=cell.name, label=cell.label, cell=cell, cells=cells,
-            gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
+        }  # fmt: skip
+        work = Measurement(
+            cell=cell, cells=cells, gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
             counterpart=counterpart, outside=plan.metrics,
-            needs=(cell.task_id,), reads=reads, batch=scene.name,
-            units=self._frames(scene.motion) * MeasureCell.shares(len(cells) if cells[:1] == (cell,) else 0),
-            **of_scene | {"inputs": of_scene["inputs"] | inputs},
+        )  # fmt: skip
+        # The first of a batch measures the body, the reference, and how all of them touch the body.
+        share = 7 + 2 * len(cells) // 5 if cells[:1] == (cell,) else 1
+        return Task(
+            kind="metrics", name=cell.name, label=cell.label, stage="metrics",
+            run=partial(measure_cell, work), needs=(cell.task_id,), reads=reads, batch=scene.name,
+            files=(self.folder.relative(self.folder.curves_path(*cell.key)),),
+            seconds=0.01 * self._frames(scene.motion) * share,
+            inputs=of_scene["inputs"] | inputs, code=of_scene["code"],
         )  # fmt: skip
 
-    def case(self, case: Case) -> RunCase:
+    def case(self, case: Case) -> Task:
         """Return the task of a known answer or a stress test."""
-        return RunCase(
-            name=case.name, label=case.name, case=case, deadline=case.seconds, process=case.process,
+        return Task(
+            kind="case", name=case.name, label=case.name, stage="validation", run=partial(run_case, case),
+            warm_up=case.warm_up, deadline=case.seconds, process=case.process, seconds=0.2,
             inputs=self.inputs.machine() | {"declared": declared(case)},
             code=(find_module(case.module), *CASES),
         )  # fmt: skip
@@ -407,6 +473,11 @@ class Schedule:
         """Return whether the plan simulates a scene by the reference solver."""
         of_scene = (cell for cell in self.plan.cells if cell.scene == scene)
         return any(cell.entry.role == "reference" and runs(cell) for cell in of_scene)
+
+
+def start_of(scene: Scene) -> TaskId:
+    """Return the id of the task that settles the garment of a scene."""
+    return "start", flat(scene.name)
 
 
 def _label(what: str, entry: MethodEntry) -> str:

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.plan.cell import TaskId
-from benchmarks.runner.isolated_process import WorkerDied, one_line
+from benchmarks.runner.isolated_process import WorkerDied, one_line, tell_nobody
 
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
-    from benchmarks.results.row import Row
     from benchmarks.results.run_folder import RunFolder
 
 
@@ -45,9 +44,15 @@ class Outcome:
     origin: Mapping[str, Any] = field(default_factory=dict)
     remark: str = ""
 
+    @property
+    def ending(self) -> str:
+        """Status and reason, for messages."""
+        return f"{self.status}: {self.reason}"
 
-def tell_nobody(units: float) -> None:
-    """Report progress to nobody."""
+    @property
+    def usable(self) -> bool:
+        """True if other tasks may build upon it: it has not failed and is up to date."""
+        return not (self.failed or self.remark or self.status == "skipped")
 
 
 @dataclass
@@ -57,16 +62,17 @@ class Context:
     Attributes:
         folder: files of the run.
         assets: body, garments and motions; None where no task needs a dressed body.
-        tell: reports units of progress.
+        tell: reports a further share of the task that is done; by default to nobody.
         memo: kept between the tasks of one batch in this process.
-        kept: between all tasks of this process: what every scene asks for again.
     """
 
     folder: RunFolder
     assets: Assets | None = None
     tell: Callable[[float], None] = tell_nobody
     memo: dict[Any, Any] = field(default_factory=dict)
-    kept: dict[Any, Any] = field(default_factory=dict)
+
+
+Needed = Mapping[TaskId, Outcome]  # outcomes, up to date and successful, of what a task needs or reads
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,34 +80,48 @@ class Task:
     """One piece of work.
 
     Attributes:
+        kind: of work, as "cell".
         name: unique among the tasks of its kind; part of file names.
         label: for messages.
+        stage: title of the stage of a run that it belongs to.
+        run: does it, in a process: a function of a module, or a partial of one. An exception is a failure.
         inputs: plain values that the outcome depends on.
         code: folders and files whose content the outcome depends on, see benchmarks.provenance.
         needs: tasks without whose success it cannot be run; their outcomes count as inputs.
         reads: tasks whose outcomes it uses where they succeeded; they count as inputs too.
-        units: of progress.
+        skip: why there is nothing to do, or empty, or how to tell it from what it needs. Such a task leaves
+            no trace.
+        files: names of the files that it may leave, removed before it is run again.
+        seconds: its expected duration [s], for the progress bar and the order of tasks.
         batch: tasks of one batch are handed out together.
         process: a timed task runs alone on the machine, in the process of this name; others, without a
             name, run side by side in any process.
+        motion: of the assets, all that the process of a timed task needs; empty: it needs no assets.
+        begin: prepares a timed task before its turn, beside others. `run` raises again what this raises.
+        warm_up: prepares a process for its first task of this code; the deadline does not count.
         deadline: [s] after which its process is ended.
+        silent: whether no row of the results speaks of it: a failure is then said apart.
     """
 
-    kind: ClassVar[str]
-    stage: ClassVar[str]  # title of the stage of a run that it belongs to
-    unit_seconds: ClassVar[float] = 1.0  # expected duration of one of its units: for progress and order
-    silent: ClassVar[bool] = False  # whether no row of the results speaks of it: a failure is then said apart
-
+    kind: str
     name: str
     label: str
-    inputs: Mapping[str, Any]
-    code: tuple[str, ...]
+    stage: str
+    run: Callable[[Context, Needed], Outcome]
+    inputs: Mapping[str, Any] = field(default_factory=dict)
+    code: tuple[str, ...] = ()
     needs: tuple[TaskId, ...] = ()
     reads: tuple[TaskId, ...] = ()
-    units: int = 1
+    skip: str | Callable[[Needed], str] = ""
+    files: tuple[str, ...] = ()
+    seconds: float = 1.0
     batch: str = ""
     process: str = ""
+    motion: str = ""
+    begin: Callable[[Context], None] | None = None
+    warm_up: Callable[[], None] | None = None
     deadline: float | None = None
+    silent: bool = False
 
     @property
     def id(self) -> TaskId:
@@ -109,42 +129,9 @@ class Task:
         return self.kind, self.name
 
     @property
-    def expected_seconds(self) -> float:
-        """Expected duration [s], for the progress bar and the order of tasks."""
-        return self.units * self.unit_seconds
-
-    @property
     def title(self) -> str:
         """Kind and label, for messages."""
         return f"{self.kind} {self.label}"
-
-    def skip(self, needed: Mapping[TaskId, Outcome]) -> str:
-        """Return why there is nothing to do, or empty. Such a task leaves no trace."""
-        return ""
-
-    def clear(self, folder: RunFolder) -> None:
-        """Remove the files of an earlier run of it, so that nobody takes them for this one's."""
-
-    def assets(self, assets: Assets | None) -> Assets | None:
-        """Return the part of the assets that a process of its own needs."""
-        return None
-
-    def begin(self, context: Context) -> None:
-        """Prepare a timed task before its turn, beside others. run() has to raise again what this raises."""
-
-    def run(self, context: Context, needed: Mapping[TaskId, Outcome]) -> Outcome:
-        """Do it and return its outcome; an exception is a failure.
-
-        needed: outcomes of those of `needs` and `reads` that succeeded.
-        """
-        raise NotImplementedError
-
-    def warm_up(self) -> None:
-        """Prepare a process for its first task of this kind and code; the deadline does not count."""
-
-    def rows(self, outcome: Outcome) -> list[Row]:
-        """Return the rows of an outcome, skips aside; unit, commit and remark are filled in later."""
-        return []
 
 
 class RunRefused(ValueError):

@@ -15,7 +15,6 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.execute_plan import held
 from benchmarks.runner.executor import Executor
-from benchmarks.runner.ground_truth import SimulateMotion
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import Schedule
 from reference_sim.trajectory import Trajectory
@@ -45,19 +44,18 @@ def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
         StudyError: a simulation failed, or did not reach its last frame.
     """
     run, assets = RunFolder(out.with_name(f"{out.name}.parts")), plan.open_assets()
-    tasks = Schedule(plan).ground_truth(Network(LEARNER, 0, garment))
+    schedule, network = Schedule(plan), Network(LEARNER, 0, garment)
     with held(run.path):
         run.remove_parts()
-        runner = Runner(tasks, Cache(run, only=(*DEFAULT_ONLY, "failed")))
+        runner = Runner(schedule.ground_truth(network), Cache(run, only=(*DEFAULT_ONLY, "failed")))
         runner.run(Executor(run, assets, plan.workers))
         files: dict[str, str] = {}
-        for task in tasks:
-            assert isinstance(task, SimulateMotion)
-            outcome = runner.outcomes[task.id]
+        for motion, id in schedule.training(network).simulated.items():
+            outcome = runner.outcomes[id]
             if outcome.failed or not outcome.result["whole"]:
                 why = outcome.reason or outcome.result.get("reason", "")
-                raise StudyError(f"training motion {task.scene.motion}: {outcome.status}: {why}")
-            files[task.scene.motion] = outcome.files[0]
+                raise StudyError(f"training motion {motion}: {outcome.status}: {why}")
+            files[motion] = outcome.files[0]
         simulations = (
             (assets.motions[name], Trajectory.load(run.path / file).positions) for name, file in files.items()
         )

@@ -14,8 +14,8 @@ from benchmarks.contract import ContractError, check_derivatives
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.cell import Cell
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.ground_truth import SettleStart
-from benchmarks.runner.task import Context
+from benchmarks.runner import schedule
+from benchmarks.runner.task import Context, failure
 from benchmarks.validation.equilibrium import DeadLoad
 from reference_sim import Trajectory
 from reference_sim.energies import StretchSpring
@@ -66,8 +66,11 @@ def look(make, tmp_path, monkeypatch, scene="hanging_sheet", **fields) -> str:
     monkeypatch.setitem(sys.modules, "breaches", module)
     entry = MethodEntry(name="m", description="", module="breaches", declared_in=__file__, **fields)
     cell = Cell(SCENE[scene].at(TINY), entry, 0, ("speed",))
-    context, tasks = Context(RunFolder(tmp_path)), {"name": "m", "label": "", "inputs": {}, "code": ()}
-    outcome = check.CheckedCell(cell=cell, least=0.02, **tasks).run(context, {})
+    context = Context(RunFolder(tmp_path))
+    try:
+        outcome = check.run_checked(cell, 0.02, context, {})
+    except Exception as error:
+        outcome = failure(error)
     return outcome.reason
 
 
@@ -181,7 +184,7 @@ def test_a_method_that_is_bound_to_a_mesh_is_checked_in_the_scene_that_has_it(
     assert check.main([str(path), "--scene", "hanging_sheet", "--set", "sizes=smoke"]) == 0
     assert capsys.readouterr().out == "bound in hanging_sheet: fine\nnothing is wrong\n"
     simulated = []
-    monkeypatch.setattr(SettleStart, "run", lambda *_: simulated.append(1))
+    monkeypatch.setattr(schedule, "settle_start", lambda *_: simulated.append(1))
     assert check.main([str(path)]) == 1
     assert "bound to 49 vertices, not 25" in capsys.readouterr().out and not simulated
     (tmp_path / "highest.py").write_text(METRIC_FILE)

@@ -152,7 +152,7 @@ def test_a_file_in_a_package_counts_with_the_package_and_one_installed_without_w
 
 # What tasks import and what decides no result: names, files and their formats, origin, sizes that are inputs.
 CARRYING = (
-    "benchmarks/plan/cell.py", "benchmarks/plan/plan.py", "benchmarks/declarations.py",
+    "benchmarks/plan/cell.py", "benchmarks/declarations.py",
     "benchmarks/presets.py", "benchmarks/provenance.py", "benchmarks/results", "benchmarks/runner/task.py",
     "benchmarks/training.py", "snug/trained", *provenance.NO_RESULT,
 )  # fmt: skip

@@ -224,7 +224,8 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
         command="", motions=Motions(("walk",), ("kick",)),
     )  # fmt: skip
     (task,) = (task for task in Schedule(plan).tasks() if task.kind == "network")
-    assert (task.chosen, task.home, task.steps) == (Training("snug", recipe), home, TINY.steps["snug"])
+    job = Schedule(plan).training(plan.networks[0])
+    assert (job.chosen, job.home, job.steps) == (Training("snug", recipe), home, TINY.steps["snug"])
     assert home in task.code and home in Schedule(plan).cell(cell).code
     other = dataclasses.replace(entry, name="b", training=Training("snug", DEFAULT))
     for wrong in ([entry, other], [dataclasses.replace(entry, trained="snug")]):

@@ -99,18 +99,16 @@ def worker() -> int:
     return asking.pid
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Write(Task):
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Write:
     """A file of so many random numbers, plus those of what it needs; `how` says what it does besides."""
 
-    kind = "numbers"
-    stage = "writing"
-    silent = True
+    name: str
     count: int = 1000
     seed: int = 0
     how: str = ""
     mark: str = ""  # a file that says that it is at it
-    seconds: float = 0.0
+    sleep: float = 0.0
 
     def run(self, context, needed):
         if self.mark:
@@ -123,26 +121,28 @@ class Write(Task):
         if self.how == "die with the worker":
             os.kill(worker(), signal.SIGKILL)
             time.sleep(60)
-        time.sleep(self.seconds)
+        time.sleep(self.sleep)
         numbers = np.random.default_rng(self.seed).random(self.count)
         for outcome in needed.values():
             numbers += np.load(context.folder.path / outcome.files[0])[: self.count]
         path = context.folder.path / "numbers" / f"{self.name}.npy"
         path.parent.mkdir(exist_ok=True)
         np.save(path, numbers)
-        context.tell(self.units)
         context.memo.setdefault("done", []).append(self.name)
         return Outcome(result={"memo": list(context.memo["done"])}, files=(context.folder.relative(path),))
 
 
-def write(name: str, **fields) -> Write:
-    return Write(name=name, label=name, inputs={}, code=("benchmarks/results",), **fields)
+def write(name: str, needs=(), batch: str = "", seconds: float = 1.0, **fields) -> Task:
+    return Task(
+        kind="numbers", name=name, label=name, stage="writing", silent=True, needs=needs, batch=batch,
+        run=Write(name=name, **fields).run, code=("benchmarks/results",), seconds=seconds,
+    )  # fmt: skip
 
 
-def chain(**fields) -> list[Write]:
+def chain(**fields) -> list[Task]:
     """Twelve tasks in three rounds, the later ones made from the earlier ones, the last two one batch."""
 
-    def number(n: int, *needs: int, **more) -> Write:
+    def number(n: int, *needs: int, **more) -> Task:
         ids = tuple(("numbers", str(need)) for need in needs)
         return write(str(n), seed=n, needs=ids, **fields | more)
 
@@ -209,7 +209,7 @@ def start_runner(folder: Path, address: str, *, seconds: float, mark: Path) -> s
     program = (
         "import sys; from pathlib import Path; from tests.benchmarks.runner.cluster_by_hand import finish\n"
         "folder, address, seconds, mark = sys.argv[1:]\n"
-        "finish(Path(folder), address, seconds=float(seconds), mark=mark)"
+        "finish(Path(folder), address, sleep=float(seconds), mark=mark)"
     )
     return subprocess.Popen(
         [sys.executable, "-c", program, str(folder), address, str(seconds), str(mark)],

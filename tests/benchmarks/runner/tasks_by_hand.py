@@ -13,7 +13,7 @@ from benchmarks.assets import Assets
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.networks import TrainNetwork
+from benchmarks.runner.networks import NetworkTraining
 from benchmarks.runner.task import Context, failure
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
@@ -43,11 +43,11 @@ def assets_of(dressed, motion) -> Assets:
     return Assets(dressed.body, {"tshirt": dressed.garment}, {motion.name: motion}, {})
 
 
-def training(name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu") -> TrainNetwork:
-    """The task that trains a network of the T-shirt."""
-    return TrainNetwork(
-        name=name, label=name, inputs={}, code=(), training=name, seed=0, garment="tshirt", steps=steps,
-        chosen=TRAININGS.get(name), motions=motions, device=device, parts={"key": key},
+def training(name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu") -> NetworkTraining:
+    """The training of a network of the T-shirt."""
+    return NetworkTraining(
+        training=name, seed=0, garment="tshirt", steps=steps,
+        chosen=TRAININGS.get(name), motions=motions, device=device, inputs={"key": key}, software={},
         simulated={m: ("data", m) for m in motions if name in TRAININGS and TRAININGS[name].simulated},
     )  # fmt: skip
 
@@ -96,7 +96,7 @@ class InProcess:
     def begin(self, tasks):
         for task, _ in tasks:
             with suppress(Exception):
-                task.begin(self._named.setdefault(task.process, self.context()))
+                task.begin and task.begin(self._named.setdefault(task.process, self.context()))
 
     def alone(self, task, needed):
         return self.outcome(task, self._named.setdefault(task.process, self.context()), needed)

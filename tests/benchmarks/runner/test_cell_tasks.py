@@ -22,17 +22,18 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.cells import CellProcess
+from benchmarks.runner.cells import CellProcess, begin_cell
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import clock_costs, rows_of
-from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scenes import SCENES as DECLARED
 from tests.benchmarks.runner.misbehaving import HANGING_CHILD
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = {scene.name: scene for scene in DECLARED}
+NAMES = {"snug", "snug.recipe", "snug.named_recipes", "snug.kinds"}  # of trainings, in the list of methods
 TINY = dataclasses.replace(
     find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1, least_seconds=0.01
 )
@@ -87,21 +88,13 @@ def rows_of_cell(runner: Runner, plan: Plan) -> list[Row]:
 # --- processes -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("how", ["still", "raise"])
-def test_a_cell_tells_the_bar_that_it_is_done(tmp_path, how):
-    plan, units = plan_of(tmp_path, "newton-1", how=how), []
-    task = Schedule(plan).cell(plan.cells[0])
-    task.run(Context(RunFolder(tmp_path), tell=units.append), {})
-    assert sum(units) == task.units
-
-
 def test_only_a_method_of_the_project_is_prepared_before_its_turn(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="still")
     user_entry = dataclasses.replace(plan.cells[0].entry, declared_in="mine.py")
     for entry, prepared in ((plan.cells[0].entry, True), (user_entry, False)):
         context = Context(RunFolder(tmp_path))
         cell = dataclasses.replace(plan.cells[0], entry=entry)
-        dataclasses.replace(Schedule(plan).cell(plan.cells[0]), cell=cell).begin(context)
+        begin_cell(cell, context)
         process = CellProcess.of(context)
         assert (process.scene is not None, process.prepared is not None) == (prepared, prepared)
 
@@ -114,9 +107,7 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
     assert 0.0 < result["seconds"] < 10.0 and 50.0 < result["peak"] < 1000.0
     assert result["terms"] == "strain+bending+gravity+inertia"
     assert "reference_sim.energies.stretch_stvk" in result["modules"] and "numba" in result["modules"]
-    snug = {name for name in result["modules"] if name.startswith("snug")}
-    # Names of trainings, which the list of methods holds.
-    assert snug <= {"snug", "snug.recipe", "snug.named_recipes", "snug.kinds"}
+    assert {name for name in result["modules"] if name.startswith("snug")} <= NAMES
     for name in ("torch", "igl", "reference_sim.obstacle", "reference_sim.energies.contact_penalty"):
         assert name not in result["modules"], f"{name} was loaded"
     costs, remark = clock_costs(plan.cells[0], 1, {("cell", plan.cells[0].name): outcome})
@@ -135,9 +126,8 @@ def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
     plan = plan_of(tmp_path, "newton-1", scene=scene)
     loaded = outcome_of(plan).result["modules"]
     known = dependencies(next(task for task in tasks_of(plan) if task.kind == "cell"))
-    files = {
-        name: name.replace(".", "/") for name in loaded if name.split(".")[0] in ("reference_sim", "snug")
-    }
+    ours = {name for name in loaded if name.split(".")[0] in ("reference_sim", "snug")} - NAMES
+    files = {name: name.replace(".", "/") for name in ours}
     places = tuple(f"{place.removesuffix('.py')}/" for place in known)
     missing = [name for name, stem in files.items() if not f"{stem}/".startswith(places)]
     assert missing == [] and len(files) > 10

@@ -76,8 +76,8 @@ def test_failures_are_values_and_a_batch_stays_together(two, folder):
 def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
     updates = []
     monkeypatch.setattr(Bar, "update", lambda self, units=1: updates.append(units))
-    together(folder, two.address, [write("one", units=7), write("two", units=5, seconds=1.0)])
-    assert 7 in updates
+    together(folder, two.address, [write("one", seconds=7.0), write("two", sleep=1.0)])
+    assert 7.0 in updates
 
 
 @pytest.mark.slow
@@ -117,13 +117,13 @@ def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_li
         stopped.value
     )
     assert "package numpy: numpy 2" in str(stopped.value) and "numpy 1.0 here" in str(stopped.value)
-    worker = runner_side.Cluster.worker
+    do = runner_side.Cluster.do
 
-    def without_folder(self):
+    def without_folder(self, *arguments):
         self.assets.unlink()
-        return worker(self)
+        return do(self, *arguments)
 
-    monkeypatch.setattr(runner_side.Cluster, "worker", without_folder)
+    monkeypatch.setattr(runner_side.Cluster, "do", without_folder)
     with pytest.raises(RunStopped, match=r"worker tcp:.*does not see the folder .*--out"):
         together(folder, two.address, [write("one")])
     assert list(folder.path.iterdir()) == []

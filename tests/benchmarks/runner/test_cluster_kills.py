@@ -78,7 +78,7 @@ def test_an_interrupt_ends_what_the_cluster_does_and_leaves_the_cluster(folder, 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
     request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     threading.Thread(target=interrupt).start()
-    batches = [[write(f"{n}", seconds=60.0, mark=str(mark))] for n in range(4)]
+    batches = [[write(f"{n}", sleep=60.0, mark=str(mark))] for n in range(4)]
     with cluster(tmp_path, 2) as two:
         with pytest.raises(KeyboardInterrupt):
             together(folder, two.address, *batches)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 import operator
 import os
 import signal
 import sys
 import time
 from contextlib import closing
+from functools import partial
 
 import pytest
 
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner import executor
 from benchmarks.runner.cells import loaded
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.isolated_process import LOADED_BY_ALL, IsolatedProcess, WorkerDied
@@ -24,54 +23,52 @@ from tests.project.own_memory import needs_proc, own_memory
 HELD: list[bytearray] = []  # of a process
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Add(Task):
-    kind = "sum"
-    stage = "adding"
-    terms: tuple = (1, 2)
-    how: str = ""
-
-    def begin(self, context):
-        if self.how == "die at once":
-            os.kill(os.getpid(), signal.SIGKILL)
-        if self.how == "raise":
-            raise OSError("no such body")
-        context.memo["done"] = [f"{self.name} begun beside {self._others(context.folder.path)}"]
-
-    def _others(self, folder) -> int:
-        """Return how many other tasks have begun: wait for the first, at most 10 s."""
-        (folder / self.name).touch()
-        for _ in range(100):
-            if (others := len(list(folder.iterdir())) - 1) > 0:
-                return others
-            time.sleep(0.1)
-        return 0
-
-    def warm_up(self) -> None:
-        if self.how == "cold":
-            raise MemoryError("no room to compile")
-
-    def run(self, context, needed):
-        if self.how == "die telling":
-            executor._context.tell.__self__._wlock.acquire()  # as in the midst of a report
-            os.kill(os.getpid(), signal.SIGKILL)
-        if self.how == "hang":
-            signal.pause()
-        if self.how == "stop":
-            raise RunStopped("the disk is full")
-        if self.how == "fill":
-            pieces: list = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
-            HELD.append(bytearray(50_000))  # while it is there the heap does not shrink by itself
-            pieces.append(pieces)  # freed only by who looks for circles
-            del pieces
-        context.tell(1)
-        context.memo.setdefault("done", []).append(self.name)
-        first, second = self.terms
-        return Outcome(result={"sum": first + second, "memo": list(context.memo["done"]), "kB": own_memory()})
+def begin(name, how, context):
+    if how == "die at once":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if how == "raise":
+        raise OSError("no such body")
+    context.memo["done"] = [f"{name} begun beside {others(name, context.folder.path)}"]
 
 
-def add(name: str, **fields) -> Add:
-    return Add(name=name, label=name, inputs={}, code=("benchmarks/results",), **fields)
+def others(name, folder) -> int:
+    """Return how many other tasks have begun: wait for the first, at most 10 s."""
+    (folder / name).touch()
+    for _ in range(100):
+        if (count := len(list(folder.iterdir())) - 1) > 0:
+            return count
+        time.sleep(0.1)
+    return 0
+
+
+def warm_up():
+    raise MemoryError("no room to compile")
+
+
+def run(name, terms, how, context, needed):
+    if how == "die":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if how == "hang":
+        signal.pause()
+    if how == "stop":
+        raise RunStopped("the disk is full")
+    if how == "fill":
+        pieces: list = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
+        HELD.append(bytearray(50_000))  # while it is there the heap does not shrink by itself
+        pieces.append(pieces)  # freed only by who looks for circles
+        del pieces
+    context.tell(0.5)
+    context.memo.setdefault("done", []).append(name)
+    first, second = terms
+    return Outcome(result={"sum": first + second, "memo": list(context.memo["done"]), "kB": own_memory()})
+
+
+def add(name: str, terms=(1, 2), how: str = "", **fields) -> Task:
+    return Task(
+        kind="sum", name=name, label=name, stage="adding", run=partial(run, name, terms, how),
+        begin=partial(begin, name, how), warm_up=warm_up if how == "cold" else None,
+        code=("benchmarks/results",), **fields,
+    )  # fmt: skip
 
 
 def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Bar]:
@@ -89,8 +86,8 @@ def test_a_failure_is_a_value_and_the_others_go_on(tmp_path):
     assert all(outcome.seconds > 0.0 for outcome in outcomes.values())
 
 
-def test_a_process_that_was_killed_while_it_reported_keeps_no_other_waiting(tmp_path):
-    outcomes, _ = together(tmp_path, [add("dies", how="die telling")], [add("tells", terms=(3, 4))])
+def test_a_process_that_was_killed_keeps_no_other_waiting(tmp_path):
+    outcomes, _ = together(tmp_path, [add("dies", how="die")], [add("tells", terms=(3, 4))])
     assert outcomes["dies"].status == "out-of-memory" and "SIGKILL" in outcomes["dies"].reason
     assert outcomes["tells"].result["sum"] == 7
 
@@ -130,16 +127,10 @@ def test_a_worker_has_its_next_batch_before_outcomes_of_others_are_kept(tmp_path
     class Instant:
         slots = 2
 
-        def worker(self):
-            return self
-
-        def do(self, task, needed, batch):
+        def do(self, task, needed, batch, told):
             return Outcome()
 
-        def told(self):
-            return 0.0
-
-        def dismiss(self):
+        def rest(self):
             pass
 
     def ready():
@@ -187,7 +178,6 @@ def test_timed_tasks_begin_side_by_side_and_what_goes_wrong_there_is_their_outco
     ]  # fmt: skip
     try:
         two.begin([(task, {}) for task in tasks])
-        assert not two._crew
         one, other, dies, raises = (two.alone(task, {}) for task in tasks)
         assert one.result["memo"] == ["one begun beside 1", "one"]
         assert other.result["memo"] == ["other begun beside 1", "other"]

@@ -6,6 +6,7 @@ import dataclasses
 import os
 import signal
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,33 +30,20 @@ from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.benchmarks.runner.test_cell_tasks import finish, outcome_of, plan_of
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Written(Task):
-    """Writes a file, or dies."""
-
-    kind = "network"
-    stage = "writing"
-    silent = True
-    dies: bool = False
-
-    def run(self, context, needed):
-        if self.dies:
-            os.kill(os.getpid(), signal.SIGKILL)
-        path = context.folder.path / f"{self.name}.txt"
-        path.write_text("".join(outcome.result["word"] for outcome in needed.values()) or "first")
-        context.tell(self.units)
-        return Outcome(result={"word": self.name}, files=(path.name,))
+def write(name, dies, context, needed):
+    """Write a file, or die."""
+    if dies:
+        os.kill(os.getpid(), signal.SIGKILL)
+    path = context.folder.path / f"{name}.txt"
+    path.write_text("".join(outcome.result["word"] for outcome in needed.values()) or "first")
+    return Outcome(result={"word": name}, files=(path.name,))
 
 
-def task(name: str, *, dies: bool = False, value: int = 0, **ties) -> Written:
-    return Written(
-        name=name,
-        label=name,
-        inputs={"value": value},
-        code=("benchmarks/results",),
-        dies=dies,
-        **ties,
-    )
+def task(name: str, *, dies: bool = False, value: int = 0, **ties) -> Task:
+    return Task(
+        kind="network", name=name, label=name, stage="writing", run=partial(write, name, dies), silent=True,
+        inputs={"value": value}, code=("benchmarks/results",), **ties,
+    )  # fmt: skip
 
 
 def run_tasks(folder: Path, *tasks: Task, only=("stale", "missing")) -> Runner:
@@ -90,12 +78,12 @@ class TwoAtOnce(InProcess):
         return super().alone(task, needed)
 
 
-def test_workers_that_would_wait_begin_what_comes_later_and_nothing_is_beside_a_timed_task(tmp_path):
+def test_a_task_begins_when_its_needs_are_there_and_nothing_is_beside_a_timed_task(tmp_path):
     def ids(*names: str) -> tuple[tuple[str, str], ...]:
         return tuple(("network", name) for name in names)
 
     tasks = (
-        task("short"), task("long", units=5), task("next", needs=ids("short", "long")),
+        task("short"), task("long", seconds=5.0), task("next", needs=ids("short", "long")),
         task("timed", needs=ids("next"), process="own"),
         task("after", needs=ids("timed")), task("one", needs=ids("short"), batch="both"),
         task("two", needs=ids("long"), batch="both"), task("three", needs=ids("next")),
@@ -104,8 +92,7 @@ def test_workers_that_would_wait_begin_what_comes_later_and_nothing_is_beside_a_
     runner, executor = Runner(tasks, Cache(folder)), TwoAtOnce(folder)
     runner.run(executor)
     assert executor.at_work == [
-        ["long", "short"], ["short"], ["next", "one", "two"], ["one", "two"], ["timed"],
-        ["after", "three"], ["three"],
+        ["long", "short"], ["short"], ["one", "two", "next"], ["next"], ["three"], ["timed"], ["after"],
     ]  # fmt: skip
     assert all(outcome.status == "ok" for outcome in runner.outcomes.values())
 
@@ -185,8 +172,8 @@ def test_a_network_that_learned_without_a_failed_simulation_is_another(tmp_path)
     plan = plan_of(tmp_path, motions=Motions(train=("walk", "run")))
     schedule = Schedule(plan)
     lost = schedule.data("run", "tshirt", find_method("simulation")).id
-    assert lost in schedule.network(Network("supervised", 0, "tshirt")).reads
-    assert schedule.network(Network("snug", 0, "tshirt")).reads == ()
+    assert lost in schedule.training(Network("supervised", 0, "tshirt")).reads
+    assert schedule.training(Network("snug", 0, "tshirt")).reads == ()
 
 
 def test_a_cell_that_was_blocked_is_run_once_nothing_blocks_it(tmp_path):
@@ -231,16 +218,8 @@ def test_a_dry_run_decides_as_the_run_does(tmp_path):
     assert planned_and_done(False, "stale", "missing") == ({"third", "fourth"}, {"third", "fourth"})
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Unkept(Task):
-    """Its outcome cannot be written down."""
-
-    kind = "unkept"
-    stage = "writing"
-    outcome: Outcome
-
-    def run(self, context, needed):
-        return self.outcome
+def give(outcome, context, needed):
+    return outcome
 
 
 @pytest.mark.parametrize(
@@ -248,7 +227,7 @@ class Unkept(Task):
     [(Outcome(result={"x": np.float32(1)}), "float32"), (Outcome(files=("nowhere.npy",)), "nowhere.npy")],
 )
 def test_what_cannot_be_kept_has_failed_and_the_others_go_on(outcome, word, tmp_path):
-    bad = Unkept(name="bad", label="bad", inputs={}, code=("benchmarks/results",), outcome=outcome)
+    bad = dataclasses.replace(task("bad"), kind="unkept", run=partial(give, outcome))
     runner = run_tasks(tmp_path, bad, task("good"))
     assert runner.outcomes["unkept", "bad"].failed and word in runner.outcomes["unkept", "bad"].reason
     assert runner.outcomes["network", "good"].status == "ok"

@@ -16,8 +16,8 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.runner import ground_truth, training_motions
-from benchmarks.runner.ground_truth import SimulateClips, SimulateQuasiStatic
-from benchmarks.runner.networks import LONGEST, TrainNetwork
+from benchmarks.runner.ground_truth import MixedClips, simulate_clips, simulate_quasi_static
+from benchmarks.runner.networks import LONGEST, train
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.training import Simulated
 from reference_sim import Trajectory, simulate
@@ -33,11 +33,13 @@ from tests.snug.training.dressing import swaying, tube_dress
 MOTION = swaying(90)
 
 
-def clips_of(part: int, method: str = "simulation") -> SimulateClips:
-    return SimulateClips(
-        name=str(part), label="", inputs={}, code=(), scene=dressed_scene(MOTION.name),
-        entry=find_method(method), motions=(MOTION.name,), clips="tshirt/mixed", part=part,
+def clips_of(part: int, folder, assets, method: str = "simulation"):
+    """Return the outcome of a part of the clips."""
+    mixed = MixedClips(
+        scene=dressed_scene(MOTION.name), entry=find_method(method), motions=(MOTION.name,),
+        clips="tshirt/mixed", part=part,
     )  # fmt: skip
+    return simulate_clips(mixed, context(folder, assets), {})
 
 
 def still(clip, entry) -> Trajectory:
@@ -85,21 +87,21 @@ def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, qu
 
     odd |= {"mixed_0": ended, "mixed_2": refused, "mixed_3": halved}
     assets = assets_of(tube_dress(), MOTION)
-    outcomes = [clips_of(part).run(context(tmp_path, assets), {}) for part in range(4)]
+    outcomes = [clips_of(part, tmp_path, assets) for part in range(4)]
     assert asked == [clip.name for clip in make_shared_clips([MOTION], 4, vertices=150)]
     assert [o.result["clips"] for o in outcomes] == [["mixed_1"], [], [], ["mixed_4", "mixed_5"]]
     left_out = {name: why for o in outcomes for name, why in o.result["left_out"].items()}
     assert left_out == {"mixed_0": "stalled: stuck", "mixed_2": "no room", "mixed_3": "converged: "}
     kept = read_arrays(tmp_path / outcomes[0].files[0])
     assert kept.keys() == {"mixed_1"} and kept["mixed_1"].dtype == np.float32
-    truncated = clips_of(0, "fast-lbfgs-10").run(context(tmp_path, assets), {})
+    truncated = clips_of(0, tmp_path, assets, "fast-lbfgs-10")
     assert truncated.result["clips"] == ["mixed_0", "mixed_1"]  # it is stopped on purpose
 
 
 def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
     assets = assets_of(tube_dress(), MOTION)
     clip, *_ = make_shared_clips([MOTION], 1, vertices=150)
-    outcome = clips_of(0, "lbfgs-5").run(context(tmp_path, assets), {})
+    outcome = clips_of(0, tmp_path, assets, "lbfgs-5")
     scene = dressed_scene(clip.name).build(assets_of(tube_dress(), clip))
     trajectory = simulate(
         scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
@@ -115,12 +117,11 @@ def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkey
     import reference_sim
 
     scene, assets = dressed_scene(MOTION.name), assets_of(tube_dress(), MOTION)
-    task = SimulateQuasiStatic(name="still", label="", inputs={}, code=(), scene=scene)
     worn = dataclasses.replace(scene.build(assets), frames=5)
     assert worn.start.shape  # it has come to rest
     monkeypatch.setattr(ground_truth, "build_scene", lambda *_: worn)
     monkeypatch.setattr(reference_sim, "simulate", partial(simulate, max_iterations=1))
-    outcome = task.run(context(tmp_path, assets), {})
+    outcome = simulate_quasi_static(scene, context(tmp_path, assets), {})
     assert outcome.status == "ok"
     assert outcome.result == {"status": "max_iterations", "frames_not_converged": 4}
 
@@ -129,22 +130,22 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
     odd, _ = quickly
     odd["mixed_1"] = lambda clip, entry: dataclasses.replace(still(clip, entry), status="stalled")
     assets = assets_of(tube_dress(), MOTION)
-    clips = {("clips", str(part)): clips_of(part).run(context(tmp_path, assets), {}) for part in range(2)}
+    clips = {("clips", str(part)): clips_of(part, tmp_path, assets) for part in range(2)}
     given = still(dataclasses.replace(MOTION, name="sway_9"), None)
     path = tmp_path / "given.vtkhdf"
     given.save(path)
     done = ground_truth.Outcome(result={"whole": True}, files=(path.name,))
     task = dataclasses.replace(training("supervised", MOTION.name, steps=1), clips=tuple(clips))
-    result = task.run(context(tmp_path, assets), {("data", MOTION.name): done, **clips}).result
+    result = train(task, context(tmp_path, assets), {("data", MOTION.name): done, **clips}).result
     assert result["frames"] == 90 + 2 * CLIP_FRAMES
     assert result["clips_left_out"] == 1 and result["left_out"] == []
-    lost = task.run(context(tmp_path, assets), {("data", MOTION.name): done}).result
+    lost = train(task, context(tmp_path, assets), {("data", MOTION.name): done}).result
     assert lost["frames"] == 90
     called = dataclasses.replace(MOTION, name="mixed_0")
     task = dataclasses.replace(training("supervised", "mixed_0", steps=1), clips=tuple(clips))
     needed = {("data", "mixed_0"): done, **clips}
     with pytest.raises(ValueError, match=r"mixed_0.*rename"):
-        task.run(context(tmp_path, assets_of(tube_dress(), called)), needed)
+        train(task, context(tmp_path, assets_of(tube_dress(), called)), needed)
 
 
 def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatch):
@@ -161,7 +162,7 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
     assert "tshirt/walk" in labels and "tshirt/walk by fast-lbfgs-10" in labels
 
     def read(name):
-        return {id[0]: id[1] for id in Schedule(plan).network(Network(name, 0, "tshirt")).reads}
+        return {id[0]: id[1] for id in Schedule(plan).training(Network(name, 0, "tshirt")).reads}
 
     assert read("tailornet")["clips"] == "tshirt-mixed-2/fast-lbfgs-10-1"
     assert read("supervised")["clips"] == "tshirt-mixed-2/simulation-2" and read("snug") == {}
@@ -176,7 +177,8 @@ def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tm
     scene = dressed_scene("kick")
     cells = tuple(Cell(scene, entry, 0, ("garments",)) for entry in BLOCK)
     plan = plan_of(tmp_path, motions=Motions(train=("walk", "run", "bow"), test=("kick",)), cells=cells)
-    tasks = {task.training: task for task in tasks_of(plan) if isinstance(task, TrainNetwork)}
+    schedule = Schedule(plan)
+    tasks = {network.name: schedule.training(network) for network in plan.networks}
     assert len(BLOCK) == len(tasks) == 12
     for entry in BLOCK:
         task, training = tasks[entry.trained], entry.training
@@ -195,7 +197,7 @@ def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tm
     )
     alone = dataclasses.replace(plan, motions=Motions(train=("walk",), test=("kick",)))
     network = Network("snug", 0, "tshirt", find_method("snug-data-converged-0").training)
-    task = Schedule(alone).network(network)  # a single motion cannot be held out
+    task = Schedule(alone).training(network)  # a single motion cannot be held out
     assert task.motions == ("walk",) and task.held_out == () and task.chosen.converged
 
 
@@ -217,7 +219,7 @@ def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monke
     )  # fmt: skip
     values = iter([5.0, 3.0, *[4.0] * 200])
     monkeypatch.setattr("snug.training.validation.Validator.value", lambda self: next(values))
-    result = task.run(context(tmp_path, assets), needed).result
+    result = train(task, context(tmp_path, assets), needed).result
     # Of 200 steps: a validation after each second, no better than the second one 25 times.
     assert result["steps"] == 2 * (2 + 25) and result["validation"]["best_step"] == 4
     assert result["validation"]["motions"] == ["held"] and result["frames"] == 30

@@ -146,13 +146,13 @@ def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it
     cache = Cache(folder)
     monkeypatch.setattr(executor, "_context", Context(folder), raising=False)
     monkeypatch.setattr(executor, "_verified", set())
-    entry = cache.keep(first, executor.perform(first, {}), {})
+    entry = cache.keep(first, executor.perform(first.run, {}, 1.0), {})
     assert isinstance(entry.outcome, Outcome)
     needed = {first.id: entry.outcome}
-    assert executor.perform(second, needed).status == "ok"
+    assert executor.perform(second.run, needed, 1.0).status == "ok"
     (tmp_path / "first.txt").write_text("worst")
-    assert executor.perform(second, needed).status == "ok"  # compared once in each process
+    assert executor.perform(second.run, needed, 1.0).status == "ok"  # compared once in each process
     executor._verified.clear()
     with pytest.raises(RunStopped, match=r"^first\.txt is damaged since this run wrote it"):
-        executor.perform(second, needed)
+        executor.perform(second.run, needed, 1.0)
     assert cache.find(first, {}).state == "missing"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -75,7 +76,7 @@ def rows(cell: Cell, outcome: Outcome, metrics: dict[str, float] | None = None, 
     outcomes = {("cell", cell.name): outcome} | {(kind, cell.name): other for kind, other in more.items()}
     if metrics is not None:
         outcomes["metrics", cell.name] = Outcome(result=metrics)
-    return rows_of(dataclasses.replace(plan_of(None), cells=(cell,)), (), outcomes)
+    return rows_of(dataclasses.replace(plan_of(Path()), cells=(cell,)), (), outcomes)
 
 
 RAN = Outcome(result={"seconds": 1.0, "frames": 4, "peak": 70.0, "terms": "strain+inertia"}, files=("x",))
@@ -235,7 +236,7 @@ def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path, ca
 def test_what_a_network_has_cost_is_that_of_its_training_and_of_what_it_learned_from(method, data):
     cell = Cell(dressed_scene("kick"), find_method(method), 0, ("garments",))
     motions = Motions(train=("walk", "run"), test=("kick",))
-    plan = dataclasses.replace(plan_of(None), cells=(cell,), motions=motions)
+    plan = dataclasses.replace(plan_of(Path()), cells=(cell,), motions=motions)
     tasks, network = tasks_of(plan), plan.networks[0].task_id
     origin = {"commit": "c", "preset": "p", "hardware": "there"}
     result = {"seconds": 120.0, "setup_seconds": 20.0, "megabytes": 9.0, "steps": 60, "frames": 90}

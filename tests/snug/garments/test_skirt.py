@@ -10,7 +10,7 @@ from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.ground_truth import SimulateQuasiStatic
+from benchmarks.runner.ground_truth import simulate_quasi_static
 from reference_sim import Trajectory
 from snug.garments.templates import find_template
 from snug.motion.library import make_motion
@@ -90,8 +90,7 @@ def test_simulated_and_held_still_the_waistband_goes_with_the_body(scene, small,
     method.prepare(scene)
     moving = method.run().positions
     declared = dressed_scene("turning_stop", "skirt", part="clip")
-    task = SimulateQuasiStatic(name="skirt", label="", inputs={}, code=(), scene=declared)
-    task.run(context(tmp_path, small), {})
+    simulate_quasi_static(declared, context(tmp_path, small), {})
     path = RunFolder(tmp_path).quasi_static_path(scene.name)
     still = Trajectory.load(path).positions
     pins = scene.cloth.pins
