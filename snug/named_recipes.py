@@ -1,11 +1,8 @@
-"""Named recipes, and the recipe that each kind of network is trained by.
+"""Named recipes, and the deviations of the default recipe from the paper's text.
 
 `default` trains well on a CPU in minutes, `paper` follows the paper's text except for what the comment below
-lists, the ablations are the default with one option changed.
-
-Deviations of the default recipe from the paper's text, each of which can be undone or added alone.
-
-Together they name every option in which the two recipes differ. Imports nothing heavy.
+lists, the ablations are the default with one option changed. Each deviation can be undone or added alone;
+together they name every option in which the two recipes differ. Imports nothing heavy.
 """
 
 from __future__ import annotations

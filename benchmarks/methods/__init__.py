@@ -61,9 +61,9 @@ METHODS = (
     network("untrained", "SNUG, untrained",
             "the SNUG network with a random last layer (SNUG itself starts as skinning)",
             role="baseline", timed=False),  # a frame of it costs what one of SNUG does
-    network("snug", "SNUG", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
-    network("supervised", "Supervised", "the SNUG network trained on simulated vertices instead"),
-    network("pbns", "PBNS", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
+    network("snug", "", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
+    network("supervised", "", "the SNUG network trained on simulated vertices instead"),
+    network("pbns", "", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     *FURTHER_METHODS,
     *EQUAL_DATA,
     *SOLVERS,

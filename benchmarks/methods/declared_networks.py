@@ -35,7 +35,7 @@ def network(
 
     Args:
         name: that of its training in TRAININGS, unless `fields` has a `training`.
-        label: its name for people.
+        label: its name for people; empty: that of its kind.
         description: one line for --list and run.json.
         base: the method that it is compared with.
         pairing_group: shared by methods that are compared seed by seed; its own name by default.
@@ -56,7 +56,7 @@ def network(
         "role": "network",
         "reporting": Reporting(base=base, pairing_group=pairing_group or name),
     }
-    return MethodEntry(name=name, label=label, description=description, **usual | fields)
+    return MethodEntry(name=name, label=label or KINDS[name].label, description=description, **usual | fields)
 
 
 def post_processed(entry: MethodEntry) -> MethodEntry:
@@ -76,22 +76,22 @@ NETWORKS = (
     network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
     network("pbns-paper", "PBNS, paper's text", "PBNS with StVK, trained as SNUG by the paper's text",
             base="pbns", pairing_group="pbns"),
-    network("santesteban2019", "Santesteban 2019",
+    network("santesteban2019", "",
             "fit by shape and one GRU of 1500, trained on simulated vertices"),
-    network("tailornet", "TailorNet",
+    network("tailornet", "",
             "low and high frequencies by static networks, trained on simulated vertices"),
-    network("ncs", "Neural Cloth Simulation",
+    network("ncs", "",
             "static and dynamic branch apart, trained on the energies (Bertiche et al. 2022)"),
-    network("ncs-static", "Neural Cloth Simulation, static branch",
+    network("ncs-static", "",
             "its static branch alone, trained on the energies of single frames",
             base="ncs", pairing_group="ncs"),
-    network("handles-80-dynamic", "80 handles, dynamic",
+    network("handles-80-dynamic", "",
             "recurrent network that moves the garment by 80 handles, trained on the energies as SNUG is",
             base="handles-80", pairing_group="handles"),
-    network("nearest-poses", "Nearest poses",
+    network("nearest-poses", "",
             "no network: simulated offsets of the training frames nearest in pose, skinned",
             seeded=False, role="baseline"),
-    network("pose-regression", "Ridge on principal components",
+    network("pose-regression", "",
             "no network: ridge regression from the pose to principal components of simulated offsets",
             seeded=False, role="baseline"),
     network("snug-dynamic", "SNUG, dynamic",
@@ -145,10 +145,7 @@ FLOORS = (
     ),
 )  # fmt: skip
 
-POST_PROCESSED = tuple(
-    post_processed(network(name, label, ""))
-    for name, label in (("snug", "SNUG"), ("supervised", "Supervised"))
-)
+POST_PROCESSED = tuple(post_processed(network(name, "", "")) for name in ("snug", "supervised"))
 
 
 _LABELS = {

@@ -4,12 +4,10 @@ Everything a network or its loss sees is relative to the pelvis (the posed joint
 static energies do not depend on where a person stands, float32 keeps its digits, and the zero of gravity is
 the pelvis. World positions come back by adding the pelvis, in float64.
 
-Rates and history of a body's motion: the inputs that a network needs to answer secondary motion.
-
-Poses and the root's velocity do not tell of turning on the spot, nor of a stop: cloth is moved by the
-accelerations of what it hangs on, and that is joints, not the root alone. Everything is in the axes of the
-joint that turns (of the root for translations), so that it does not matter where north is. The cloth's state
-began some time ago: the longer ago, the coarser it need be known.
+Inputs with a history serve secondary motion: poses and the root's velocity do not tell of turning on the
+spot, nor of a stop, and cloth is moved by the accelerations of the joints that it hangs on. Rates are in the
+axes of the joint that turns (of the root for translations), so that it does not matter where north is. The
+longer ago a motion was, the coarser it need be known.
 """
 
 from __future__ import annotations

@@ -10,16 +10,14 @@ columns of each joint's rotation as they are, so that |r - r_k| is a distance of
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
 
+from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, seeded
 from snug.networks.pbns import PoseSpaceDeformation
-
-if TYPE_CHECKING:
-    from snug.networks.frame_layout import FramePlan
 
 NEIGHBOURS = 4
 NEAR = 1e-8  # squared distance of two poses below which they are one
@@ -72,8 +70,8 @@ class NearestPoses(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self)
-        plan.add_nearest(self, self.poses, self.frames, x, NEIGHBOURS, NEAR)
+        x = plan.add_normalised(self.input_mean, self.input_std)
+        plan.add_nearest(self.poses, self.frames, x, NEIGHBOURS, NEAR)
 
 
 class PoseRegression(PoseSpaceDeformation):

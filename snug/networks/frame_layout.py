@@ -7,6 +7,7 @@ compares every kind with its `forward`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -27,64 +28,9 @@ from snug.kernels.one_frame import (
     SMOOTH,
     SUM,
     VERTEX_BLOCK,
-    run_frame,
-    skin_frame,
 )
-from snug.networks.garment_network import GarmentNetwork
 
 ACTIVATIONS = {nn.Identity: PRODUCT, nn.ReLU: RECTIFIED, nn.SiLU: SMOOTH}
-
-
-class CompiledFrame:
-    """A compiled call that skins an unposed garment, with a network's offsets if there is a network.
-
-    Args:
-        rest: unposed garment (V, 3) [m].
-        weights: skinning weights (V, J).
-        network: gives the offsets; None skins alone.
-    """
-
-    def __init__(
-        self,
-        rest: Tensor,
-        weights: Tensor,
-        network: GarmentNetwork | None = None,
-    ) -> None:
-        order, *joints = _blocks(weights.numpy())
-        unposed = np.zeros((3, VERTEX_BLOCK * (len(joints[0]) - 1)), np.float32)
-        unposed[:, : len(order)] = rest.numpy()[order].T
-        plan = FramePlan(order, unposed.shape[1])
-        if network is not None:
-            network.lay_out(plan)
-        self._operations = None if network is None else plan.operations()
-        self._skinning = unposed, *joints, order
-        self._size = plan.size
-
-    def start(self) -> np.ndarray:
-        """Return a fresh working array, whose state is zero."""
-        return np.zeros(self._size, np.float32)
-
-    def __call__(
-        self,
-        features: np.ndarray,
-        transforms: np.ndarray,
-        pelvis: np.ndarray,
-        work: np.ndarray,
-        out: np.ndarray,
-    ) -> None:
-        """Write the world vertices into `out`, and the state after this frame into `work`.
-
-        Args:
-            features: (D,) float32; unused without a network.
-            transforms: of the joints, (J, 3, 4) float32.
-            pelvis: (3,) [m] float64.
-            work: array of `start`, or as the frame before left it.
-            out: (V, 3) [m] float64.
-        """
-        if self._operations is None:  # without a network no more than skinning is compiled
-            skin_frame(work, *self._skinning, transforms, pelvis, out)
-        else:
-            run_frame(*self._operations, features, *self._skinning, transforms, pelvis, work, out)
 
 
 class FramePlan:
@@ -95,12 +41,17 @@ class FramePlan:
     Args:
         order: vertices (V,) as they are skinned.
         padded: number of vertices, filled up to whole blocks.
+        pins: vertices without offset.
+        scale: factor on the offsets.
     """
 
-    def __init__(self, order: np.ndarray, padded: int) -> None:
-        self._used = 0
+    def __init__(
+        self, order: np.ndarray, padded: int, *, pins: Sequence[int] = (), scale: float = 1.0
+    ) -> None:
+        self._used, self._scale = 0, scale
         self._places = np.full(padded, len(order))
         self._places[: len(order)] = order
+        self._free = np.where(np.isin(self._places, pins), len(order), self._places)
         self._operations: list[tuple[int, ...]] = []
         self._matrices: list[np.ndarray] = []
         self._terms: list[np.ndarray] = []
@@ -115,10 +66,10 @@ class FramePlan:
         operations = np.array(self._operations, np.int64)
         return operations, np.concatenate(self._matrices), np.concatenate(self._terms)
 
-    def add_normalised(self, network: GarmentNetwork) -> slice:
-        """Add the features less the network's mean, over its spread; to be called first."""
-        self._terms += [network.input_mean.numpy(), network.input_std.numpy()]
-        return self._place(len(network.input_mean))
+    def add_normalised(self, mean: Tensor, std: Tensor) -> slice:
+        """Add the features less their mean (D,), over their spread (D,); to be called first."""
+        self._terms += [mean.numpy(), std.numpy()]
+        return self._place(len(mean))
 
     def add_linear(self, layer: nn.Linear, x: slice, activation: type[nn.Module] = nn.Identity) -> slice:
         """Add a linear layer of the numbers at x, followed by one of ACTIVATIONS."""
@@ -151,17 +102,15 @@ class FramePlan:
         """Add the numbers at x to those at a place of the same size."""
         self._operations.append((SUM, x.stop - x.start, 0, 0, 0, x.start, place.start))
 
-    def add_offsets(self, network: GarmentNetwork, *parts: tuple[nn.Linear, slice]) -> None:
+    def add_offsets(self, *parts: tuple[nn.Linear, slice]) -> None:
         """Add the offsets (3 V,), the sum of linear layers of the numbers at places; to be called last."""
-        rows = self._rows(network)
+        rows = self._rows()
         for kind, (layer, x) in zip((PRODUCT, *[ADDED] * len(parts)), parts):
             matrix, bias = _numbers_of(layer)
             matrix, bias = np.pad(matrix, ((0, 3), (0, 0)))[rows], np.pad(bias, (0, 3))[rows]
-            self._product(kind, matrix, bias, x, self._used, scale=network.output_scale)
+            self._product(kind, matrix, bias, x, self._used, scale=self._scale)
 
-    def add_nearest(
-        self, network: GarmentNetwork, poses: Tensor, frames: Tensor, x: slice, neighbours: int, near: float
-    ) -> None:
+    def add_nearest(self, poses: Tensor, frames: Tensor, x: slice, neighbours: int, near: float) -> None:
         """Add the offsets of the frames (F, 3V) whose poses (F, D) are nearest to x; to be called last.
 
         They weigh 1 / (squared distance + near).
@@ -169,20 +118,20 @@ class FramePlan:
         nothing = torch.zeros(len(poses)).numpy()
         distances = self._place(len(poses))
         self._product(DISTANCES, poses.detach().numpy(), nothing, x, distances.start)
-        matrix = np.pad(frames.detach().numpy(), ((0, 0), (0, 3)))[:, self._rows(network)]
+        matrix = np.pad(frames.detach().numpy(), ((0, 0), (0, 3)))[:, self._rows()]
         first = sum(map(len, self._matrices)), sum(map(len, self._terms))
         self._operations.append((NEAREST, *matrix.shape, *first, distances.start, self._used))
         self._matrices.append(matrix.ravel())
-        self._terms.append(np.array([neighbours, near, network.output_scale], np.float32))
+        self._terms.append(np.array([neighbours, near, self._scale], np.float32))
 
-    def add_handles(self, network: GarmentNetwork, functions: Tensor, x: slice) -> None:
+    def add_handles(self, functions: Tensor, x: slice) -> None:
         """Add the offsets of handles whose numbers lie at x, with shape functions (V, B, 4); called last.
 
         Each block of vertices reads the handles that reach it.
         """
         count, padded = functions.shape[1], len(self._places)
         values = np.concatenate([functions.detach().numpy(), np.zeros((1, count, 4), np.float32)])
-        values = np.float32(network.output_scale) * values[self._free_places(network)]
+        values = np.float32(self._scale) * values[self._free]
         for block in range(padded // VERTEX_BLOCK):
             part = values[block * VERTEX_BLOCK : (block + 1) * VERTEX_BLOCK]
             reaching = np.flatnonzero(part.any(axis=(0, 2)))
@@ -193,15 +142,9 @@ class FramePlan:
                 self._operations.append((kind, padded, 4 * count, 0, terms, numbers, target))
                 self._terms.append(np.ascontiguousarray(part[:, handle].T).ravel())
 
-    def _free_places(self, network: GarmentNetwork) -> np.ndarray:
-        """Return the vertex of each place (V',); V for those without offset: pins, and places behind."""
-        places, vertices = self._places.copy(), network.vertices
-        places[np.isin(places, network.pins)] = vertices
-        return places
-
-    def _rows(self, network: GarmentNetwork) -> np.ndarray:
-        """Return the offset of a network that each of the frame's is; 3 V to 3 V + 2 for none."""
-        return (3 * self._free_places(network) + np.arange(3)[:, None]).ravel()
+    def _rows(self) -> np.ndarray:
+        """Return the offset of the network that each of the frame's is; 3 V to 3 V + 2 for none."""
+        return (3 * self._free + np.arange(3)[:, None]).ravel()
 
     def _place(self, size: int) -> slice:
         """Reserve a place for `size` numbers; those behind stay zero: matrices are read in whole vectors."""
@@ -227,7 +170,7 @@ def _numbers_of(layer: nn.Linear) -> tuple[np.ndarray, np.ndarray]:
     return layer.weight.detach().numpy(), bias.numpy()
 
 
-def _blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def blocks_of_vertices(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Sort vertices into blocks of VERTEX_BLOCK, and find the joints that move any vertex of a block.
 
     weights (V, J) -> order (V,) of the vertices, first of the joints of each block (B + 1,), joints (E,),

@@ -1,10 +1,8 @@
 """Base class of the networks that dress a body: body motion in, offsets of the unposed garment out.
 
-Random weights that a network starts from, by the rules of torch or of Keras.
-
-The rules differ by orders of magnitude in the joules of the first frames: the offsets of a network begin as
-noise, and noise of centimetres between neighbouring vertices is a great strain. SNUG's authors train in
-Keras.
+They start from random weights by the rules of torch or of Keras, in which SNUG's authors train. The two
+differ by orders of magnitude in the joules of the first frames: noise of centimetres between neighbouring
+vertices is a great strain.
 """
 
 from __future__ import annotations
@@ -21,11 +19,11 @@ import torch
 from torch import Tensor, nn
 
 from snug.kinds import find_kind
+from snug.networks.frame_layout import FramePlan
 from snug.recipe import Recipe
 
 if TYPE_CHECKING:
     from snug.garments.garment import Garment
-    from snug.networks.frame_layout import FramePlan
 
 
 class GarmentNetwork(nn.Module):

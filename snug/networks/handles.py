@@ -6,21 +6,17 @@ A small network gives the twelve numbers of each A_b: a perceptron that sees one
 recurrent units that see the motion and their own past, as SNUG's do. So it has a tenth of SNUG's weights, and
 what it can express is the span of the shape functions (method `handles-80-floor`), whatever it has learned.
 
-Shape functions of handles on a garment: where the handles sit, and how each moves every vertex.
-
-    u_v = sum_b w_b(v) A_b [(r_v - c_b) / h; 1],      A_b: (3, 4), the numbers of handle b
-
-u is an offset of the unposed garment r, as SNUG's, so that it is skinned. The centres c are farthest points
-of the garment, each the vertex that lies farthest from those before it. The weights are compact,
-w_b ~ (1 - d_b/R)^4 (4 d_b/R + 1) for distances d_b < R (Wendland 1995), and sum to one in each vertex, so
-that equal transforms of all handles move the garment affinely. h is the covering radius, the largest distance
-of a vertex from its nearest centre; R = REACH h. Distances are straight: those along edges leave more of the
+The offsets are of the unposed garment r, as SNUG's, so that it is skinned. The centres c are farthest points
+of the garment, each the vertex that lies farthest from those before it. The weights are compact, w_b ~ (1 -
+d_b/R)^4 (4 d_b/R + 1) for distances d_b < R (Wendland 1995), and sum to one in each vertex, so that equal
+transforms of all handles move the garment affinely. h is the covering radius, the largest distance of a
+vertex from its nearest centre; R = REACH h. Distances are straight: those along edges leave more of the
 energy above the minimum (docs/notebook/training.md).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -28,10 +24,8 @@ from torch import Tensor, nn
 
 from snug.garments.garment import Garment
 from snug.kernels.gru import run_gru
+from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, perceptron
-
-if TYPE_CHECKING:
-    from snug.networks.frame_layout import FramePlan
 
 REACH = 2.5  # covering radii
 
@@ -149,8 +143,8 @@ class StaticHandles(HandleNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_layers(self.activations, plan.add_normalised(self))
-        plan.add_handles(self, self.functions, plan.add_linear(self.numbers, x))
+        x = plan.add_layers(self.activations, plan.add_normalised(self.input_mean, self.input_std))
+        plan.add_handles(self.functions, plan.add_linear(self.numbers, x))
 
 
 class DynamicHandles80(HandleNetwork):
@@ -172,8 +166,8 @@ class DynamicHandles80(HandleNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        hidden = plan.add_gru(self.gru, plan.add_normalised(self))
-        plan.add_handles(self, self.functions, plan.add_linear(self.numbers, hidden))
+        hidden = plan.add_gru(self.gru, plan.add_normalised(self.input_mean, self.input_std))
+        plan.add_handles(self.functions, plan.add_linear(self.numbers, hidden))
 
 
 class Handles20(StaticHandles):

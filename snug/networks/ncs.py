@@ -7,7 +7,7 @@ z_d is zero and the garment is D(z_s). So the branches are apart by their form, 
 In training a fifth of a batch has codes z_d of other windows (motion augmentation). These windows teach the
 decoder alone, and by the static energies alone.
 
-Pose and motion of the joints near a garment, the inputs of Neural Cloth Simulation.
+The inputs are of the joints near a garment:
 
     pose of a joint:    two columns of its rotation R, and the direction of gravity in its axes
     motion of a joint:  rates of both, and the acceleration of its position in its axes
@@ -18,7 +18,7 @@ left out of the pose, and the rate of it is taken in its own axes, so that it do
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 import torch
@@ -27,10 +27,8 @@ from torch import Tensor, nn
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT, rotation_matrices
 from snug.motion.motion import Motion
+from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, perceptron
-
-if TYPE_CHECKING:
-    from snug.networks.frame_layout import FramePlan
 
 # Those of the published configuration for SMPL: what carries clothes, without shanks, feet, hands and head.
 DESCRIBED = (
@@ -121,13 +119,15 @@ class StaticBranch(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        self._lay_out_decoder(plan, self._lay_out_static(plan, plan.add_normalised(self)))
+        self._lay_out_decoder(
+            plan, self._lay_out_static(plan, plan.add_normalised(self.input_mean, self.input_std))
+        )
 
     def _lay_out_static(self, plan: FramePlan, x: slice) -> slice:
         return plan.add_layers(self.static_encoder, slice(x.start, x.start + POSE_NUMBERS))
 
     def _lay_out_decoder(self, plan: FramePlan, code: slice) -> None:
-        plan.add_offsets(self, (self.offsets, plan.add_layers(self.decoder, code)))
+        plan.add_offsets((self.offsets, plan.add_layers(self.decoder, code)))
 
 
 class TwoBranches(StaticBranch):
@@ -170,7 +170,7 @@ class TwoBranches(StaticBranch):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self)
+        x = plan.add_normalised(self.input_mean, self.input_std)
         motion = slice(x.start + POSE_NUMBERS, x.stop)
         for layer in self.joint_encoder:
             if isinstance(layer, nn.Linear):

@@ -8,15 +8,11 @@ membrane strain it is what the SNUG paper calls the extended PBNS.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from torch import Tensor, nn
 
 from snug.kernels.gru import run_linear
+from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, perceptron
-
-if TYPE_CHECKING:
-    from snug.networks.frame_layout import FramePlan
 
 
 class PoseSpaceDeformation(GarmentNetwork):
@@ -42,5 +38,5 @@ class PoseSpaceDeformation(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_layers(self.activations, plan.add_normalised(self))
-        plan.add_offsets(self, (self.offsets, x))
+        x = plan.add_layers(self.activations, plan.add_normalised(self.input_mean, self.input_std))
+        plan.add_offsets((self.offsets, x))

@@ -1,29 +1,23 @@
-"""The garment regressor R of SNUG: body motion to offsets of an unposed garment.
+"""Networks of the body's motion: the regressor R of SNUG, and a perceptron of three quarters of a second.
 
     M(beta, phi) = W(T + R(beta, phi), J(beta), theta, W_G)                      (paper, eq. 1 and 2)
 
 Four gated recurrent units of 256 with tanh and one linear layer to 3V offsets (paper, section 3.5). The state
 at the start is zero at run time; in training N(0, sigma) is added to it, sigma being a recipe's choice.
 
-The network of garments with secondary motion: from three quarters of a second of motion to offsets.
-
-It carries nothing from frame to frame: its inputs hold the motion that drove the garment
+The perceptron carries nothing from frame to frame: its inputs hold the motion that drove the garment
 (snug.networks.dressed_body) instead of the garment's own past. So frames are learned one by one, in any
 order, and no roll-out can drift.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from torch import Tensor, nn
 
 from snug.kernels.gru import run_gru, run_linear
+from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.pbns import PoseSpaceDeformation
-
-if TYPE_CHECKING:
-    from snug.networks.frame_layout import FramePlan
 
 HIDDEN, LAYERS = 256, 4
 
@@ -55,7 +49,9 @@ class Regressor(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        plan.add_offsets(self, (self.offsets, plan.add_gru(self.gru, plan.add_normalised(self))))
+        plan.add_offsets(
+            (self.offsets, plan.add_gru(self.gru, plan.add_normalised(self.input_mean, self.input_std)))
+        )
 
 
 class MotionPerceptron(PoseSpaceDeformation):

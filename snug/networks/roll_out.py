@@ -1,6 +1,6 @@
 """Roll-outs: a trained network run over a motion, one frame at a time, as an application would.
 
-Times of frames are those of network and skinning, one compiled call each (snug.networks.frame_layout); their
+Times of frames are those of network and skinning, one compiled call each (CompiledFrame); their
 inputs come from `prepare_frame_inputs`. Many bodies at once go through torch.
 """
 
@@ -16,9 +16,11 @@ from torch import Tensor
 
 from reference_sim.trajectory import Trajectory
 from snug.body.skinning import skin
+from snug.kernels.one_frame import VERTEX_BLOCK, run_frame, skin_frame
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import FEATURE_SETS, DressedBody
-from snug.networks.frame_layout import CompiledFrame
+from snug.networks.frame_layout import FramePlan, blocks_of_vertices
+from snug.networks.garment_network import GarmentNetwork
 from snug.networks.trained_model import TrainedModel, digest_of_triangles
 
 WARM_UP = 10  # frames computed and thrown away, before the caller starts a clock
@@ -167,6 +169,59 @@ def _trajectory(
             "motion": motion.name,
         },
     )
+
+
+class CompiledFrame:
+    """A compiled call that skins an unposed garment, with a network's offsets if there is a network.
+
+    Args:
+        rest: unposed garment (V, 3) [m].
+        weights: skinning weights (V, J).
+        network: gives the offsets; None skins alone.
+    """
+
+    def __init__(
+        self,
+        rest: Tensor,
+        weights: Tensor,
+        network: GarmentNetwork | None = None,
+    ) -> None:
+        order, *joints = blocks_of_vertices(weights.numpy())
+        unposed = np.zeros((3, VERTEX_BLOCK * (len(joints[0]) - 1)), np.float32)
+        unposed[:, : len(order)] = rest.numpy()[order].T
+        plan = FramePlan(order, unposed.shape[1])
+        if network is not None:
+            plan = FramePlan(order, unposed.shape[1], pins=network.pins, scale=network.output_scale)
+            network.lay_out(plan)
+        self._operations = None if network is None else plan.operations()
+        self._skinning = unposed, *joints, order
+        self._size = plan.size
+
+    def start(self) -> np.ndarray:
+        """Return a fresh working array, whose state is zero."""
+        return np.zeros(self._size, np.float32)
+
+    def __call__(
+        self,
+        features: np.ndarray,
+        transforms: np.ndarray,
+        pelvis: np.ndarray,
+        work: np.ndarray,
+        out: np.ndarray,
+    ) -> None:
+        """Write the world vertices into `out`, and the state after this frame into `work`.
+
+        Args:
+            features: (D,) float32; unused without a network.
+            transforms: of the joints, (J, 3, 4) float32.
+            pelvis: (3,) [m] float64.
+            work: array of `start`, or as the frame before left it.
+            out: (V, 3) [m] float64.
+        """
+        if self._operations is None:  # without a network no more than skinning is compiled
+            skin_frame(work, *self._skinning, transforms, pelvis, out)
+        else:
+            run_frame(*self._operations, features, *self._skinning, transforms, pelvis, work, out)
 
 
 def prepare_frames(

@@ -12,16 +12,14 @@ do on other bodies. The authors' collision post-processing (2 mm) is no part of 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from torch import Tensor, nn
 
 from snug.body.parametric_body import SHAPES
 from snug.kernels.gru import run_gru, run_linear
+from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork
-
-if TYPE_CHECKING:
-    from snug.networks.frame_layout import FramePlan
 
 FIT_WIDTH, WRINKLE_WIDTH = 20, 1500
 
@@ -53,7 +51,7 @@ class FitAndWrinkles(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self)
+        x = plan.add_normalised(self.input_mean, self.input_std)
         first, drape = cast(nn.Linear, self.fit[0]), cast(nn.Linear, self.fit[2])
         shape = plan.add_linear(first, slice(x.stop - SHAPES, x.stop), nn.ReLU)
-        plan.add_offsets(self, (drape, shape), (self.offsets, plan.add_gru(self.gru, x)))
+        plan.add_offsets((drape, shape), (self.offsets, plan.add_gru(self.gru, x)))

@@ -12,16 +12,12 @@ instead of twenty. A static method: it sees one pose.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import torch
 from torch import Tensor, nn
 
 from snug.body.parametric_body import SHAPES
+from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork
-
-if TYPE_CHECKING:
-    from snug.networks.frame_layout import FramePlan
 
 WIDTH, DROPOUT = 1024, 0.2
 
@@ -81,6 +77,6 @@ class FrequencyMixture(GarmentNetwork):
 
     def lay_out(self, plan: FramePlan) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self)
+        x = plan.add_normalised(self.input_mean, self.input_std)
         pose = slice(x.start, x.stop - SHAPES)
-        plan.add_offsets(self, self.low.lay_out(plan, x), self.high.lay_out(plan, pose))
+        plan.add_offsets(self.low.lay_out(plan, x), self.high.lay_out(plan, pose))

@@ -1,6 +1,4 @@
-"""The training set of a recipe: original motions and augmented clips, each on its body.
-
-Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
+"""Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
 
 Self-supervision needs no simulation, so a training set is not bound to what was recorded. Recorded clips show
 a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
@@ -11,14 +9,12 @@ comes too near to it. Legs that always come as a pair show no lunge; a network t
 as in a squat lets it through the hem; and people, unlike tables of angles, let their arms hang close to the
 torso and turned in their sockets. Every part stays continuous in time, so velocities keep their meaning.
 
-Training motions with turns and stops, which give a garment secondary motion, joined into one.
-
-Secondary motion shows after a turn and a stop, and few motions have either. Each clip is played at
-another speed; its trunk turns to and fro about the vertical, a random share of it from the pelvis; at a
-random frame the body stops dead and holds still for up to a second. Joined into one long motion they need one
-settled start, and the ways between them are motions too. Half of the clips are pieces of the original
-motions: mixed ones alone hardly come near a pose that people take, and there the network then stretches the
-cloth.
+Secondary motion shows after a turn and a stop, and few motions have either. In a swinging motion each clip is
+played at another speed; its trunk turns to and fro about the vertical, a random share of it from the pelvis;
+at a random frame the body stops dead and holds still for up to a second. Joined into one long motion they
+need one settled start, and the ways between them are motions too. Half of the clips are pieces of the
+original motions: mixed ones alone hardly come near a pose that people take, and there the network then
+stretches the cloth.
 """
 
 from __future__ import annotations

@@ -28,16 +28,13 @@ def find_device(name: str) -> torch.device:
     try:
         device = torch.device(name)
     except RuntimeError:
-        raise DeviceError(f"--device {name}: unknown; use cpu or cuda") from None
+        device = None
+    if device is None or device.type not in ("cpu", "cuda"):
+        raise DeviceError(f"--device {name}: use cpu or cuda")
     if device.type == "cpu":
         return device
-    if device.type != "cuda":
-        raise DeviceError(f"--device {name}: use cpu or cuda")
-    if not torch.cuda.is_available():
-        why = "this torch was built without CUDA" if torch.version.cuda is None else "no CUDA device answers"
-        raise DeviceError(f"--device {name}: {why}; use --device cpu")
     if (device.index or 0) >= torch.cuda.device_count():
-        raise DeviceError(f"--device {name}: this machine has {torch.cuda.device_count()} CUDA device(s)")
+        raise DeviceError(f"--device {name}: this machine has {torch.cuda.device_count()} of them; use cpu")
     torch.backends.cudnn.allow_tf32 = False  # it rounds what is multiplied to ten bits
     return device
 

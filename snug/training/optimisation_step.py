@@ -19,7 +19,7 @@ from snug.kernels.skinning import FastSkin
 from snug.kinds import find_kind
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.networks.garment_network import make_network
+from snug.networks.garment_network import GarmentNetwork, make_network
 from snug.networks.regressor import MotionPerceptron
 from snug.networks.tensor_file import select_tensors
 from snug.recipe import Recipe
@@ -34,6 +34,15 @@ from snug.training.vertex_targets import TARGETS, Trajectories, VertexTargets
 
 DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
+
+
+def start_network(kind: str, data: TrainingSet, *, seed: int) -> GarmentNetwork:
+    """Return the network of a training set before its first step, its inputs' statistics set."""
+    garment, inputs = data.dressed.garment, data.features.shape[1]
+    network = make_network(kind, inputs, data.dressed.vertices, data.recipe, seed=seed, pins=garment.pins)
+    network.wear(garment)
+    network.normalise_by(*data.input_statistics())
+    return network
 
 
 class Trainer:
@@ -73,15 +82,9 @@ class Trainer:
         self.data = make_training_set(how, dressed, motions, recipe, seed=seed, device=device)
         self.shaped = varies_shape(how, dressed, recipe) and recipe.shape_of == "window"
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
-        pins = dressed.garment.pins
-        network = make_network(
-            kind, self.data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins
-        )
-        network.wear(dressed.garment)
-        network.normalise_by(*self.data.input_statistics())
-        self.network = network.to(device)
+        self.network = start_network(kind, self.data, seed=seed).to(device)
         if how.closed_form:
-            network.closed_form = self.kernels
+            self.network.closed_form = self.kernels
         on_gpu = device.type == "cuda"
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(),

@@ -5,13 +5,11 @@ group for each motion, called by its place, has attributes `name` and `fps`, and
 translations (T,3) [m] and vertices (T,V,3) [m] from the pelvis, float32.
 `python -m benchmarks.export GARMENT/training-motions` writes such a file.
 
-Inertia and distance with respect to a simulation, for a network that learns from the energies.
-
-Inertia measures the distance from where the cloth would be if nothing but its own velocity moved it,
-x_hat = 2 x_{t-1} - x_{t-2}. A network that predicts the frames t-1 and t-2 itself makes them agree with a
-still present: to hang still costs no energy. So the two frames are those of a simulation, s, and the loss of
-frame t is the function that the simulator minimised in that frame, and a distance that weighs NEARNESS times
-as much as inertia,
+The loss is inertia and distance, for a network that learns from the energies. Inertia measures the distance
+from where the cloth would be if nothing but its own velocity moved it, x_hat = 2 x_{t-1} - x_{t-2}. A network
+that predicts the frames t-1 and t-2 itself makes them agree with a still present: to hang still costs no
+energy. So the two frames are those of a simulation, s, and the loss of frame t is the function that the
+simulator minimised in that frame, and a distance that weighs NEARNESS times as much as inertia,
 
     E(x) = strain + bending + gravity + collision + |x - x_hat|^2 + NEARNESS |x - s_t|^2,
     |y|^2 = 1/(2 dt^2) y^T M y                                                                      [J]

@@ -27,7 +27,7 @@ from snug.recipe import Recipe
 from snug.training.captured_step import CapturedTrainer
 from snug.training.checkpoint import Checkpoint, describe_run
 from snug.training.device import find_device
-from snug.training.optimisation_step import Trainer
+from snug.training.optimisation_step import Trainer, start_network
 from snug.training.training_set import TrainingSet
 from snug.training.validation import Validation, Validator
 from snug.training.vertex_targets import Trajectories, relative_vertices, vertex_loss
@@ -312,10 +312,7 @@ def untrained_model(
     data = TrainingSet(
         dressed, motions, recipe, features=kind.network.feature_set, sequences=kind.network.sequential
     )
-    pins = dressed.garment.pins
-    network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
-    network.wear(dressed.garment)
-    network.normalise_by(*data.input_statistics())
+    network = start_network(model_kind, data, seed=seed)
     return TrainedModel(
         model_kind, network.eval(), recipe, seed=seed, unit=kind.unit, fps=1.0 / data.dt,
         triangles=digest_of_triangles(dressed.garment.faces),

@@ -7,9 +7,8 @@ import torch
 from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
 from snug.kinds import KINDS
-from snug.networks.frame_layout import CompiledFrame
 from snug.networks.garment_network import make_network
-from snug.networks.roll_out import prepare_frames, prepare_skinned_frames, roll_out
+from snug.networks.roll_out import CompiledFrame, prepare_frames, prepare_skinned_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from tests.snug.training.dressing import swaying, tube_dress
 
