@@ -24,7 +24,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference_sim.cloth import MeshError
 from reference_sim.files.array_file import ArrayFileError, read_arrays, read_pickled_arrays
@@ -32,54 +31,8 @@ from reference_sim.geometry.topology import boundary_loops, check_closed
 from snug.body.parametric_body import SHAPES, Body
 from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, PARENTS, BodyError
 
-Array = NDArray[np.float64]
-
 ARM_JOINTS = ("shoulder", "elbow", "wrist", "hand")
 SIDE_SIGNS = (("left", 1.0), ("right", -1.0))
-
-
-def arm_angles(joints: Array) -> Array:
-    """Return the angles (2,) [rad] by which the left and right arm of joints (24, 3) [m] hang down."""
-    arms = [joints[JOINT[f"{side}_wrist"]] - joints[JOINT[f"{side}_shoulder"]] for side, _ in SIDE_SIGNS]
-    return np.array(
-        [np.arctan2(-arm[1], sign * arm[0]) for arm, (_, sign) in zip(arms, SIDE_SIGNS, strict=True)]
-    )
-
-
-def arm_rotations(angles: Array) -> Array:
-    """Return the world rotations (24, 3, 3) that lift each arm, as one piece, by angles (2,) [rad]."""
-    turns = np.broadcast_to(np.eye(3), (len(JOINT), 3, 3)).copy()
-    for (side, sign), angle in zip(SIDE_SIGNS, angles, strict=True):
-        c, s = np.cos(angle), sign * np.sin(angle)
-        turns[[JOINT[f"{side}_{part}"] for part in ARM_JOINTS]] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
-    return turns
-
-
-def turn_rest_pose(points: Array, joints: Array, weights: Array, turns: Array) -> tuple[Array, Array]:
-    """Turn the joints of an unposed body in the world, and its vertices with them.
-
-    The new rest pose is the one that linear blend skinning takes back to the old one exactly: each vertex is
-    moved by the inverse of the blended transform. Blending forwards would lose volume at the shoulder here,
-    and once more whenever the arm comes down. All is linear in points and joints together.
-
-    Args:
-        points: (B, 3, K) [m], K bodies or shape directions.
-        joints: (24, 3, K) [m] of the same.
-        weights: (B, 24) of skinning.
-        turns: (24, 3, 3), world rotation of each joint.
-
-    Returns:
-        Turned vertices (B, 3, K) and joints (24, 3, K) [m].
-    """
-    moved = joints.copy()
-    for joint, parent in enumerate(PARENTS):
-        if parent >= 0:
-            moved[joint] = moved[parent] + turns[parent] @ (joints[joint] - joints[parent])
-    back = turns.transpose(0, 2, 1)
-    offsets = joints - back @ moved
-    blended = np.einsum("vj,jab->vab", weights, back)
-    shift = np.einsum("vj,jak->vak", weights, offsets)
-    return np.linalg.solve(blended, points - shift), moved
 
 
 JOINTS = len(JOINT_NAMES)
@@ -101,7 +54,6 @@ SYNONYMS = {
     "rest_pose": ("rest_pose",),
 }
 REQUIRED = ("v_template", "f", "weights", "kintree_table")
-
 
 Arrays = dict[str, np.ndarray]
 
@@ -275,8 +227,16 @@ def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
 
 
 def _in_t_pose(body: Body) -> Body:
-    """Return the body with horizontal arms. Raises BodyError."""
-    lowered = arm_angles(body.joint_template)
+    """Return the body with horizontal arms. Raises BodyError.
+
+    The new rest pose is the one that linear blend skinning takes back to the old one exactly: each vertex is
+    moved by the inverse of the blended transform. Blending forwards would lose volume at the shoulder here,
+    and once more whenever the arm comes down. All is linear in points and joints together: shape directions
+    turn with them.
+    """
+    at = body.joint_template
+    arms = [(at[JOINT[f"{side}_wrist"]] - at[JOINT[f"{side}_shoulder"]], sign) for side, sign in SIDE_SIGNS]
+    lowered = np.array([np.arctan2(-arm[1], sign * arm[0]) for arm, sign in arms])
     if np.abs(lowered).max() <= T_POSE:
         return body
     degrees = " and ".join(f"{angle:.0f}" for angle in np.degrees(lowered))
@@ -284,15 +244,26 @@ def _in_t_pose(body: Body) -> Body:
         raise BodyError(f"the arms hang by {degrees} degrees; give the body in T pose or A pose (to 60)")
     if body.pose_directions is not None:
         raise BodyError(f"the arms hang by {degrees} degrees; posedirs need a T pose, leave them out")
+    turns = np.broadcast_to(np.eye(3), (JOINTS, 3, 3)).copy()  # in the world: each arm as one piece
+    for (side, sign), angle in zip(SIDE_SIGNS, lowered, strict=True):
+        c, s = np.cos(angle), sign * np.sin(angle)
+        turns[[JOINT[f"{side}_{part}"] for part in ARM_JOINTS]] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
     points = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
     joints = np.concatenate([body.joint_template[..., None], body.joint_directions], axis=2)
-    points, joints = turn_rest_pose(points, joints, body.skinning_weights, arm_rotations(lowered))
+    moved = joints.copy()
+    for joint, parent in enumerate(PARENTS):
+        if parent >= 0:
+            moved[joint] = moved[parent] + turns[parent] @ (joints[joint] - joints[parent])
+    back = turns.transpose(0, 2, 1)
+    blended = np.einsum("vj,jab->vab", body.skinning_weights, back)
+    shift = np.einsum("vj,jak->vak", body.skinning_weights, joints - back @ moved)
+    points = np.linalg.solve(blended, points - shift)
     return replace(
         body,
         template=points[..., 0],
         shape_directions=points[..., 1:],
-        joint_template=joints[..., 0],
-        joint_directions=joints[..., 1:],
+        joint_template=moved[..., 0],
+        joint_directions=moved[..., 1:],
         arms_lowered=lowered,
     )
 

@@ -1,13 +1,11 @@
-"""Put the motion of a foreign skeleton on ours: every limb points where theirs does.
+"""Put the motion of a foreign skeleton on ours: joints matched by name, every limb points where theirs does.
 
 Our joint j turns in the world by G_j = G_b A_j. Theirs turns by G_b from the zero pose, and A_j turns our
 resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t_j = G_b d_b. How a limb is
 twisted about itself follows from its hinge where the file has one. Else A_j is the smallest turn, and the
 zero pose must be a T or A pose.
 
-Joints of a foreign skeleton matched with ours: from a file, or guessed from common names.
-
-Limbs are found by name; pelvis, spine and neck by place: the pelvis is where the legs meet, the spine leads
+Joints are matched with ours by a user's file, or guessed from common names: limbs are found by name; pelvis, spine and neck by place: the pelvis is where the legs meet, the spine leads
 from there to where the arms meet, and the neck from there to the head.
 """
 
@@ -16,7 +14,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -185,9 +182,9 @@ def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, int
             known = ", ".join(JOINT_NAMES)
             raise MotionError(f"{file}: '{ours[:40]}' is none of our joints; they are {known}")
         if not theirs or theirs not in names:
-            near = get_close_matches(str(theirs), filter(None, names), n=3)
-            hint = f"did you mean {' or '.join(near)}?" if near else "look into its hierarchy"
-            raise MotionError(f"{file}: {path.name} has no joint '{str(theirs)[:40]}' for {ours}; {hint}")
+            raise MotionError(
+                f"{file}: {path.name} has no joint '{str(theirs)[:40]}' for {ours}; look into its hierarchy"
+            )
     return {ours: names.index(theirs) for ours, theirs in table.items()}
 
 

@@ -79,14 +79,6 @@ def test_units_and_axes_give_the_same_garment(tmp_path, body, tube, units, metre
     np.testing.assert_allclose(read.rest_positions, tube.rest_positions, rtol=0, atol=1e-12)
 
 
-def test_a_garment_that_is_inside_out_is_turned_with_its_chart(tmp_path, body, tube):
-    turned = tube.faces[:, ::-1]
-    uv = own_chart(tube.rest_positions, turned)
-    read = read_garment(GarmentFile(path=saved(tmp_path, tube, faces=turned, uv=uv), rest="uv"), body)
-    np.testing.assert_array_equal(read.faces, tube.faces)
-    assert energies(read) == pytest.approx(energies(tube), rel=1e-12)
-
-
 def test_each_piece_that_is_inside_out_is_turned(tmp_path, body, tube):
     """Two halves of a tube, above and below, of which one is wound inward."""
     low = tube.rest_positions[tube.faces, 1].max(axis=1) <= np.median(np.unique(tube.rest_positions[:, 1]))
@@ -120,20 +112,6 @@ def test_doubled_vertices_are_joined_and_weights_are_those_of_the_file(tmp_path,
     dressed = DressedBody(body, read)
     for smoothing in (0, 20):
         np.testing.assert_allclose(dressed.weights(smoothing), weights[: len(tube.rest_positions)], atol=1e-7)
-
-
-def test_borrowed_weights_are_smoothed_as_a_recipe_says(tmp_path, body, tube):
-    dressed = DressedBody(body, read_garment(GarmentFile(path=saved(tmp_path, tube)), body))
-    assert not np.allclose(dressed.weights(0), dressed.weights(20), atol=1e-3)
-
-
-def test_a_garment_follows_the_limbs_that_it_encloses_and_no_other(tmp_path, body, shirt):
-    names = np.array(body.joint_names)
-    garment = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
-    strongest = set(names[np.unique(garment.skinning_weights.argmax(axis=1))])
-    assert strongest <= {"pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip", "left_collar",
-                         "right_collar", "left_shoulder", "right_shoulder"}  # fmt: skip
-    assert {"spine3", "left_shoulder", "right_shoulder"} <= strongest
 
 
 def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):

@@ -17,14 +17,14 @@ KINDS = [pattern.name for pattern in GARMENT_TEMPLATES]
 
 @pytest.fixture(scope="session")
 def shirts(body):
-    return {count: find_template("tshirt").tailor(body, vertices=count) for count in (300, 1000)}
+    return {count: find_template("tshirt").tailor(body, vertices=count) for count in (300, 600)}
 
 
 @pytest.fixture(scope="session")
 def wardrobe(body, shirts):
-    """Every sort of garment, at 1000 vertices."""
-    others = {p.name: p.tailor(body, vertices=1000) for p in GARMENT_TEMPLATES if p.name != "tshirt"}
-    return {"tshirt": shirts[1000], **others}
+    """Every sort of garment, at 600 vertices."""
+    others = {p.name: p.tailor(body, vertices=600) for p in GARMENT_TEMPLATES if p.name != "tshirt"}
+    return {"tshirt": shirts[600], **others}
 
 
 @pytest.fixture(params=KINDS)
@@ -47,9 +47,7 @@ def at(body, name):
     return body.joint_template[body.joint_names.index(name)]
 
 
-@pytest.mark.parametrize(
-    "count", [300, 1000, *(pytest.param(c, marks=pytest.mark.slow) for c in (2000, 4400))]
-)
+@pytest.mark.parametrize("count", [300, 600, pytest.param(4400, marks=pytest.mark.slow)])
 def test_topology_and_triangles_at_every_resolution(body, shirts, count):
     shirt = shirts.get(count) or find_template("tshirt").tailor(body, vertices=count)
     points, faces = shirt.rest_positions, shirt.faces
@@ -73,7 +71,7 @@ def test_topology_and_triangles_at_every_resolution(body, shirts, count):
 
 @pytest.mark.parametrize("which", [*KINDS, 300, pytest.param(4400, marks=pytest.mark.slow)])
 def test_clear_of_the_body_at_vertices_and_within_triangles(body, shirts, wardrobe, which):
-    """Every sort at 1000 vertices, the T-shirt at others too."""
+    """Every sort at 600 vertices, the T-shirt at others too."""
     garment = wardrobe.get(which) or shirts.get(which) or find_template("tshirt").tailor(body, vertices=which)
     corners = garment.rest_positions[garment.faces]
     rng = np.random.default_rng(3)
@@ -157,16 +155,6 @@ def test_the_shirt_hangs_from_the_chest(body, shirt):
     front = points[shirt.hem][:, 2] > 0
     middle = np.abs(points[shirt.hem][:, 0]) < 0.05
     assert points[shirt.hem][front & middle, 2].min() > points[shirt.hem][:, 2].max() - 0.01
-
-
-def test_weights_are_borrowed_from_the_nearest_allowed_vertex(body, shirt):
-    weights = shirt.skinning_weights
-    assert weights.shape == (len(shirt.rest_positions), 24)
-    assert np.allclose(weights.sum(axis=1), 1.0, atol=1e-12)
-    assert np.array_equal(weights, body.skinning_weights[shirt.body_vertices])
-    strongest = {body.joint_names[j] for j in np.argmax(weights, axis=1)}
-    assert not strongest & {"head", "neck", "left_wrist", "left_hand", "left_knee", "left_foot"}
-    assert {"left_shoulder", "right_shoulder", "spine3", "pelvis"} <= strongest
 
 
 def test_another_shape_carries_the_shirt_along(body, shirt):
