@@ -5,8 +5,9 @@ resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t
 twisted about itself follows from its hinge where the file has one. Else A_j is the smallest turn, and the
 zero pose must be a T or A pose.
 
-Joints are matched with ours by a user's file, or guessed from common names: limbs are found by name; pelvis, spine and neck by place: the pelvis is where the legs meet, the spine leads
-from there to where the arms meet, and the neck from there to the head.
+Joints are matched with ours by a user's file, or guessed from common names: limbs by name; pelvis, spine and
+neck by place, since the pelvis is where the legs meet, the spine leads from there to where the arms meet, and
+the neck from there to the head.
 """
 
 from __future__ import annotations

@@ -134,12 +134,6 @@ def run_json() -> bytes:
     return Path("run.json").read_bytes()
 
 
-def arrays_npy() -> bytes:
-    stream = io.BytesIO()
-    np.save(stream, CORNERS)
-    return stream.getvalue()
-
-
 def clip_text() -> bytes:
     return (":FULLY-SPECIFIED\n:DEGREES\n" + amc_frame(1) + amc_frame(2)).encode()
 

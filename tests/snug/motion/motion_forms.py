@@ -1,4 +1,4 @@
-"""One motion in the forms that people keep motions in, written by code of its own."""
+"""One motion in the forms that people keep motions in, written by code of its own; speeds of joints."""
 
 import pickle
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import JOINT_NAMES, PARENTS, REST_JOINTS
+from snug.body.skeleton import JOINT_NAMES, PARENTS, REST_JOINTS, axis_angles, rotation_matrices
 
 Y_UP = np.eye(3)
 # From y up to z up: (x, y, z) becomes (x, -z, y).
@@ -99,3 +99,10 @@ def bvh(poses, trans, fps, *, names=None, order="ZXY", unit=1.0, rest=REST_JOINT
     rows = np.concatenate([(trans + rest[0]) / unit, angles.reshape(len(poses), -1)], axis=1)
     lines += ["MOTION", f"Frames: {len(poses)}", f"Frame Time: {1 / fps:.7f}", *map(numbers, rows)]
     return "\n".join(lines) + "\n"
+
+
+def joint_speeds(motion):
+    """Angular speed of every joint relative to its parent, (T - 1, 24) [rad/s]."""
+    rotations = rotation_matrices(motion.poses)
+    steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
+    return np.linalg.norm(steps, axis=-1) * motion.fps

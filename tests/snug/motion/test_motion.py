@@ -31,7 +31,7 @@ from snug.motion.motion import (
 )
 from snug.motion.posture import poses_from_angles
 from snug.motion.walks import GAITS, STOPS
-from tests.snug.motion.joint_speeds import joint_speeds
+from tests.snug.motion.motion_forms import joint_speeds
 
 # Those made by code; tests of recorded clips are in test_recorded.
 MADE = [name for name in (*CONTROL, *VALIDATION, *TEST, *DYNAMIC_VALIDATION) if clip_of(name) not in CLIPS]

@@ -26,7 +26,7 @@ from snug.motion.library import (
 )
 from snug.motion.motion import arm_clearance
 from snug.motion.raw_motion import MAX_TURN_SPEED, RawMotion, remove_recording_errors
-from tests.snug.motion.joint_speeds import joint_speeds
+from tests.snug.motion.motion_forms import joint_speeds
 
 ROOT = Path(__file__).resolve().parents[3]
 NOTICE = "snug/motion/recorded/NOTICE.md"

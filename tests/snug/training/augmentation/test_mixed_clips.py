@@ -10,7 +10,7 @@ from snug.motion.library import make_motion
 from snug.motion.motion import Motion, arm_clearance, lap_clearance, mirror_motion
 from snug.recipe import DEFAULT
 from snug.training.augmentation import augment, hang_arms, make_mixed_clips
-from tests.snug.motion.joint_speeds import joint_speeds
+from tests.snug.motion.motion_forms import joint_speeds
 
 
 def test_mirror_swaps_the_sides():

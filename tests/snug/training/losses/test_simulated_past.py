@@ -27,7 +27,7 @@ from snug.training.simulated_data import NEARNESS, SimulatedPast
 from snug.training.train_network import train_network
 from snug.training.training_set import TrainingSet
 from snug.training.vertex_targets import TargetError
-from tests.snug.motion.joint_speeds import joint_speeds
+from tests.snug.motion.motion_forms import joint_speeds
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMALL = replace(DYNAMIC, pretraining=0)
