@@ -327,17 +327,9 @@ def read_run(folder: RunFolder) -> Run:
     return replace(
         run,
         protocol=one_protocol(run.frame["protocol"], folder.rows_path),
-        frame_energies=_read_frame_energies(folder.frame_energies_path),
+        frame_energies=run_folder.read_frame_energies(folder.frame_energies_path),
         roll_outs=RollOuts(folder, run.problems),
     )
-
-
-def _read_frame_energies(path: Path) -> pd.DataFrame:
-    """Return the lines of run_folder.csv, none without the file. Raises ResultsError."""
-    if not path.is_file():
-        return pd.DataFrame()
-    columns, lines = run_folder.read(path)
-    return pd.DataFrame(lines, columns=columns)
 
 
 def _read_histories(folder: RunFolder, run: Run) -> list[History]:

@@ -12,8 +12,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-DEEPEST = 30  # levels of lists and objects in one another
-
 
 class ResultsError(ValueError):
     """A run folder or one of its files is absent or not what it should be; the message names it."""
@@ -29,16 +27,7 @@ def read_json(path: Path) -> dict[str, Any]:
         raise ResultsError(f"{path}: not readable as JSON ({' '.join(str(error).split())})") from None
     if not isinstance(value, dict):
         raise ResultsError(f"{path}: holds no JSON object")
-    level: list[Any] = [value]
-    for _ in range(DEEPEST):
-        level = [inner for outer in level for inner in _inside(outer)]
-    if level:
-        raise ResultsError(f"{path}: is nested more than {DEEPEST} deep")
     return value
-
-
-def _inside(value: Any) -> list[Any]:
-    return list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
 
 
 USABLE = ("ok", "stalled")  # statuses of cells that came to their last frame: their numbers count

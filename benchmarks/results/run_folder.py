@@ -16,6 +16,7 @@ from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:
     import numpy as np
+    import pandas as pd
 
 FORMAT = 4  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
@@ -195,7 +196,7 @@ SECONDS = "judged/seconds"  # among the curves of a cell: of each frame, nan whe
 ENERGY = "energy/"
 
 
-def write(folder: RunFolder, rows: Iterable[Row]) -> None:
+def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
     """Write frame_energies.csv, whole or not at all: the energy of each evaluated frame by term.
 
     A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their sum.
@@ -235,33 +236,24 @@ def _curves(path: Path) -> dict[str, np.ndarray]:
     return {name.removeprefix(ENERGY): arrays[name] for name in kept}
 
 
-def read(path: Path) -> tuple[list[str], list[list[str | int | float]]]:
-    """Read columns and lines; nan where a cell is empty. Raises ResultsError: file, line and column."""
+def read_frame_energies(path: Path) -> pd.DataFrame:
+    """Return the lines of frame_energies.csv, nan where a cell is empty; none without the file.
+
+    Raises:
+        ResultsError: a file of other columns, or with a cell that is no number.
+    """
+    import pandas as pd
+
+    if not path.is_file():
+        return pd.DataFrame()
     try:
         with path.open(newline="", encoding="utf-8") as stream:
-            reader = csv.reader(stream)
-            columns = next(reader, [])
-            fits = tuple(columns[: len(CELL)]) == CELL and len(set(columns)) == len(columns)
-            if not fits or len(columns) == len(CELL):
-                expected = ",".join(CELL)
-                raise ResultsError(
-                    f"{path}: line 1: the columns should be {expected} and energies, each once"
-                )
-            return columns, [_line(f"{path}: line {reader.line_num}", columns, cells) for cells in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({error})") from None
-
-
-def _line(where: str, columns: list[str], cells: list[str]) -> list[str | int | float]:
-    if len(cells) != len(columns):
-        raise ResultsError(f"{where}: {len(columns)} cells are expected")
-    line: list[str | int | float] = [*cells[:2]]
-    for name, cell in list(zip(columns, cells))[2:]:
-        try:
-            number = int(cell) if name == "seed" else float(cell or "nan")
-            if (cell and not math.isfinite(number)) or (name == "seed" and abs(number) >= 1 << 63):
-                raise ValueError
-            line.append(number)
-        except ValueError:
-            raise ResultsError(f"{where}: column {name}: '{cell[:40]}' is no number") from None
-    return line
+            columns, *lines = list(csv.reader(stream)) or [[]]
+        whole = all(len(line) == len(columns) for line in lines)
+        if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL) or not whole:
+            raise ValueError(f"the columns should be {','.join(CELL)} and energies")
+        table = pd.DataFrame(lines, columns=columns)
+        numbers = {name: [float(cell or "nan") for cell in table[name]] for name in columns[3:]}
+        return table.assign(seed=list(map(int, table["seed"])), **numbers)
+    except (OSError, ValueError, csv.Error) as error:
+        raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({' '.join(str(error).split())})") from None

@@ -149,7 +149,7 @@ class RunLog:
         ]
         self.count_look()
         self.folder.write_rows(self.rows)
-        run_folder.write(self.folder, self.rows)
+        run_folder.write_frame_energies(self.folder, self.rows)
         self.config |= described(self.plan, self.rows)
         written = (self.folder.rows_path, self.folder.frame_energies_path)
         self.config["digests"] = {path.name: digest_of_file(path) for path in written if path.is_file()}

@@ -292,8 +292,9 @@ def test_every_method_has_the_whole_protocol(tmp_path):
 def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks(run, rows, scenes, tmp_path):
     folder, scene = run[1].cache.folder, scenes[BODY]
     assert not folder.frame_energies_path.is_file()
-    run_folder.write(folder, rows)
-    columns, lines = run_folder.read(folder.frame_energies_path)
+    run_folder.write_frame_energies(folder, rows)
+    table = run_folder.read_frame_energies(folder.frame_energies_path)
+    columns, lines = list(table), table.values.tolist()
     assert columns == ["scene", "method", "seed", "seconds", *scene.terms, "total"]
     kept = {entry.name for entry in FEWER_METHODS if entry.role in ("reference", "baseline", "network")}
     assert {line[1] for line in lines} == kept and {line[0] for line in lines} == {BODY}
@@ -308,7 +309,7 @@ def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks
                 means[method, f"energy/{term}"], rel=1e-4, abs=1e-9
             )
     other = dataclasses.replace(rows[0], suite="speed")
-    run_folder.write(folder, [other])  # nothing takes part any more
+    run_folder.write_frame_energies(folder, [other])  # nothing takes part any more
     assert not folder.frame_energies_path.is_file()
 
 
