@@ -231,20 +231,11 @@ class SceneRollOuts(Kept):
         self.quasi_static: np.ndarray | None = None
         self.roll_outs: list[RollOut] = []
 
-    def find(self, *, role: str, family: str | None = None, level: float | None = None) -> RollOut | None:
-        """Return the first finished roll-out of that role, family and level, or None."""
-        for roll_out in self.roll_outs:
-            entry = roll_out.entry
-            place = entry.reporting
-            fits = entry.role == role and family in (None, place.family) and level in (None, place.level)
-            if fits and roll_out.status in USABLE:
-                return roll_out
-        return None
-
     @property
     def reference(self) -> RollOut | None:
-        """Reference simulation of the scene, or None."""
-        return self.find(role="reference")
+        """Finished reference simulation of the scene, or None."""
+        of_role = (roll_out for roll_out in self.roll_outs if roll_out.entry.role == "reference")
+        return next((roll_out for roll_out in of_role if roll_out.status in USABLE), None)
 
     @property
     def ensemble(self) -> list[RollOut]:

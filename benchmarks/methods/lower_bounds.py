@@ -1,26 +1,23 @@
 """Lower bounds: a clip's vertices optimised directly, and steps minimised over what a network can express.
 
-Lower bound: the vertices of a whole clip optimised directly under the training loss, without a network.
+Vertices of a whole clip are optimised under the training loss, without a network,
 
     min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3} inertia(x_t)
     inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
 
-It is what a network could reach whose output were not bound to its input: it sees the whole clip, the
-future too. All frames are one cloth of T copies, minimised by the L-BFGS of reference_sim on the very terms
-that judge every method; its preconditioner couples no frames. Contact planes are frozen for a round and then
-searched anew (towards the closest point, as the judge has them; training takes the skin's normal there). The
-sum is not convex: a bound found from skinning, not proven to be the lowest. Not a method to run a garment
-with: its time a frame is that of the whole clip divided by its frames.
+which a network could reach whose output were not bound to its input. All frames are one cloth of T copies,
+minimised by the L-BFGS of reference_sim on the very terms that judge every method; its preconditioner couples
+no frames. Contact planes are frozen for a round and then searched anew, towards the closest point. The sum is
+not convex: a bound found from skinning, not proven to be the lowest. Its time a frame is that of the whole
+clip divided by its frames.
 
-Floor of a subspace: each time step minimised over the few numbers a frame that a network would predict.
+The floor of a subspace is the simulation, from its own past and with its own contact planes, whose cloth can
+only do what the subspace expresses: handles, or all that the last layer of a network can give,
 
     x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)       M: skinning, r: the unposed garment, m + U q: its offsets
 
-It is the simulation, from its own past and with its own contact planes, whose cloth can only do what the
-subspace expresses: handles, or all that the last layer of a network can give (for ridge on principal
-components these components, for SNUG the span of its last 256 numbers). So the excess of a network over the
-reference splits into the floor's, which no training removes, and the rest, which its training has not
-learned. Both are roll-outs with a past of their own, so that the rest may be negative where cloth is chaotic.
+So the excess of a network over the reference splits into the floor's, which no training removes, and the
+rest, which its training has not learned; that may be negative where cloth is chaotic.
 """
 
 from __future__ import annotations

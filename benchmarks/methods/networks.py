@@ -1,18 +1,12 @@
 """Methods that need a body: trained networks, collision post-processing, skinning.
 
-Collision post-processing: vertices below or within 2 mm of the skin are pushed out to 2 mm.
+Collision post-processing pushes vertices below or within 2 mm of the skin out to 2 mm,
 
     x' = x + max(2 mm - n.(x - c), 0) n      c: closest body point that x may touch, n: the skin's normal
 
 The released SNUG models and Santesteban 2019 end with such a step, so numbers from them are post-processed.
-Here it is never part of a network's row: it is a method of its own, and its time is on that method's clock.
-One push for each vertex, none for edges and faces: where skin is hollow a vertex may end nearer than 2 mm,
-and a long edge may still cut through the body.
-
-Skinning alone: the garment follows the body's joints. The free baseline of every table.
-
-Weights are smoothed as much as those of the networks' default recipe, so that what a network adds to
-skinning is all that tells them apart.
+Here it is a method of its own, and its time is on that method's clock. One push for each vertex, none for
+edges and faces: where skin is hollow a vertex may end nearer, and a long edge may still cut the body.
 """
 
 from __future__ import annotations
@@ -172,7 +166,10 @@ def make_post_processed_network(*, models: Path, seed: int, kind: str) -> PostPr
 
 
 class Skinning(Method):
-    """One linear blend a frame; joint transforms are ready before, as for the networks."""
+    """One linear blend a frame; joint transforms are ready before, as for the networks.
+
+    Weights are smoothed as much as those of the networks' default recipe: the rest is what a network adds.
+    """
 
     def prepare(self, scene: BuiltScene) -> None:
         """Smooth the weights and make the joint transforms. Not timed."""

@@ -1,9 +1,8 @@
-"""Methods from outside: programs that read an exported scene, and stored roll-outs.
+"""Methods from outside: stored roll-outs, and programs with their own environment.
 
-Method that is a program with its own environment: it reads an exported scene and writes a roll-out.
-
-What its start, its imports and its files take is no work of the method, so the harness's clock says nothing
-of it. A time of its own that it writes beside the positions is reported, and marked as declared.
+A program reads an exported scene and writes a roll-out. Its start, its imports and its files are no work of
+the method, so the harness's clock says nothing of it. A time that it writes beside the positions is reported,
+and marked as declared.
 """
 
 from __future__ import annotations

@@ -1,16 +1,12 @@
-"""Solvers that begin at the frame of a network or of skinning.
-
-Warm-started solver: a network's frame, or skinning's, as first guess of a step, then a few iterations.
+"""Solvers that begin each step at the frame of a network or of skinning, then take a few iterations.
 
 The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while the
 network sees what it always sees. Contact planes are frozen at the first guess, as for every solver. The time
 of the network or of skinning is that of run(); posed body, features and joint transforms are ready before.
 
-Transport of a solver's residual: what it added to a network's frame is carried by the skin to the next.
-
 A network's error changes slowly: cloth that it puts too deep, or hangs too stiffly, is so in the next frame
-too. So the next first guess is the network's frame and a share of the last residual, turned as skinning turns
-the vertex.
+too. So the first guess may be the network's frame and a share of what the solver added to the last one,
+turned as skinning turns the vertex.
 """
 
 from __future__ import annotations

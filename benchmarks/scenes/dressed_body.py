@@ -3,11 +3,6 @@
 Before the motion starts the garment settles: the body, already facing and standing as in the first frame,
 moves its limbs from the T-pose into the first pose, then holds still for a while. A part of a motion begins
 with the positions and velocities that a simulation from the motion's own first frame has there.
-
-Scene of the mesh and time-step study: the T-shirt of a given size, at a given time step.
-
-How much of every headline number is the mesh's or the time step's: numbers of two meshes are two definitions
-of the energy, of contact and of curvature, so they are reported and never judged.
 """
 
 from __future__ import annotations
@@ -172,7 +167,11 @@ WARM_UP = 2  # it starts at rest, and few frames are simulated
 def build_dependence(
     scene: Scene, assets: Assets, *, dependence: Dependence, vertices: int = 0, substeps: int = 1
 ) -> BuiltScene:
-    """Build the scene; `vertices` of the garment, by default the middle mesh, and `substeps` of a frame."""
+    """Build the scene with so many `vertices`, by default those of the middle mesh, and `substeps` a frame.
+
+    Numbers of two meshes are two definitions of the energy, of contact and of curvature, so they are
+    reported and never judged.
+    """
     garment = find_template(scene.garment).tailor(assets.body, vertices=vertices or dependence.middle)
     motion = make_motion(scene.motion).cut(0, dependence.frames)
     tailored = replace(assets, garments={scene.garment: garment}, motions={scene.motion: motion})

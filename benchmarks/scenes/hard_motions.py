@@ -1,15 +1,10 @@
 """Scenes of motions made hard for a network: too fast, too far, an extreme body, very long.
 
-Scenes of a walk made hard: too fast, too far, an extreme body, a glitch, another material.
+Walks made hard start in the walk's first pose and share its settled shirt; but for the extreme shapes, which
+start in T-pose in the shirt's own rest shape, fitted to that body.
 
-All start in the walk's first pose and share its settled shirt; but for the extreme shapes, which start in
-T-pose in the shirt's own rest shape, fitted to that body.
-
-Scenes of a thousand frames and more, for networks alone: does a garment end where it began?
-
-Nobody simulates so long, so there is no body to collide with. Of ten thousand frames the body alone would
-take gigabytes. Only some frames are kept: those of two stretches that show the same motion, early and late,
-and of a loop one in fifty besides.
+Nobody simulates a thousand frames and more, so there is no body to collide with. Only some frames are kept:
+those of two stretches that show the same motion, early and late, and of a loop one in fifty besides.
 """
 
 from __future__ import annotations

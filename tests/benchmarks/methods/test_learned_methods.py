@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from benchmarks.methods import FURTHER_METHODS, METHODS, find_method
+from benchmarks.methods import METHODS
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results.run_folder import RunFolder, model_path
@@ -20,27 +20,6 @@ from tests.snug.training.dressing import swaying, tube_dress
 
 def plan(*options):
     return planned("full:garments", *options)
-
-
-def methods(*options):
-    return {cell.method for cell in plan(*options).cells}
-
-
-def test_they_run_when_named_and_not_otherwise(tmp_path):
-    further = {entry.name for entry in FURTHER_METHODS}
-    out = ("-o", str(tmp_path))
-    assert not further & methods(*out)
-    assert further < methods(*out, "--methods", "*")
-    named = methods(*out, "--methods", "snug-no-*")
-    assert named == {
-        "snug-no-bending",
-        "snug-no-strain",
-        "snug-no-gravity",
-        "snug-no-collision",
-        "snug-no-inertia",
-        "snug-no-noise",
-    }
-    assert further < {cell.method for cell in planned("paper:garments", *out).cells}
 
 
 @pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
@@ -60,13 +39,6 @@ def test_an_ablation_trains_as_long_as_the_whole():
     # A network of its own: more swing and less strain both come with steps.
     assert steps("snug-dynamic") == quick.steps["dynamic"] > quick.steps["snug"]
     assert steps("pbns-springs") == quick.steps["pbns"] and steps("untrained") == 0
-
-
-def test_what_is_cleaned_up_is_a_row_of_its_own_over_the_same_network(tmp_path):
-    cleaned = find_method("snug+cleanup")
-    assert cleaned.trained == find_method("snug").trained
-    chosen = plan("-o", str(tmp_path), "--methods", "snug,snug+cleanup", "--seeds", "0,1")
-    assert [(n.name, n.seed) for n in chosen.networks] == [("snug", 0), ("snug", 1)]
 
 
 CHECKPOINT = ".snug-seed0.checkpoint.safetensors"

@@ -15,7 +15,6 @@ from benchmarks.runner.measurements import measured
 from benchmarks.scenes import dressed_body as module
 from benchmarks.scenes import find_scene
 from snug.body.parametric_body import Body
-from tests.benchmarks.plan.planned import planned
 
 SIZES = Dependence((200,), 200, (1, 2), 4, 4)
 SCENES = ("dependence/mesh/200", "dependence/dt/60")
@@ -77,20 +76,6 @@ def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
     mine = dataclasses.replace(assets.body, template=np.zeros((7, 3)))
     with pytest.raises(ValueError, match="200 vertices on a body of 7"):
         built("dependence/dt/60", dataclasses.replace(assets, body=mine))
-
-
-@pytest.mark.parametrize("study", ["smoke", "full", "paper"])
-def test_a_study_asks_for_the_meshes_and_steps_of_its_sizes(study):
-    plan = planned(f"{study}:validation")
-    sizes, further = plan.preset.dependence, study == "paper"
-    assert {cell.scene.name for cell in plan.cells} == {
-        *(f"dependence/mesh/{count}" for count in sizes.meshes),
-        *(f"dependence/dt/{30 * count}" for count in sizes.substeps[1:]),
-    }
-    printed = {"simulation-printed-bending"} if further else set()
-    assert {cell.method for cell in plan.cells} == {"simulation", "skinning", "newton-1"} | printed
-    assert sizes.middle in sizes.meshes and sizes.substeps[0] == 1
-    assert not planned("default:validation").cells
 
 
 def test_no_network_meets_a_garment_that_it_was_not_trained_for():

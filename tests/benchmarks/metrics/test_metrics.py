@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import icosphere, right_grid
-from benchmarks.methods import METHODS
 from benchmarks.metrics import declared, find_metric
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
@@ -178,17 +177,6 @@ def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_reference
     assert metrics["body/self_intersection_frame"] == 2.0
     roll_out.entry.role = "learned"
     assert measure_body(roll_out) == {}
-
-
-def test_families_hold_every_level_from_coarse_to_fine():
-    families: dict[str, list[str]] = {}
-    for entry in sorted(
-        (e for e in METHODS if e.reporting.level is not None), key=lambda e: e.reporting.level
-    ):
-        families.setdefault(entry.reporting.family, []).append(entry.name)
-    assert families["lbfgs"] == ["lbfgs-5", "lbfgs-10", "lbfgs-20", "lbfgs-40"]
-    assert families["snug+newton"] == [f"snug+newton-{count}" for count in (1, 2, 4, 8)]
-    assert all(entry.reporting.level for entry in METHODS if entry.truncated)
 
 
 def test_every_metric_has_a_unit_a_title_and_a_definition_and_a_pattern_serves_a_new_term():

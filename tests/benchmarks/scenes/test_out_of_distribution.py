@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import Assets
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods import find_method
 from benchmarks.methods.networks import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.roll_out import EXTRAPOLATION, judge, measure_extrapolation
@@ -250,27 +250,6 @@ def cells(*words):
     return planned(*words).cells
 
 
-def test_part_extremes_trains_what_it_needs():
-    assert len({cell.scene.name for cell in cells("default:extremes")}) == 6
-    selection = cells("full:extremes")
-    assert {cell.scene.name for cell in selection} == {scene.name for scene in OUT_OF_DISTRIBUTION}
-    methods = {"simulation", "skinning", "snug", "supervised", "pbns", "snug+fast-lbfgs-1", "fast-lbfgs-10"}
-    assert {cell.method for cell in selection} == methods
-    alone = {cell.method for cell in selection if cell.scene.name == "out_of_distribution/long"}
-    assert alone == {"snug", "supervised", "pbns"}
-    assert len({cell.scene.name for cell in cells("smoke:extremes")}) == 3
-    named = {cell.scene.name for cell in cells("smoke:extremes", "--scenes", "*splits")}
-    assert named == {"out_of_distribution/splits"}
-
-
-def test_a_network_does_hard_motions_under_its_own_name_alone():
-    words = ("default:extremes", "--methods", "snug*,pbns*,tailornet,snug-no-noise")
-    names = {cell.method for cell in cells(*words)} - {"snug+fast-lbfgs-1"}  # a solver from its frame
-    batched = {entry.name for entry in METHODS if entry.batched}
-    assert names <= batched and {"snug", "pbns", "tailornet"} <= names
-    assert not any("+" in name for name in names)
-
-
 def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_path, monkeypatch):
     selection = cells("full:extremes", "--scenes", "*splits,*girth_+5", "--methods", "simulation")
     plan = plan_of(tmp_path, selection)
@@ -289,11 +268,3 @@ def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_pat
     assert len(settled) == 1 and np.array_equal(one, other) and not np.allclose(one, fitted)
     areas = np.load(context.folder.rest_areas_path("out_of_distribution/ordinary"))
     assert np.array_equal(areas, settled[0].areas)
-
-
-def test_cells_that_nobody_times_run_beside_others(tmp_path):
-    selection = cells("full:extremes", "--scenes", "*walk_x4")
-    plan = plan_of(tmp_path, selection)
-    tasks = [task for task in tasks_of(plan) if task.kind in ("cell", "batch", "repeat", "quasi-static")]
-    assert {task.kind for task in tasks} == {"cell"} and len(tasks) == len(selection)
-    assert not any(task.process for task in tasks)

@@ -11,10 +11,9 @@ import pytest
 
 from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets, read_inputs
 from benchmarks.meshes import sphere, square_sheet
-from benchmarks.methods import find_method
 from benchmarks.metrics.scene_facts import measure_body_shape
 from benchmarks.plan.plan import network_of
-from benchmarks.presets import PRESETS, find_preset
+from benchmarks.presets import find_preset
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES, all_scenes
@@ -37,14 +36,6 @@ def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
     assert first.terms[-1] == "inertia" and len(set(first.terms)) == len(first.terms)
     assert (first.obstacle is not None) == ("collision" in first.terms)
     assert first.dressed is None
-
-
-def test_the_terms_are_those_of_the_descriptions():
-    built = {scene.name: scene.at(SMOKE).build() for scene in SCENES}
-    assert built["hanging_sheet"].terms == ("strain", "bending", "gravity", "inertia")
-    assert built["sheet_on_sphere"].terms == ("strain", "bending", "gravity", "collision", "inertia")
-    assert built["free_fall"].terms == ("gravity", "inertia")
-    assert built["free_fall"].exact is not None
 
 
 def test_scene_names_are_unique_and_a_dressed_scene_needs_assets():
@@ -106,18 +97,6 @@ def test_how_far_a_shape_is_from_the_mean_is_said_once():
     assert of("reference", None) == {"body/shape": 0.0} and of("network", None) == {}
 
 
-def test_shapes_are_asked_for_by_name_or_by_the_largest_preset():
-    def scenes(*options):
-        return [cell.scene.name for cell in planned("--methods", "simulation", *options).cells]
-
-    every = [scene.name for scene in shapes("kick")]
-    assert scenes("full:shapes") == every == scenes("--scenes", "shapes/*")
-    assert not {*scenes(), *scenes("full:garments")} & set(every)
-    assert set(every) <= set(scenes("paper"))
-    cells = planned("full:shapes", "--methods", "snug*").cells
-    assert {c.suites for c in cells} == {("shapes",)} and "snug-shapes" in {c.method for c in cells}
-
-
 def test_the_sheet_is_a_square_without_slivers():
     positions, faces = square_sheet(9, 0.4)
     corners = positions[faces]
@@ -158,11 +137,6 @@ def test_a_scene_of_no_sensible_duration_is_refused(field, value, says):
         dataclasses.replace(built, **{field: value})
 
 
-def test_presets_grow():
-    sizes = [preset.garment_vertices for preset in PRESETS]
-    assert sizes == sorted(sizes) and [preset.name for preset in PRESETS] == ["smoke", "quick", "paper"]
-
-
 def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
     """And each scene is built with its own: the tunic is not the T-shirt."""
     assets = open_assets(TINY, embedded_motions(["twist_stop"]), ["tunic"])
@@ -172,54 +146,6 @@ def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
     assert len(built.cloth.rest_positions) == pytest.approx(300, abs=3)
     with pytest.raises(KeyError):
         dressed_scene("twist_stop").build(assets)
-
-
-def test_networks_are_trained_for_the_garment_and_on_the_motions_of_their_scenes():
-    plan = planned("--scenes", "tunic/*,tshirt/kick", "--methods", "simulation,snug,snug-dynamic")
-    assert set(plan.garments) == {"tshirt", "tunic"}
-    tested = {name for garment in plan.garments for name in plan.motions.by_role(garment)["test"]}
-    assert tested and not set(plan.motions.train) & tested
-    assert {(n.name, n.garment) for n in plan.networks} == {
-        (name, garment) for name in ("snug", "snug-dynamic") for garment in plan.garments
-    }
-    learning = {n.garment for n in plan.networks if n.training and n.training.simulated}  # snug-dynamic does
-    assert learning == {"tshirt", "tunic"}
-    keys = {key_of(Schedule(plan).network(network)) for network in plan.networks}
-    assert len(keys) == 4
-
-
-def test_a_plain_run_wears_the_t_shirt_and_suite_speed_swings_a_skirt_without_networks():
-    assert planned().garments == ("tshirt",)
-    speed = planned("full:speed")
-    skirts = [cell for cell in speed.cells if cell.scene.garment == "skirt"]
-    assert len({cell.method for cell in skirts}) >= 10
-    assert not any(find_method(cell.method).trained for cell in skirts if cell.entry.skip(cell.scene) is None)
-
-
-def test_suite_speed_has_clips_of_the_split():
-    for split, names in (
-        ("test", {"01_01_a", "push_recovery", "dance_turn"}),
-        ("validation", {"sudden_stop", "05_02_a", "turning_stop"}),
-    ):
-        plan = planned("full:speed", "--set", f"split={split}")
-        assert {scene.motion for scene in plan.scenes if scene.garment == "tshirt"} == names
-        assert {plan.motions.role_of(scene.motion) for scene in plan.scenes if scene.dressed} == {split}
-
-
-def test_validation_has_a_walk_that_turns_as_none_that_the_t_shirt_trains_on():
-    plan = planned("full:speed", "--set", "split=validation")
-    cells = [cell for cell in plan.cells if cell.scene.name == "tshirt/turning_stop@clip"]
-    assert {"simulation", "snug", "lbfgs-5"} <= {cell.method for cell in cells}
-    assert "turning_stop" in plan.motions_of("tshirt") and "turning_stop" not in plan.motions.train
-    body, whole = Body.load(), make_motion("turning_stop")
-    frames = liveliest_part(body, whole, plan.preset.clip_frames)
-    walk = whole.cut(frames.start, frames.stop)
-    assert joint_speeds(body, walk).min() > 0.5  # [m/s] it is over before the stop
-    pace = np.linalg.norm(np.ptp(walk.translations[:, [0, 2]], axis=0)) / walk.duration
-    assert 0.6 < pace < 1.6
-    for name in plan.motions.train:  # nobody's heading and strides together
-        nearest = np.abs(walk.poses[:, None] - make_motion(name).poses).max(axis=(2, 3)).min(axis=1)
-        assert nearest.mean() > np.radians(10), name
 
 
 def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_path):
