@@ -46,11 +46,9 @@ def tables(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
         names = [label for key, label in judged.items() if far.get(key)]
         if absent := sum(key not in values for key in judged):
             names.append(f"{absent} not measured")
-        budget = values.get((engine, "budget"))
-        limit = f"{engine}/x{budget or 0:.0f}"  # the least budget that is near it
-        places = ((f"{engine}/x1", "time"), (f"{engine}/x1", "distance"), (limit, "time"))
-        default, distance, converged = map(values.get, places)
-        reference = values.get((engine, "reference_time"))
+        budget, reference = (values.get((engine, law)) for law in ("budget", "reference_time"))
+        default, distance = (values.get((f"{engine}/x1", law)) for law in ("time", "distance"))
+        converged = values.get((f"{engine}/x{budget or 0:.0f}", "time"))
         audit.append([engine, ", ".join(names) or "nothing", default, distance, budget, converged, reference])
         laws.append([engine, *(errors.get((engine, law)) for law in LAWS)])
     heads = list(HEADS)

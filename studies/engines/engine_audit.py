@@ -273,10 +273,9 @@ def _within(runs: dict[int, RollOut]) -> int | None:
 
     None where only the largest is.
     """
-    limit = runs[max(runs)]
     least = None
     for budget in sorted(runs, reverse=True)[1:]:
-        if distance(runs[budget], limit) > CONVERGED:
+        if distance(runs[budget], runs[max(runs)]) > CONVERGED:
             break
         least = budget
     return least

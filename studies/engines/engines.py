@@ -114,7 +114,7 @@ def _mujoco(integrator: str, settings: str, **declared: Any) -> Engine:
     )  # fmt: skip
 
 
-_DECLARED = (
+ENGINES: dict[str, Engine] = {engine.name: engine for engine in (
     REFERENCE,
     _newton("vbd", "VBD", "VBD", 20),
     _newton("vbd_frame", "VBD, one step a frame", "VBD", 1, factors=(1, 4, 16, 64, 256, 1024),
@@ -123,5 +123,4 @@ _DECLARED = (
     _newton("style3d", "Style3D", "Style3D", 4),
     _mujoco("Euler", "the default is 2 ms and integrator Euler", factors=(1, 4, 16, 64, 256)),
     _mujoco("discrete", "integrator discrete, as its manual advises"),
-)  # fmt: skip
-ENGINES: dict[str, Engine] = {engine.name: engine for engine in _DECLARED}
+)}  # fmt: skip

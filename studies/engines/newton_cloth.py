@@ -248,8 +248,7 @@ class NewtonSolver(Method):
         import newton
 
         scene, pins = self.scene, self.scene.cloth.pins
-        x = scene.start
-        v = scene.start_velocity
+        x, v = scene.start, scene.start_velocity
         positions, seconds, status, reason = [x], [0.0], "ok", ""
         clock = time.perf_counter()
         for frame in range(1, scene.frames):
