@@ -17,6 +17,8 @@ from benchmarks.validation.equilibrium import minimum, motion, order
 from reference_sim import energies
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from reference_sim.obstacle import Planes
 
 
@@ -80,25 +82,39 @@ PULL = 2.0  # [N/m] at its ends, about, so that it never hangs slack
 
 
 class RoundBody:
-    """Sphere about the origin, or (axis=2) cylinder about the z axis, of `radius` [m]."""
+    """Sphere about the origin, or (axis=2) cylinder about the z axis, of `radius` [m]; its skin is exact.
+
+    Its centre is at `heights` (T,) [m], frame by frame. It turns about z by `turn` [rad] a frame: its face
+    has the turned unit vectors as corners, so that "barycentric" coordinates on it are the coordinates of a
+    point in the frame that turns.
+    """
 
     fingerprint = "round"
+    faces = np.array([[0, 1, 2]])
 
-    def __init__(self, radius: float, axis: int | None = None) -> None:
-        self.radius = radius
+    def __init__(
+        self, radius: float, axis: int | None = None, *, turn: float = 0.0, heights: ArrayLike = (0.0,)
+    ) -> None:
+        self.radius, self.turn, self.heights = radius, turn, np.asarray(heights)
         self.keep = np.ones(3)
         if axis is not None:
             self.keep[axis] = 0.0
 
+    def at(self, frame: int) -> np.ndarray:
+        """Return the turned unit vectors of a frame, (3, 3)."""
+        c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
+        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
-        """Return tangent planes below points (S, 3); faces and places on them do not exist."""
+        """Return tangent planes below points (S, 3) [m] in a frame, with places on the turning skin."""
         from reference_sim.obstacle import Planes
 
+        centre = np.array([0.0, self.heights[min(frame, len(self.heights) - 1)], 0.0])
+        points = points - centre
         radial = points * self.keep
         normals = radial / np.linalg.norm(radial, axis=1, keepdims=True)
-        count = len(points)
-        nowhere = np.zeros(count, dtype=np.int64), np.zeros((count, 3))
-        return Planes(points - radial + self.radius * normals, normals, *nowhere)
+        skin = points - radial + self.radius * normals
+        return Planes(skin + centre, normals, np.zeros(len(points), dtype=np.int64), skin @ self.at(frame).T)
 
 
 @known_answer(expected=1.0, tolerance=2e-3, reason="second order in dt; the point's depth over R")

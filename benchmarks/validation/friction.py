@@ -1,45 +1,35 @@
-"""Coulomb friction on a plane: a patch on a slope and on a belt, and one that is pulled by a spring.
+"""Known answers of Coulomb friction: a patch on a slope and a belt, a point on a spring, a strip, a capstan.
 
-All vertices of a patch of vertex samples press alike, for k and the mass are per area: the patch keeps its
-shape and moves as a point. With u its slip speed over that of the smoothing, the step of backward Euler is
+Patch: all vertices press alike, for k and the mass are per area, so it keeps its shape and moves as a point.
+With u its slip speed over that of the smoothing, a step of backward Euler on a slope of tan(a) = r mu is
 
     u' = u + c (r - f'(u')),   c = dt mu g cos a / speed,   f'(u) = 2 u - u^2 for u < 1, else 1     (1)
 
-on a slope of tan(a) = r mu, which says all that follows: below the angle of friction the patch creeps at
-1 - sqrt(1 - r) of the smoothing's speed, above it the path is that of a constant force.
+Below the angle of friction it creeps at 1 - sqrt(1 - r) of the smoothing's speed, above it the path is that
+of a constant force.
 
-Coulomb friction of what is pulled over a table: a point by a spring, and a strip by its end.
+Point: the apex of a triangle that is its spring, held at the two other corners: it moves on a line. It sticks
+until the spring pulls with mu m g, and ends up behind the handle with that very pull, by steps of
 
-The point is a triangle's apex, its spring the triangle, held at the two other corners: by symmetry it moves
-on a line. It sticks until the spring pulls with mu m g, and ends up behind the handle with that very pull,
-for sliding costs what breaking loose does. In between it swings, step by step as
+    m (x' - x - dt v) / dt^2 = T(handle' - x') - mu m g f'(|x' - x|),   T of uniaxial strain
 
-    m (x' - x - dt v) / dt^2 = T(handle' - x') - mu m g f'(|x' - x|)                                    (1)
-
-with the closed form T of a triangle in uniaxial strain.
-
-The strip, of modulus E2 and Poisson's ratio 0, slides from the pulled end on, and sticks beyond: its tension
+Strip, of modulus E2 and Poisson's ratio 0, pulled over a table: it slides from the pulled end on. Its tension
 per width falls by q = mu rho_a g per length from the pull F to zero over F/q, so the end is at
 
     u(F) = integral over 0 <= X <= F/q of s(q X) - 1,    E2 s (s^2 - 1)/2 = T at stretch s              (2)
 
-until all of length L slides, with F = q L, about mu rho_a g L^2 / (2 E2) from where it was.
+until all of length L slides, with F = q L.
 
-Capstan: a strip held at both ends over a drum that turns under it; the pulls differ by exp(mu phi).
-
-Everything slips one way, and nothing moves any more once the tension has found its profile, so the friction
-of each vertex is mu N on its own tangent. Where the strip turns by b at a vertex whose normal halves the
-turn, forces along and across the tangent balance where
+Capstan: a strip held at both ends over a drum that turns under it. Once the tension has found its profile the
+friction of each vertex is mu N on its own tangent. Where the strip turns by b, forces balance where
 
     (T2 - T1) cos(b/2) = mu N,    (T2 + T1) sin(b/2) = N,    T2/T1 = (1 + mu tan(b/2))/(1 - mu tan(b/2))
 
-which over n turns of phi/n is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2) phi b^2/12 in its
-logarithm. On a penalty the strip also sinks into the margin towards the tight end, against its normals.
+which over a turn of phi is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2) phi b^2/12 in its logarithm.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +44,7 @@ from benchmarks.validation.large_bending import HANGING_MATERIAL, WEIGHT, string
 from reference_sim import energies
 
 if TYPE_CHECKING:
-    from reference_sim.obstacle import Planes
+    pass
 
 MU = 0.5
 SPEED = 0.02  # [m/s] of the smoothing
@@ -297,30 +287,6 @@ HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep in the margin as on
 TURN = 0.02  # [rad] of the drum in a step
 
 
-class TurningDrum(RoundBody):
-    """Cylinder about the z axis, turning by `turn` [rad] a step; its skin is known exactly.
-
-    Its one face has the turned unit vectors as corners, so that "barycentric" coordinates on it are the
-    coordinates of a point in the frame that turns.
-    """
-
-    faces = np.array([[0, 1, 2]])
-
-    def __init__(self, radius: float, turn: float) -> None:
-        super().__init__(radius, axis=2)
-        self.turn = turn
-
-    def at(self, frame: int) -> np.ndarray:
-        """Return the turned unit vectors of a frame, (3, 3)."""
-        c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
-        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-
-    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
-        """Return tangent planes below points (S, 3) [m], with places on the turning skin."""
-        tangent = super().planes(points, frame)
-        return dataclasses.replace(tangent, barycentric=tangent.points @ self.at(frame).T)
-
-
 @known_answer(
     {"friction_capstan_rough": {"mu": 0.5}, "friction_capstan_smooth": {"mu": 0.1}},
     expected=1.0, tolerance=1e-3, reason="60 cells: mu (1 + mu^2) phi b^2 / 12, at most 8e-4",
@@ -342,7 +308,7 @@ def _excess(mu: float, columns: int) -> float:
     ends = points[:, 0] < 1e-9, points[:, 0] > points[:, 0].max() - 1e-9
     contact = energies.ContactPenalty(cloth, samples="vertices", stiffness=HARD)
     friction = energies.ContactFriction(contact, coefficient=mu, speed=1e-3 * DRUM * TURN)
-    body: Any = TurningDrum(DRUM, TURN)
+    body: Any = RoundBody(DRUM, axis=2, turn=TURN)
     x = motion(
         cloth, [energies.StretchStVK(cloth), contact, friction], dt=1.0, frames=40, obstacle=body,
         start=start, guess="previous", quasi_static=True, tolerance=1e-9,

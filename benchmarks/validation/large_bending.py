@@ -1,33 +1,21 @@
-"""Large bending with a known answer: elastica, catenary, lateral buckling, slit annulus.
+"""Large bending with a known answer: elastica, hanging strips, lateral buckling, slit annulus.
 
-Elastica: a clamped strip against Euler's, which scipy integrates.
+Elastica: a clamped strip against Euler's. Hinges stand for a plate stiffness D that depends on the mesh (see
+plates.py), so D, and where the clamp acts, are calibrated from small deflections (see clamped_strip.py).
 
-Hinges stand for a plate stiffness D that depends on the mesh (see plates.py). So D, and where the clamp acts,
-are calibrated once per mesh from small deflections (see clamped_strip.py), and what is judged is the shape at
-large ones.
+Hanging strip and catenary, with lambda = 0: a string of force N = E2 s (s^2 - 1)/2 per width at stretch s,
+whose weight gives the force at each of its points; integrated by scipy.
 
-Equilibria with an exact curve: a hanging strip and the elastic catenary, both with lambda = 0.
-
-Then a strip is a string of force N = E2 s (s^2 - 1)/2 per width at stretch s, and a strip of 1 m under its
-weight w = rho_a g per area follows from the force at each of its points, integrated here by scipy.
-
-Lateral buckling: a strip on edge, clamped at one end, gives way sideways under a load or its own weight.
-
-P = 4.0126 (EI GJ)^0.5 / L^2 at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread
-evenly over the length (Timoshenko and Gere, Theory of Elastic Stability), the limit of narrow strips of the
-test of Romero et al. 2021. On equilateral triangles the hinges are an
-isotropic plate (see plates.py) with D = k/4 and nu = -1/3, so for a narrow strip of width b
-EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
+Lateral buckling: a strip on edge, clamped at one end, gives way sideways under P = 4.0126 (EI GJ)^0.5 / L^2
+at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread evenly over the length
+(Timoshenko and Gere, Theory of Elastic Stability), the limit of narrow strips of the test of Romero et al.
+2021. Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
 
 Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line load.
-
 E = 21 MPa, nu = 0, thickness 0.03 m, radii 6 and 10 m, 0.8 N/m on the free lip. Shells of the literature
-lift its inner corner by 13.891 m and the outer by 17.528 m.
-
-The mesh is made of equilateral triangles, where hinges are a plate of one D (see plates.py), mapped to the
-annulus by exp, which is conformal: they stay equilateral. Such a plate has nu = -1/3, so its D is C11 = k/4,
-and the energy of Gaussian curvature makes it one of nu = 0 (see gaussian_curvature.py). Without that term the
-limit is another plate, which the load lifts less.
+lift its inner corner by 13.891 m and the outer by 17.528 m. Equilateral triangles are mapped to the annulus
+by exp, which is conformal. Such a plate has nu = -1/3, so its D is C11 = k/4, and the energy of Gaussian
+curvature makes it one of nu = 0; without that term the limit is another plate, which the load lifts less.
 """
 
 from __future__ import annotations

@@ -1,22 +1,15 @@
-"""Strain and stress of St. Venant and Kirchhoff in the arrays of scikit-fem, for forms of the known answers.
+"""Known answers of the membrane: closed forms, scikit-fem, a clamped sheet, a chosen equilibrium.
 
     G = (F^T F - 1) / 2,   S = lambda tr(G) 1 + 2 mu G
 
-F is (d, 2, ...), the gradient of the positions; G and S are (2, 2, ...). No code is shared with the energies
-of the simulator, which the forms check.
+F is (d, 2, ...), the gradient of the positions; G and S are (2, 2, ...). No code is shared with the energies.
 
-A square sheet pulled between two clamps, against quadratic triangles of scikit-fem.
+Clamped: a square sheet pulled between two clamps that hold its width necks: no closed form, but a smooth
+reference by quadratic triangles of scikit-fem. Both are held in their plane, here by a large hinge stiffness.
 
-The clamps hold the width, so the sheet necks: no closed form, but a smooth reference. Both are held in their
-plane, here by a large hinge stiffness (flat hinges do no work), there by having two coordinates.
-
-A membrane under the forces that make a chosen smooth surface its equilibrium.
-
-    x(X, Y) = (1.15 X + 0.04 sin pi X sin pi Y, 1.1 Y + 0.05 X Y (1 - Y), 0.15 sin pi X sin pi Y)
-
-The forces are those of the weak form, f_a = int P(grad x) grad phi_a, by quadrature of order 8 in scikit-fem,
-and the border is held on the surface; what the mesh then makes of it may differ by the error of linear
-triangles alone: h^2 in the mean square, h in the gradient.
+Manufactured: forces that make x(X, Y) = (1.15 X + 0.04 b, 1.1 Y + 0.05 X Y (1 - Y), 0.15 b), b = sin pi X
+sin pi Y, an equilibrium, f_a = int P(grad x) grad phi_a by quadrature of order 8. What the mesh makes of it
+may differ by the error of linear triangles alone: h^2 in the mean square, h in the gradient.
 """
 
 from __future__ import annotations

@@ -1,31 +1,22 @@
-"""Hinges as bending: folded strips, Gaussian curvature, plates.
+"""Hinges as bending: folded strips, the plate that they stand for, Gaussian curvature.
 
-Gaussian curvature as an energy: the part of a plate's bending that Poisson's ratio decides.
-
-Kirchhoff's plate has the energy D/2 [tr(S)^2 - 2 (1 - nu) det(S)] per area, S the curvature tensor. So plates
-of one D that differ in nu differ by a multiple of the total curvature, the integral of K = det(S). On a mesh
-that is the sum of the angle defects of inner vertices (Descartes), and therefore a function of the border
-alone (Gauss and Bonnet):
-
-    sum of defects = 2 pi (inner vertices) - pi (faces) + sum of the face angles at border vertices
-
-Hinges as a plate: the stiffness that they stand for on each family of triangles.
-
-Kirchhoff's plate has the energy D/2 [(w_xx + w_yy)^2 - 2 (1 - nu) (w_xx w_yy - w_xy^2)]. Hinges are no such
-plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles, and on
-equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the edges of
+Kirchhoff's plate has the energy D/2 [tr(S)^2 - 2 (1 - nu) det(S)] per area, S the curvature tensor. Hinges
+are no such plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles,
+and on equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the edges of
 direction t, summed over the three directions of an equilateral mesh of spacing l:
 C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)), there
-1/(2 3^0.5), C11 = k/4.
-
-No other family is isotropic: their stiffness depends on the direction of the fold by up to a factor of 3, see
-the table in docs/notebook/simulator.md. So a plate that can be compared with one of another program has
-equilateral triangles.
+1/(2 3^0.5), C11 = k/4. No other family is isotropic (table in docs/notebook/simulator.md).
 
 Squares with both diagonals, w = x^2/2 at the corners and d above that at the centres: per cell the hinges
 of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy over
 k/2 is 1 - 8 d + 64 d^2, at least 3/4; scaled by l^2/(4 (A1 + A2)) it is 3/8 - 2 d + 24 d^2, at least 1/3.
 Alternating diagonals are the same tiling turned by 45 degrees: 3/4 again, and 5/24.
+
+Plates of one D that differ in nu differ by a multiple of the total curvature, the integral of K = det(S). On
+a mesh that is the sum of the angle defects of inner vertices (Descartes), and therefore a function of the
+border alone (Gauss and Bonnet):
+
+    sum of defects = 2 pi (inner vertices) - pi (faces) + sum of the face angles at border vertices
 """
 
 from __future__ import annotations
