@@ -2,8 +2,8 @@
 
 Kirchhoff's plate has the energy D/2 [tr(S)^2 - 2 (1 - nu) det(S)] per area, S the curvature tensor. Hinges
 are no such plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles,
-and on equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the edges of
-direction t, summed over the three directions of an equilateral mesh of spacing l:
+and on equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the
+edges of direction t, summed over the three directions of an equilateral mesh of spacing l:
 C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)), there
 1/(2 3^0.5), C11 = k/4. No other family is isotropic (table in docs/notebook/simulator.md).
 
