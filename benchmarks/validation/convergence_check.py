@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -38,16 +37,12 @@ class StressStep:
     weight: float
 
 
-def lbfgs_then_newton(potential: sim.Potential, guess: np.ndarray, **options: Any) -> sim.Result:
-    """Minimise as the simulator does."""
-    return sim.minimise(potential, guess, method="lbfgs", **options)
-
-
 def solve_and_check(step: StressStep) -> Measurement:
     """Minimise as the simulator does, and check the result."""
-    return check_result(
-        step, lbfgs_then_newton(step.potential, step.guess, tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT)
+    result = sim.minimise(
+        step.potential, step.guess, method="lbfgs", tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT
     )
+    return check_result(step, result)
 
 
 def check_result(step: StressStep, result: sim.Result) -> Measurement:

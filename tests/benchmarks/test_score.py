@@ -217,13 +217,10 @@ REFUSED = {
     "no scene": (["mine.npz", "--scene", "flagg"], "did you mean flag"),
     "two scenes": (["mine.npz", "--scene", "tshirt/*"], "are asked for"),
     "kind": (["mine.abc", "--scene", "flag"], "unknown kind of roll-out"),
-    "units": (["mine.npz,units=inch", "--scene", "flag"], "choose from m, cm, mm"),
-    "time": (["mine.npz,ms=0", "--scene", "flag"], "positive"),
     "both": (["mine.npz", "--scene", "flag", "--reference", "a", "--no-reference"], "not allowed"),
     "shape": (["mine.npz", "--scene", "flag"], "has 5 vertices, the cloth of flag 49"),
     "taken": (["snug=mine.npz", "--scene", "flag"], "NAME=FILE"),
     "taken by the file": (["snug.npz", "--scene", "flag"], "snug=snug.npz: a method is called snug"),
-    "name": (["a b=mine.npz", "--scene", "flag"], "the name 'a b' has other than letters"),
     "long": (["mine.npz", "--scene", "flag", "--reference", "a" * 300 + ".npz"], "a" * 300),
     "pattern": (["mine.npz", "--scene", "flag", "--reference", "r_{scene}.npz"], "r_flag.npz: no such file"),
 }

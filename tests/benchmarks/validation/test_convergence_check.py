@@ -126,6 +126,6 @@ def test_a_minimiser_that_lies_is_caught_by_what_the_suite_runs(solved, monkeypa
     lies = [(point, standing, "saddle"), (step, standing, "claims convergence"),
             (step, vanishing, "not finite"), (step, climbing, "rose")]  # fmt: skip
     for case, solve, message in lies:
-        monkeypatch.setattr(convergence_check, "lbfgs_then_newton", solve)
+        monkeypatch.setattr(convergence_check.sim, "minimise", solve)
         checked = solve_and_check(case)
         assert checked.status == "failed" and message in checked.reason, (solve, checked)

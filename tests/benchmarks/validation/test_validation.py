@@ -29,17 +29,10 @@ def test_a_known_answer_is_found(case):
     assert (row.suite, row.scene, row.method, row.metric) == ("validation", case.name, "simulation", "check")
 
 
-def test_there_are_enough_of_every_kind():
+def test_every_case_has_a_name_of_its_own_and_a_reason():
     names = [case.name for case in CASES]
     assert len(set(names)) == len(set(CASES)) == len(names)
-    judged = [case for case in KNOWN_ANSWERS if case.tolerance is not None]
-    assert len(judged) >= 40
-    assert sum(name.endswith("_order") for name in names) >= 9
     assert all(case.reason for case in KNOWN_ANSWERS)
-    # A number is judged against a number: declared, or given by the check itself.
-    modules = {case.module.rpartition(".")[2] for case in judged if case.expected is None}
-    exact = {"membrane", "time_steps", "plates", "large_bending"}
-    assert modules == exact
 
 
 def test_study_smoke_runs_the_quick_ones_unless_one_is_named():
