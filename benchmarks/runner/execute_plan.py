@@ -27,8 +27,6 @@ from benchmarks.runner.task import Outcome, RunRefused, RunStopped
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
 
-ABLATIONS = "--methods 'simulation,skinning,snug,snug-no-*'"
-
 
 def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str = "") -> str:
     """Return the answer, the text of page one if there is one, and one line of counts and times."""
@@ -63,9 +61,6 @@ def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> li
         differences = {remark.partition("; ")[2] for remark in pretrained.values()}
         same = differences.pop() if len(differences) == 1 else "the reasons of their rows say what differs"
         lines.append(f"pretrained, not trained here: {', '.join(pretrained)}; {same}")
-    methods = {row.method for row in rows}
-    if {"snug", "untrained"} <= methods and not any(name.startswith("snug-no-") for name in methods):
-        lines.append(f"not run here, SNUG with one energy of its loss left out: {ABLATIONS}")
     return lines
 
 
@@ -198,9 +193,7 @@ def held(folder: Path) -> Iterator[None]:
     made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise RunRefused(f"--out {folder}: there is a file in the way; name another folder") from None
-    except OSError as error:
+    except OSError as error:  # as where a file is in the way
         raise RunRefused(f"--out {folder}: cannot be made ({error.strerror}); name another folder") from None
     with ExitStack() as closing:
         try:

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.method import Method
-from benchmarks.runner.executor import Executor
 from reference_sim.trajectory import Trajectory
 
 # No other test starts a process by this text, so that the test which looks for it finds its own alone.
@@ -105,11 +104,13 @@ def make(*, models: Path, seed: int, how: str) -> Misbehaving:
 
 def interrupt_at(method: str, monkeypatch) -> None:
     """Whoever runs cells is interrupted from the keyboard when that method's turn has come."""
-    alone = Executor.alone
+    from tests.benchmarks.runner.tasks_by_hand import InProcess  # loads what no process of a cell needs
+
+    alone = InProcess.alone
 
     def interrupted(self, task, needed):
         if f" x {method}" in task.label:
             raise KeyboardInterrupt
         return alone(self, task, needed)
 
-    monkeypatch.setattr(Executor, "alone", interrupted)
+    monkeypatch.setattr(InProcess, "alone", interrupted)

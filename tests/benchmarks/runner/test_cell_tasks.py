@@ -30,6 +30,7 @@ from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scenes import SCENES as DECLARED
 from tests.benchmarks.runner.misbehaving import HANGING_CHILD
+from tests.benchmarks.runner.tasks_by_hand import InProcess
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = {scene.name: scene for scene in DECLARED}
@@ -61,18 +62,19 @@ def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", 
     return Plan(**(values | changes))
 
 
-def finish(plan: Plan, *stages: str) -> Runner:
-    """All tasks of these stages, run or reused."""
+def finish(plan: Plan, *stages: str, processes: bool = False) -> Runner:
+    """All tasks of these stages, run or reused: here, or in processes of their own."""
     tasks = [task for task in tasks_of(plan) if task.stage in (stages or ("cells",))]
-    runner = Runner(tasks, Cache(RunFolder(plan.folder), only=plan.only))
-    runner.run(Executor(RunFolder(plan.folder), None, 1))
+    folder = RunFolder(plan.folder)
+    runner = Runner(tasks, Cache(folder, only=plan.only))
+    runner.run(Executor(folder, None, 1) if processes else InProcess(folder))
     return runner
 
 
-def outcome_of(plan: Plan, number: int = 0) -> Outcome:
+def outcome_of(plan: Plan, number: int = 0, *, processes: bool = False) -> Outcome:
     """Run one cell to the end of its process and return its outcome."""
     one = dataclasses.replace(plan, cells=plan.cells[number : number + 1])
-    return finish(one).outcomes["cell", plan.cells[number].name]
+    return finish(one, processes=processes).outcomes["cell", plan.cells[number].name]
 
 
 def found_of(plan: Plan, kind: str = "cell", number: int = 0):
@@ -101,7 +103,7 @@ def test_only_a_method_of_the_project_is_prepared_before_its_turn(tmp_path):
 
 def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_path):
     plan = plan_of(tmp_path, "simulation", scene="hanging_sheet")
-    outcome = outcome_of(plan)
+    outcome = outcome_of(plan, processes=True)
     result = outcome.result
     assert (outcome.status, len(outcome.files), result["frames"]) == ("ok", 1, 3)
     assert 0.0 < result["seconds"] < 10.0 and 50.0 < result["peak"] < 1000.0
@@ -118,13 +120,13 @@ def test_a_cell_says_how_long_it_took_how_much_memory_and_what_it_loaded(tmp_pat
     assert result["runs"] > 1 or result["seconds"] > TINY.least_seconds
 
 
-@pytest.mark.parametrize("scene", ["hanging_sheet", "sheet_on_sphere"])
+@pytest.mark.parametrize("scene", ["hanging_sheet", pytest.param("sheet_on_sphere", marks=pytest.mark.slow)])
 def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
     """Modules that the process loaded are among the source that its entry in the cache is known by."""
     from benchmarks.runner.cache import dependencies
 
     plan = plan_of(tmp_path, "newton-1", scene=scene)
-    loaded = outcome_of(plan).result["modules"]
+    loaded = outcome_of(plan, processes=True).result["modules"]
     known = dependencies(next(task for task in tasks_of(plan) if task.kind == "cell"))
     ours = {name for name in loaded if name.split(".")[0] in ("reference_sim", "snug")} - NAMES
     files = {name: name.replace(".", "/") for name in ours}
@@ -149,7 +151,7 @@ def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
 )
 def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path):
     plan = plan_of(tmp_path, "newton-1", how=how)
-    runner = finish(plan, "cells", "metrics")
+    runner = finish(plan, "cells", "metrics", processes=how in ("segfault", "killed"))
     outcome = runner.outcomes["cell", plan.cells[0].name]
     assert outcome.status == status and word in outcome.reason and outcome.failed and not outcome.files
     (row,) = rows_of_cell(runner, plan)
@@ -158,9 +160,10 @@ def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word,
     assert (entry.state, entry.wanted) == ("failed", False) and word in entry.why
 
 
+@pytest.mark.slow
 def test_a_cell_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="hang", preset=dataclasses.replace(TINY, cell_seconds=4.0))
-    outcome = outcome_of(plan)
+    outcome = outcome_of(plan, processes=True)
     assert outcome.status == "timeout" and "4 s" in outcome.reason
     deadline = time.monotonic() + 5.0  # what was killed may take a moment to go
     while of_session(os.getsid(0), HANGING_CHILD) and time.monotonic() < deadline:
@@ -181,6 +184,7 @@ sys.exit("it runs on" if stat.exists() and stat.read_text().rpartition(")")[2].s
 """
 
 
+@pytest.mark.slow
 def test_what_a_program_has_started_ends_with_it_before_the_next_cell(tmp_path):
     cells = []
     for name, text, seconds in (("leaving", LEAVING, 3.0), ("looking", LOOKING, 60.0)):
@@ -190,8 +194,9 @@ def test_what_a_program_has_started_ends_with_it_before_the_next_cell(tmp_path):
         entry = program(name, command, seconds=seconds)
         cells.append(Cell(SCENES["free_fall"].at(TINY), entry, 0, ("garments",)))
     runner = finish(
-        plan_of(tmp_path / "run", cells=tuple(cells), suites=("garments",)), "cells that are not timed"
-    )
+        plan_of(tmp_path / "run", cells=tuple(cells), suites=("garments",)), "cells that are not timed",
+        processes=True,
+    )  # fmt: skip
     first, second = (runner.outcomes["cell", cell.name] for cell in cells)
     assert first.status == "timeout" and second.reason.endswith("gone")
 
@@ -210,9 +215,10 @@ def of_session(session: int, word: str = "") -> list[int]:
     return processes
 
 
+@pytest.mark.slow
 def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_path):
     plan = plan_of(tmp_path / "greedy", "newton-1", how="greedy")
-    runner = finish(plan)
+    runner = finish(plan, processes=True)
     name = plan.cells[0].name
     greedy = runner.outcomes["cell", name]
     assert greedy.status == "ok" and greedy.result["peak"] < 300.0
@@ -228,7 +234,7 @@ def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_pa
 )
 def test_what_a_cell_has_run_stands_where_many_go_wrong(how, fragments, tmp_path):
     plan = plan_of(tmp_path, "newton-1", how=how)
-    runner = finish(plan, "cells", "metrics")
+    runner = finish(plan, "cells", "metrics", processes=how == "crammed")
     outcome = runner.outcomes["cell", plan.cells[0].name]
     assert (outcome.status, outcome.failed) == ("ok", False)
     rows = {row.metric: row for row in rows_of_cell(runner, plan)}
@@ -261,6 +267,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_process_ends_when_its_parent_was_killed(tmp_path):
     (tmp_path / "hanging.py").write_text(HANGING)
     parent = subprocess.Popen(
@@ -280,6 +287,7 @@ def test_a_process_ends_when_its_parent_was_killed(tmp_path):
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_killed_run_loses_the_running_cell_alone(tmp_path, monkeypatch):
     out = tmp_path / "run"
     options = ["smoke:speed", "--scenes", "free_fall", "-o", str(out)]

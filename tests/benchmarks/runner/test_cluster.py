@@ -26,7 +26,6 @@ from tests.benchmarks.runner.cluster_by_hand import (
     together,
     write,
 )
-from tests.benchmarks.runner.tasks_by_hand import Bar
 
 distributed = pytest.importorskip("distributed")
 
@@ -41,6 +40,7 @@ def two(tmp_path_factory):
 # --- what comes back ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path):
     here = tmp_path / "here"
     here.mkdir()
@@ -73,14 +73,6 @@ def test_failures_are_values_and_a_batch_stays_together(two, folder):
 
 
 @pytest.mark.slow
-def test_progress_is_told_while_tasks_run(two, folder, monkeypatch):
-    updates = []
-    monkeypatch.setattr(Bar, "update", lambda self, units=1: updates.append(units))
-    together(folder, two.address, [write("one", seconds=7.0), write("two", sleep=1.0)])
-    assert 7.0 in updates
-
-
-@pytest.mark.slow
 def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
     """Bit for bit, but for times: a network that learned from ground truth, and metrics of all frames."""
     monkeypatch.setattr(execution, "make_report", lambda log: "")
@@ -106,6 +98,7 @@ def kept(folder: RunFolder) -> tuple[dict, dict]:
 # --- what is refused ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_line(two, folder, monkeypatch):
     software_of = runner_side.software_of
     other = {"package numpy": "numpy 1.0", "benchmarks/runner/executor.py": "0"}
@@ -129,6 +122,7 @@ def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_li
     assert list(folder.path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_comes_damaged_is_not_kept(two, folder, monkeypatch):
     take = distributed.Future.result
 
@@ -190,6 +184,7 @@ def test_where_nobody_answers_and_without_dask_the_remedy_is_said(monkeypatch):
         scheduler.check_scheduler("tcp://127.0.0.1:1")
 
 
+@pytest.mark.slow
 def test_a_worker_is_no_scheduler(two):
     with distributed.Client(two.address) as client:
         client.wait_for_workers(1, timeout=30.0)

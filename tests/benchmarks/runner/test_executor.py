@@ -86,12 +86,6 @@ def test_a_failure_is_a_value_and_the_others_go_on(tmp_path):
     assert all(outcome.seconds > 0.0 for outcome in outcomes.values())
 
 
-def test_a_process_that_was_killed_keeps_no_other_waiting(tmp_path):
-    outcomes, _ = together(tmp_path, [add("dies", how="die")], [add("tells", terms=(3, 4))])
-    assert outcomes["dies"].status == "out-of-memory" and "SIGKILL" in outcomes["dies"].reason
-    assert outcomes["tells"].result["sum"] == 7
-
-
 def test_a_task_that_hangs_is_ended_at_its_deadline(tmp_path):
     outcomes, _ = together(tmp_path, [add("hangs", how="hang", deadline=0.5)], [add("after")])
     assert outcomes["hangs"].status == "timeout" and "0.5 s" in outcomes["hangs"].reason
@@ -144,18 +138,12 @@ def test_a_worker_has_its_next_batch_before_outcomes_of_others_are_kept(tmp_path
         assert len(handed_out) >= min(number + 1, 4)
 
 
+@pytest.mark.slow
 @needs_proc
 def test_free_memory_of_a_batch_is_given_back(tmp_path):
     outcomes, _ = together(tmp_path, [add("one", how="fill"), add("two")], [add("three")])
     during, after = (outcomes[name].result["kB"] for name in ("two", "three"))
     assert during - after > 100_000
-
-
-def test_what_hangs_in_a_batch_costs_the_others_nothing(tmp_path):
-    batch = [add("one"), add("hangs", how="hang", deadline=0.5), add("after", deadline=60.0)]
-    outcomes, bar = together(tmp_path, batch)
-    assert outcomes["hangs"].status == "timeout" and outcomes["one"].result["sum"] == 3
-    assert outcomes["after"].result["memo"] == ["after"] and bar.n == 2
 
 
 def test_a_named_process_is_kept_until_it_is_released(tmp_path):
@@ -170,6 +158,7 @@ def test_a_named_process_is_kept_until_it_is_released(tmp_path):
         alone.close()
 
 
+@pytest.mark.slow
 def test_timed_tasks_begin_side_by_side_and_what_goes_wrong_there_is_their_outcome(tmp_path):
     two = Executor(RunFolder(tmp_path), None, 2)
     tasks = [
@@ -188,6 +177,7 @@ def test_timed_tasks_begin_side_by_side_and_what_goes_wrong_there_is_their_outco
         two.close()
 
 
+@pytest.mark.slow
 def test_a_hang_and_a_crash_are_ended_and_the_next_work_is_done():
     with closing(IsolatedProcess()) as process:
         assert process.call(operator.mul, 2, 4, seconds=60) == 8

@@ -261,15 +261,15 @@ def case(function: str, seconds: float = 60.0, **declared) -> Case:
     )  # fmt: skip
 
 
-def rows_of_cases(folder, *cases: Case, **changes):
+def rows_of_cases(folder, *cases: Case, processes: bool = False, **changes):
     plan = plan_of(folder, cases=cases, **changes)
-    runner = finish(plan, "validation")
+    runner = finish(plan, "validation", processes=processes)
     return rows_of(plan, runner.tasks, runner.outcomes), runner
 
 
 def test_what_did_not_come_back_is_a_failed_row_and_the_next_case_is_run(tmp_path):
     cases = case("hang", 0.5, expected=0.0), *(case(name) for name in ("warmth", "wrong", "absent"))
-    (hung, next_one, *others), _ = rows_of_cases(tmp_path, *cases)
+    (hung, next_one, *others), _ = rows_of_cases(tmp_path, *cases, processes=True)
     assert (hung.status, hung.value, hung.expected) == ("failed", None, 0.0)
     assert "no answer within 0.5 s" in hung.reason
     assert (next_one.status, next_one.value) == ("ok", 1.0)  # a new process is warmed up anew

@@ -98,6 +98,7 @@ def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, qu
     assert truncated.result["clips"] == ["mixed_0", "mixed_1"]  # it is stopped on purpose
 
 
+@pytest.mark.slow
 def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
     assets = assets_of(tube_dress(), MOTION)
     clip, *_ = make_shared_clips([MOTION], 1, vertices=150)
@@ -201,7 +202,7 @@ def test_the_block_of_equal_data_gives_all_networks_the_same_frames_and_steps(tm
     assert task.motions == ("walk",) and task.held_out == () and task.chosen.converged
 
 
-@pytest.mark.parametrize("kind", ["snug", "supervised"])
+@pytest.mark.parametrize("kind", [pytest.param("snug", marks=pytest.mark.slow), "supervised"])
 def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monkeypatch, kind):
     entry = find_method(f"{kind}-data-converged-0")
     held = dataclasses.replace(swaying(20, degrees=30.0), name="held")
@@ -226,6 +227,7 @@ def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monke
     assert result["left_out"] == []
 
 
+@pytest.mark.slow
 def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path, monkeypatch, capsys):
     done: list[str] = []
 

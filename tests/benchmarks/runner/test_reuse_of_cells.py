@@ -8,9 +8,9 @@ import pytest
 
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.execute_plan import describe
-from benchmarks.runner.executor import Executor
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.task import Outcome
+from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.benchmarks.runner.test_cell_tasks import (
     TINY,
     finish,
@@ -82,13 +82,13 @@ def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
     names = ("simulation", "newton-1", "newton-4")
     preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
     plan = plan_of(tmp_path, *names, preset=preset, how="still")
-    order, alone = [], Executor.alone
+    order, alone = [], InProcess.alone
 
     def watched(self, task, needed):
         order.append((task.kind, task.label.split(" x ")[1]))
         return alone(self, task, needed)
 
-    monkeypatch.setattr(Executor, "alone", watched)
+    monkeypatch.setattr(InProcess, "alone", watched)
     runner = finish(plan)
     repeats = [method for kind, method in order if kind == "repeat"]
     assert repeats[:3] == ["newton-1", "newton-4", "simulation"]
@@ -109,13 +109,13 @@ def test_a_process_ends_when_none_of_its_cells_repeats_will_come(tmp_path, monke
     plan = plan_of(tmp_path, "simulation", "newton-1", preset=preset)
     order = []
     for name in ("alone", "release"):
-        inner = getattr(Executor, name)
+        inner = getattr(InProcess, name)
 
         def watched(self, first, *rest, name=name, inner=inner):
             order.append((name, getattr(first, "process", first)))
             return inner(self, first, *rest)
 
-        monkeypatch.setattr(Executor, name, watched)
+        monkeypatch.setattr(InProcess, name, watched)
     finish(plan)
     names = [cell.name for cell in plan.cells]
     assert order[:2] == [("alone", names[0]), ("release", names[0])]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks import provenance
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.row import Row
@@ -130,12 +130,6 @@ def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
     assert not accepted(row("extremes", "stalled", ""))
 
 
-def test_networks_skip_scenes_without_a_body_and_solvers_skip_nothing():
-    for entry in (entry for entry in METHODS if entry.package is None):
-        reason = entry.skip(SHEET)
-        assert bool(reason) == entry.needs_body and entry.skip(dressed_scene("walk")) is None
-
-
 def test_the_remarks_name_repeats_that_lie_apart_and_what_is_out_of_date():
     base = Row("speed", "flag", "newton-1", 0, "cost/spread", "%", 12.0)
     late = dataclasses.replace(base, method="lbfgs-5", value=31.0, status="stalled", reason="2 of 4 frames")
@@ -145,14 +139,6 @@ def test_the_remarks_name_repeats_that_lie_apart_and_what_is_out_of_date():
     assert lines[0].startswith("3 results") and lines[1] == "cell flag x snug: kept though scene changed"
     assert lines[2].endswith("flag x lbfgs-5 (31 %)")
     assert remarks([base], 0, {}) == []
-
-
-def test_a_default_run_says_how_to_leave_out_the_energies_of_the_loss():
-    rows = [Row("garments", "s", name, 0, "energy/total", "J", 1.0) for name in ("snug", "untrained")]
-    without = dataclasses.replace(rows[0], method="snug-no-strain")
-    (line,) = remarks(rows, 0, {})
-    assert line.endswith("--methods 'simulation,skinning,snug,snug-no-*'")
-    assert remarks(rows[:1], 0, {}) == remarks([*rows, without], 0, {}) == []
 
 
 def test_remarks_name_few_and_count_the_others():

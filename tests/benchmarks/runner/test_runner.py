@@ -26,6 +26,7 @@ from benchmarks.runner.task import Outcome
 from benchmarks.scenes import of_garment
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.misbehaving import interrupt_at
+from tests.benchmarks.runner.tasks_by_hand import run_in_this_process
 from tests.benchmarks.runner.test_cell_tasks import TINY, found_of, plan_of
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -43,6 +44,7 @@ with held(Path(sys.argv[1])):
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
     monkeypatch.setattr(execution, "make_report", lambda log: "")
+    run_in_this_process(monkeypatch)
 
 
 def words_of(folder: Path, *methods: str) -> list[str]:
@@ -69,6 +71,7 @@ def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkey
     assert not (tmp_path / "run").exists()  # nothing was written there
 
 
+@pytest.mark.slow
 def test_a_killed_run_holds_its_folder_no_longer(tmp_path, monkeypatch):
     process = subprocess.Popen(
         [sys.executable, "-c", HOLDING, tmp_path],
