@@ -136,14 +136,6 @@ def test_what_comes_damaged_is_not_kept(two, folder, monkeypatch):
         together(folder, two.address, [write("one")])
 
 
-@pytest.mark.slow
-def test_what_was_damaged_here_is_not_built_upon(two, folder):
-    (first,) = together(folder, two.address, [write("first")]).values()
-    (folder.path / first.files[0]).write_bytes(b"damaged")
-    with pytest.raises(RunStopped, match=r"first\.npy is damaged since this run wrote it"):
-        together(folder, two.address, [write("second")], needed={("numbers", "first"): first})
-
-
 @pytest.mark.parametrize(
     ("answer", "problem"),
     [

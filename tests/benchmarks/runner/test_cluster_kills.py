@@ -40,26 +40,6 @@ def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folde
     assert outcomes["after"].status == outcomes["beside"].status == "ok"
 
 
-def test_an_outcome_that_goes_with_its_worker_keeps_nobody_waiting(folder, tmp_path, monkeypatch):
-    killed: list[float] = []
-    take = distributed.Future.result
-
-    def result(self):
-        if not killed:
-            until(self.done)
-            (address,) = self.client.nthreads()
-            one.workers[0].kill()
-            killed.append(time.monotonic())
-            one.add()
-            until(lambda: address not in self.client.nthreads())
-        return take(self)
-
-    monkeypatch.setattr(distributed.Future, "result", result)
-    with cluster(tmp_path, 1) as one:
-        assert together(folder, one.address, [write("one")])["one"].status == "ok"
-        assert time.monotonic() - killed[0] < 55.0
-
-
 def test_workers_behind_a_nanny_come_back(folder, tmp_path):
     with cluster(tmp_path, 0) as none:
         none.add("--nanny")

@@ -79,13 +79,6 @@ def together(folder, *batches, workers: int = 1) -> tuple[dict[str, Outcome], Ba
     return {task.name: outcome for task, outcome in done}, bar
 
 
-def test_a_failure_is_a_value_and_the_others_go_on(tmp_path):
-    outcomes, _ = together(tmp_path, [add("one")], [add("two", terms=(1, "x"))], [add("three", terms=(3, 4))])
-    assert outcomes["one"].result["sum"] == 3 and outcomes["three"].result["sum"] == 7
-    assert outcomes["two"].failed and outcomes["two"].reason.startswith("TypeError")
-    assert all(outcome.seconds > 0.0 for outcome in outcomes.values())
-
-
 def test_a_task_that_hangs_is_ended_at_its_deadline(tmp_path):
     outcomes, _ = together(tmp_path, [add("hangs", how="hang", deadline=0.5)], [add("after")])
     assert outcomes["hangs"].status == "timeout" and "0.5 s" in outcomes["hangs"].reason

@@ -141,17 +141,6 @@ def test_the_remarks_name_repeats_that_lie_apart_and_what_is_out_of_date():
     assert remarks([base], 0, {}) == []
 
 
-def test_remarks_name_few_and_count_the_others():
-    cells = [Row("speed", f"s{k}", "snug", 0, "cost/spread", "%", 30.0 + k) for k in range(5)]
-    (line,) = remarks(cells, 0, {})
-    assert (
-        line
-        == "repeats more than 20 % apart: s4 x snug (34 %), s3 x snug (33 %), s2 x snug (32 %) and 2 more"
-    )
-    old = remarks([], 0, {f"cell {k}": "kept" for k in range(5)})
-    assert old == ["cell 0: kept", "cell 1: kept", "cell 2: kept", "and 2 more outdated in run.json"]
-
-
 def test_the_closing_lines_are_ten_with_an_answer_and_the_last_counts_the_endings_of_every_suite():
     rows = [Row(suite, "c", "simulation", 0, "check", "1", 0.0) for suite in ("validation", "extremes")]
     rows += [dataclasses.replace(rows[1], status="failed", reason="why")] * 2
