@@ -6,12 +6,11 @@ import dataclasses
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
-from benchmarks.metric import Metric
 from benchmarks.metrics import declared, find_metric
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.provenance import digest, digest_of_file
@@ -177,16 +176,12 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     A report needs no other source.
     """
     methods = {cell.method: cell.entry for cell in plan.cells}
-    declarations = {
-        name: _metric(name, plan) for name in dict.fromkeys(r.metric for r in rows if r.method in methods)
-    }
     order = {name: place for place, name in enumerate(declared(plan.metrics))}
-    ordered = sorted(declarations, key=lambda name: order.get(name, len(order)))
-    metrics = {
-        name: _fields(metric, "name", "declared_in")
-        for name in ordered
-        if (metric := declarations[name]) is not None
-    }
+    names = dict.fromkeys(row.metric for row in rows if row.method in methods)
+    metrics = {}
+    for name in sorted(names, key=lambda name: order.get(name, len(order))):
+        with suppress(KeyError):  # of a case, which describes its rows itself
+            metrics[name] = _fields(find_metric(name, plan.metrics), "name", "declared_in")
     without = ("name", "module", "declared_in", "files", "sizes", "options", "metrics")
     scenes = {
         scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
@@ -214,14 +209,6 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         for case in plan.cases
     }  # fmt: skip
     return {"metrics": metrics, "methods": of_methods, "scenes": scenes, "cases": cases}
-
-
-def _metric(name: str, plan: Plan) -> Metric | None:
-    """Its declaration; None of a case, which describes its rows itself."""
-    try:
-        return find_metric(name, plan.metrics)
-    except KeyError:
-        return None
 
 
 def _fields(entry: Any, *without: str) -> dict[str, Any]:

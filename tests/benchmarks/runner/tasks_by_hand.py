@@ -83,15 +83,15 @@ class InProcess:
             tasks, needed = batch
             context = self.context()
             for task in tasks:
-                clock = time.perf_counter()
-                outcome = self.outcome(task, context, needed)
-                yield task, dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
+                yield task, self.outcome(task, context, needed)
 
     def outcome(self, task, context, needed):
+        clock = time.perf_counter()
         try:
-            return task.run(context, needed)
+            outcome = task.run(context, needed)
         except Exception as error:
-            return failure(error)
+            outcome = failure(error)
+        return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
 
     def begin(self, tasks):
         for task, _ in tasks:
