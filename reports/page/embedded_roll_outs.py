@@ -130,7 +130,6 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
 SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
 BLOCK = 32  # frames at a time, to bound memory
 ROOM = 1500  # bytes beside a text: its tags, and what the content says of it
-NOTE = 400  # bytes to say that roll-outs of a scene were left out
 
 
 @dataclass
@@ -138,56 +137,50 @@ class Embedded:
     """Roll-outs as texts of the page.
 
     scenes: scene -> its body and methods, each the id of a text and what lies in it. texts: id -> text.
-    missing: scene -> how many roll-outs did not fit.
+    missing: how many roll-outs did not fit.
     """
 
     scenes: dict[str, dict[str, Any]] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
-    missing: dict[str, int] = field(default_factory=dict)
+    missing: int = 0
 
-    def left_out(self, rule: str) -> str:
-        """Say how many roll-outs the page has, by what rule, and which it lacks."""
+    @property
+    def remark(self) -> str:
+        """How many roll-outs the page has, and by what rule."""
         have = sum(len(scene["methods"]) for scene in self.scenes.values())
-        left_out = sum(self.missing.values())
-        if not left_out:
-            return f"All {have} roll-outs that this run kept can be shown: the first seed of each method."
-        names = ", ".join(f"{scene} ({count})" for scene, count in self.missing.items())
-        count = f"{have} of {have + left_out} roll-outs can be shown"
-        return f"{count}: {rule}. Left out for size, by scene: {names}."
+        if self.missing:
+            return f"{have} of {have + self.missing} roll-outs can be shown, for a page of 25 MB: {RULE}."
+        return f"All {have} roll-outs that this run kept can be shown: the first seed of each method."
 
 
 def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
     """Embed roll-outs in the order of groups() until the next would exceed the budget [bytes]."""
     embedded, references = Embedded(), {}
-    wanted = list(groups(folder, run))
-    budget -= NOTE * len(wanted)
-    for scene, seeds in wanted:
+    for scene, seeds in groups(folder, run):
         if embedded.missing:
-            embedded.missing[scene] = embedded.missing.get(scene, 0) + len(seeds)
+            embedded.missing += len(seeds)
             continue
         stored = {method: run.roll_outs.cloth(scene, method, seed) for method, seed in seeds.items()}
         whole = {method: cloth.finite() for method, cloth in stored.items() if cloth is not None}
         cloths = {method: cloth for method, cloth in whole.items() if cloth.frames}
-        if run.reference in cloths:
-            references[scene] = cloths[run.reference]
+        references.setdefault(scene, cloths.get(run.reference))
         body = run.roll_outs.body(scene)
         skin = skin_of(body.positions, body.faces) if body else None
         depths = _depths(cloths, skin) if skin else {}
         rest = run.roll_outs.rest_areas(scene)
         for method, cloth in cloths.items():
-            shown = dict(embedded.scenes.get(scene) or {"body": None, "methods": {}})
             texts: dict[str, str] = {}
-            if body and shown["body"] is None:
-                shown["body"] = _kept(texts, _body(body))
-            pack = _cloth(cloth, rest, references.get(scene), depths.get(method), run.metrics)
-            shown["methods"] = {**shown["methods"], method: _kept(texts, pack) | {"ending": _ending(cloth)}}
+            known = embedded.scenes.get(scene)
+            shown = known or {"body": _kept(texts, _body(body)) if body else None, "methods": {}}
+            pack = _cloth(cloth, rest, references[scene], depths.get(method), run.metrics)
+            entry = _kept(texts, pack) | {"ending": _ending(cloth)}
             new = {name: text for name, text in texts.items() if name not in embedded.texts}
             budget -= sum(ROOM + len(text) for text in new.values())
             if budget < 0:
-                embedded.missing[scene] = embedded.missing.get(scene, 0) + 1
+                embedded.missing += 1
             else:
                 embedded.texts |= new
-                embedded.scenes[scene] = shown
+                embedded.scenes[scene] = {**shown, "methods": {**shown["methods"], method: entry}}
     return embedded
 
 

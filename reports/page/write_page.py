@@ -19,7 +19,7 @@ from reference_sim.files.atomic_files import replacing
 from reports.blocks import BLOCKS, Report, TableBlock
 from reports.figures.plotting import style
 from reports.finished_run import Run
-from reports.page.embedded_roll_outs import BUDGET, RULE, Embedded, deflated, embed
+from reports.page.embedded_roll_outs import BUDGET, Embedded, deflated, embed
 from reports.sentences import headline
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean, value_of
@@ -151,7 +151,7 @@ def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
         SCRIPTS,
         subtitle=html.escape(report.subtitle),
         sentences=_sentences(report),
-        left_out=html.escape(embedded.left_out(RULE)),
+        left_out=html.escape(embedded.remark),
         blobs="\n".join(
             f'<script type="text/plain" id="{name}">{text}</script>' for name, text in blobs.items()
         ),
