@@ -155,7 +155,8 @@ class Embedded:
 
 def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
     """Embed roll-outs in the order of groups() until the next would exceed the budget [bytes]."""
-    embedded, references = Embedded(), {}
+    embedded = Embedded()
+    references: dict[str, Trajectory | None] = {}
     for scene, seeds in groups(folder, run):
         if embedded.missing:
             embedded.missing += len(seeds)

@@ -58,6 +58,7 @@ def test_segments_of_a_recording_count_as_one_motion(publish):
     assert note == "published 16 % on these motions: reproduced"  # between 5 and 50 on a scale of logarithms
 
 
+@pytest.mark.slow
 def test_the_interval_is_that_of_one_more_seed(publish):
     """The interval holds 95 % of seeds that are drawn like the published ones."""
     generator = np.random.default_rng(0)
