@@ -21,8 +21,15 @@ from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
 from snug.file_options import GarmentFile
 from snug.garments.fit import DressForm, find_placement, pose_in_file
-from snug.garments.garment import Garment, GarmentError, find_weights, smooth_weights
-from snug.garments.openings import name_openings, open_seam, piece_of_faces
+from snug.garments.garment import (
+    Garment,
+    GarmentError,
+    find_weights,
+    name_openings,
+    open_seam,
+    piece_of_faces,
+    smooth_weights,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

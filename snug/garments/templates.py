@@ -9,10 +9,9 @@ import numpy as np
 
 from snug.body.parametric_body import Body
 from snug.garments.cuts import SEAM_CUT, CutPlane, armhole_cut, level_cut, neck_cut
-from snug.garments.garment import SKIRT_SMOOTHING, Garment, GarmentError, smooth_weights
+from snug.garments.garment import SKIRT_SMOOTHING, Garment, GarmentError, name_openings, smooth_weights
 from snug.garments.implicit_surface import SHIRT_BONES, build_surface, joint_position, legs_part
 from snug.garments.meshing import mesh_garment, nearest_body_vertices
-from snug.garments.openings import name_openings
 
 TSHIRT = "tshirt"  # the garment that a command takes where none is named
 
