@@ -191,19 +191,14 @@ def _check_user_scenes(scenes: Mapping[str, Scene], motions: Motions) -> None:
 
     # Those that any run may start from.
     known = {scene.name: scene for scene in (*SCENES, *further_scenes(motions.first_garment))} | dict(scenes)
+    settling = [name for name, scene in known.items() if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes.values() if scene.declared_in):
-        chain, last = {scene.name}, scene
-        while last.start_of:
-            before = known.get(last.start_of)
-            if before is None or not before.simulated or before.name in chain:
-                others = [name for name, other in known.items() if other.simulated and name not in chain]
-                raise StudyError(
-                    f"{last.declared_in}: scene '{last.name}': start_of='{last.start_of}': name another "
-                    "scene whose garment settles, of the run or without a motion; "
-                    f"{nearest(last.start_of, others)}"
-                )
-            chain.add(before.name)
-            last = before
+        if scene.start_of and scene.start_of not in settling:
+            raise StudyError(
+                f"{scene.declared_in}: scene '{scene.name}': start_of='{scene.start_of}': name another scene "
+                "whose garment settles by itself, of the run or without a motion; "
+                f"{nearest(scene.start_of, settling)}"
+            )
         if scene.dressed and scene.motion not in (names := [*motions.files, *LIBRARY]):
             raise StudyError(
                 f"{scene.declared_in}: scene '{scene.name}': no motion is called '{scene.motion}'; "

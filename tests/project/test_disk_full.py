@@ -51,15 +51,6 @@ def files_up_to(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def limited(size: int, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own under that limit."""
-    return subprocess.run(
-        [sys.executable, "-m", *arguments],
-        cwd=cwd, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
-    )  # fmt: skip
-
-
 # --- files -------------------------------------------------------------------------------------------------
 
 
@@ -110,7 +101,11 @@ def test_a_simulation_stops_in_one_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_obj(Path("sheet.obj"), *grid(6, 6, width=0.4, depth=0.4))
     arguments = ["sheet.obj", "--pins", "0,6", "--frames", "3", "-o", "a.vtkhdf"]
-    stopped = limited(2000, "reference_sim.simulate", *arguments, cwd=tmp_path)
+    stopped = subprocess.run(
+        [sys.executable, "-m", "reference_sim.simulate", *arguments],
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)),
+    )  # fmt: skip
     assert stopped.returncode == 1 and "Traceback" not in stopped.stderr
     assert "\nsimulate: a.vtkhdf: File too large" in stopped.stderr
     assert os.listdir() == ["sheet.obj"]
@@ -134,33 +129,17 @@ def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):
     same_model(short(steps=12, checkpoint=Checkpoint(path=path, minutes=0, resume=True)), whole)
 
 
-def in_process(folder, assets, workers) -> InProcess:
-    return InProcess(folder, assets)
-
-
-@pytest.mark.parametrize("own_processes", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_a_run_stops_in_one_line_and_goes_on(own_processes, tmp_path, monkeypatch, capsys):
+def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(execution, "make_report", lambda log: "")
-    arguments = [
-        "smoke:speed",
-        "--scenes",
-        "free_fall",
-        "--methods",
-        "simulation",
-        "-o",
-    ]
+    arguments = ["smoke:speed", "--scenes", "free_fall", "--methods", "simulation", "-o"]
     folder, other = RunFolder(tmp_path / "a"), RunFolder(tmp_path / "b")
     assert run.main([*arguments, str(other.path)]) == 0  # kernels that it compiles are files that grow, too
     (trajectory,) = other.path.rglob("simulation.vtkhdf")
     limit = trajectory.stat().st_size - 1000
-    if own_processes:
-        stopped = limited(limit, "benchmarks.run", *arguments, str(folder.path), cwd=ROOT)
-        status, errors = stopped.returncode, stopped.stderr
-    else:
-        monkeypatch.setattr(execution, "Executor", in_process)
-        with files_up_to(limit):
-            status = run.main([*arguments, str(folder.path)])
-        errors = capsys.readouterr().err
+    monkeypatch.setattr(execution, "Executor", lambda folder, assets, workers: InProcess(folder, assets))
+    with files_up_to(limit):
+        status = run.main([*arguments, str(folder.path)])
+    errors = capsys.readouterr().err
     (line,) = (line for line in errors.splitlines() if line.startswith("benchmarks.run: "))
     assert status == 1 and "Traceback" not in errors and line.endswith("the same command goes on from there")
     assert "simulation.vtkhdf: File too large" in line
