@@ -39,7 +39,7 @@ class Kind:
         architecture: module in snug.networks and class of its network.
         recipe: options of network and training, unless others are named.
         targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed offsets
-            (snug.training.vertex_targets).
+            (snug.training.simulated_data).
         past: whether its inertia is that of a simulation's previous frames (snug.training.simulated_data).
         fitted: whether it is fitted in one go, in place of training steps (snug.networks.fitted).
         closed_form: whether it trains faster by snug.kernels.gru.

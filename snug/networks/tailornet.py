@@ -3,7 +3,7 @@
     offsets(theta, beta) = low(theta, beta) + high(theta)
 
 Both have three layers of 1024 with ReLU, dropout 0.2 after the first; they learn by L1 in the unposed space
-(snug.training.vertex_targets.BandTargets): low the diffusion-smoothed offsets of the simulation, high
+(snug.training.simulated_data.BandTargets): low the diffusion-smoothed offsets of the simulation, high
 the rest. With its authors the high band is a mean of several networks, each of a pivot, that is of a body
 shape and a style of garment, weighed by the distance from it. Our simulated motions show the mean body in one
 style: one pivot, of weight one, is all that they can teach, and memory and run time are those of one pivot

@@ -28,9 +28,8 @@ from snug.training.contact_planes import Posed, TrainingContact
 from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.physics_loss import PhysicsLoss
-from snug.training.simulated_data import SimulatedPast
+from snug.training.simulated_data import TARGETS, SimulatedPast, Trajectories, VertexTargets
 from snug.training.training_set import HiddenStateCache, TrainingError, TrainingSet
-from snug.training.vertex_targets import TARGETS, Trajectories, VertexTargets
 
 DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search

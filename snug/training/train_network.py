@@ -28,9 +28,9 @@ from snug.training.captured_step import CapturedTrainer
 from snug.training.checkpoint import Checkpoint, describe_run
 from snug.training.device import find_device
 from snug.training.optimisation_step import Trainer, start_network
+from snug.training.simulated_data import Trajectories, relative_vertices, vertex_loss
 from snug.training.training_set import TrainingSet
 from snug.training.validation import Validation, Validator
-from snug.training.vertex_targets import Trajectories, relative_vertices, vertex_loss
 
 DAMPING = 0.01  # of the offsets that fitted networks learn, see unskin_damped
 PIECE = 256  # frames whose loss is taken at once

@@ -18,12 +18,12 @@ from torch import Tensor
 
 from snug.body.skinning import skin
 from snug.motion.motion import Motion
+from snug.training.simulated_data import TARGETS
 from snug.training.training_set import Batch, TrainingError, TrainingSet
-from snug.training.vertex_targets import TARGETS
 
 if TYPE_CHECKING:
     from snug.training.optimisation_step import Trainer
-    from snug.training.vertex_targets import Trajectories
+    from snug.training.simulated_data import Trajectories
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,8 +17,8 @@ from snug.networks.roll_out import roll_out
 from snug.networks.tailornet import DROPOUT, FrequencyMixture
 from snug.recipe import DEFAULT
 from snug.training.physics_loss import PhysicsLoss, SquaredContact, spring_terms
+from snug.training.simulated_data import smooth_offsets
 from snug.training.train_network import train_network
-from snug.training.vertex_targets import smooth_offsets
 from tests.snug.training.dressing import swaying, tube_dress
 
 

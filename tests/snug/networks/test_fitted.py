@@ -13,8 +13,8 @@ from snug.kinds import KINDS
 from snug.networks.fitted import COMPONENTS, NEIGHBOURS, NearestPoses, PoseRegression
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
+from snug.training.simulated_data import TargetError
 from snug.training.train_network import train_network
-from snug.training.vertex_targets import TargetError
 from tests.snug.training.dressing import swaying, tube_dress
 
 FITTED = ("nearest-poses", "pose-regression")

@@ -8,7 +8,7 @@ import torch
 
 from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
-from snug.training.divergence_guard import GIVE_UP, PATIENCE, SETTLING, SNAPSHOT_EVERY
+from snug.training.divergence_guard import PATIENCE, SETTLING, SNAPSHOT_EVERY
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import TrainingLoop
 from snug.training.training_set import TrainingError
@@ -106,14 +106,6 @@ def test_gradients_that_are_not_finite_in_a_row_bring_good_weights_back():
     assert torch.equal(trainer.network.offsets.weight, good["network.offsets.weight"])
     trainer.step(4 + PATIENCE)
     assert trainer.optimiser.param_groups[0]["lr"] == 0.5 * PLAIN.learning_rate
-
-
-def test_training_gives_up_over_gradients_too():
-    trainer = made()
-    trainer.network.offsets.weight.register_hook(lambda gradient: gradient * float("inf"))
-    with pytest.raises(TrainingError, match=r"100 updates in a row not finite, last motion 'sway' frame"):
-        for number in range(GIVE_UP):
-            trainer.step(number)
 
 
 def test_runaway_energy_brings_good_weights_back():

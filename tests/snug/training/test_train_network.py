@@ -20,9 +20,9 @@ from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
 from snug.training.augmentation import augment
 from snug.training.optimisation_step import Trainer
+from snug.training.simulated_data import TargetError, vertex_loss
 from snug.training.train_network import train_network, untrained_model
 from snug.training.training_set import TrainingError, TrainingSet
-from snug.training.vertex_targets import TargetError, vertex_loss
 from tests.snug.training.dressing import leaning, swaying, tube_dress
 
 PLAIN = replace(DEFAULT, mixed=0.0)

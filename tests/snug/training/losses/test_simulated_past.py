@@ -23,10 +23,9 @@ from snug.training.augmentation import (
     make_swinging_motion,
 )
 from snug.training.optimisation_step import Trainer
-from snug.training.simulated_data import NEARNESS, SimulatedPast
+from snug.training.simulated_data import NEARNESS, SimulatedPast, TargetError
 from snug.training.train_network import train_network
 from snug.training.training_set import TrainingSet
-from snug.training.vertex_targets import TargetError
 from tests.snug.motion.motion_forms import joint_speeds
 from tests.snug.training.dressing import swaying, tube_dress
 
