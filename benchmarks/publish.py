@@ -24,7 +24,6 @@ TARGET = Path("reports/published")
 AGAIN = ("--only", "failed,stale,missing")  # so a task that lacked memory once is done again
 KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
 EXAMPLES = """examples:
-  python -m benchmarks.publish --list                which studies are published, and their commands
   python -m benchmarks.publish shapes                one of them
   python -m benchmarks.publish --workers 8           all of them, with more processes side by side
   python -m benchmarks.publish --scheduler tcp://HOST:8786 --workers 40      untimed tasks on a cluster
@@ -52,7 +51,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("studies", nargs="*", metavar="STUDY", help="names of studies (default: all that have [show])")
-    add("--list", action="store_true", help="print each study, its question and its command; run nothing")
     add("--workers", metavar="N", help="of benchmarks.run")
     add("--scheduler", metavar="ADDRESS", help="of benchmarks.run")
     add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})")
@@ -64,11 +62,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise PublishError(
                 f"study {name}: has no [show]: the studies {', '.join(published_studies())} do"
             )
-    if options.list:
-        for name in names:
-            print(f"{name}: {read_study(name).question}")
-            print(f"  {shlex.join(['python', *command_of(name, options.out)[1:]])}")
-        return 0
     head = commit()
     if head.endswith("+changes"):
         raise PublishError(f"{head}: commit the changes first, so that a commit says what was run")
@@ -88,12 +81,6 @@ def published_studies() -> list[str]:
     return [name for name in study_names() if read_study(name).show is not None]
 
 
-def command_of(name: str, out: Path, more: Sequence[str] = ()) -> list[str]:
-    """Return the command line that runs a study in a folder below `out`."""
-    folder = out / Path(name).stem
-    return [sys.executable, "-m", "benchmarks.run", name, *AGAIN, *more, "-o", str(folder)]
-
-
 def publish(name: str, out: Path, into: Path, head: str, more: Sequence[str] = ()) -> None:
     """Run a study, or go on with it, and keep what is published of it.
 
@@ -107,9 +94,9 @@ def publish(name: str, out: Path, into: Path, head: str, more: Sequence[str] = (
     Raises:
         PublishError: the run failed, has rows of another commit, or lacks a picture that the documents show.
     """
-    show, line = read_study(name).show, command_of(name, out, more)
+    show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None
-    whole = Path(line[-1])
+    line = [sys.executable, "-m", "benchmarks.run", name, *AGAIN, *more, "-o", str(whole)]
     print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
     status = subprocess.run(line, check=False).returncode
     if status and not (status == 1 and all_usable(RunFolder(whole))):

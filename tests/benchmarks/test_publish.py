@@ -89,10 +89,6 @@ def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, c
     assert command.main(["quick"]) == 2 and "commit the changes first" in capsys.readouterr().err
     assert command.main(["quik"]) == 2 and "no study 'quik'" in capsys.readouterr().err
     assert command.main(["smoke"]) == 2 and "study smoke: has no [show]" in capsys.readouterr().err
-    assert command.main(["--list"]) == 0
-    shown = capsys.readouterr().out
-    assert "quick: All methods" in shown and "python -m benchmarks.run quick --only" in shown
-    assert "smoke: " not in shown
 
 
 @pytest.mark.parametrize("error", [PublishError, ResultsError])

@@ -110,7 +110,7 @@ def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home
     assert np.abs(elsewhere - trajectory.positions).max() < 1e-6  # the method computes in float32
     np.savez(tmp_path / "mine.npz", positions=elsewhere, fps=30.0, quasi_static=elsewhere)
     metrics = measured_of(scene, tmp_path / "mine.npz")
-    assert metrics.keys() == expected.keys() and len(metrics) > 25
+    assert metrics.keys() == expected.keys() and len(metrics) > 20
     for name, value in expected.items():
         np.testing.assert_allclose(metrics[name], value, rtol=2e-3, atol=2e-5, err_msg=name)
     # The very positions of the method, by way of a file: to the last digit.
