@@ -40,7 +40,7 @@ class Scene:
         motion: name of the motion.
         part: of the motion: "whole", "clip", "loop" or "start".
         obstacle: whether there is another thing to touch.
-        metrics: names of the modules of benchmarks.metrics that are measured here; None for all that apply.
+        metrics: names of the Measurements that are taken here; None for all that apply.
         counterpart: another scene whose roll-out by the same method metrics compare with.
         start_of: another scene whose settled start is that of this one too.
         networks_only: whether nobody simulates it, so that it has neither start nor posed body.

@@ -74,8 +74,6 @@ OUT_OF_DISTRIBUTION = (
         counterpart=ORDINARY,
     ),
 )  # fmt: skip
-FEWEST = (ORDINARY, "out_of_distribution/walk_x4", "out_of_distribution/long")  # of the smallest preset
-FEW = (*FEWEST, *(f"out_of_distribution/{name}" for name in ("splits", "arms_crossed", "root_glitch")))
 
 
 SHAPES, SHAPE_SEED = 12, 2022  # of body shapes that no training has drawn
