@@ -116,7 +116,8 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
     motions, targets = job.motions, None
     mixed: list[Motion] = []
     if job.simulated:
-        whole = {m: needed[id] for m, id in job.simulated.items() if is_whole(needed.get(id))}
+        there = {m: needed[id] for m, id in job.simulated.items() if id in needed}
+        whole = {motion: outcome for motion, outcome in there.items() if outcome.result["whole"]}
         motions = tuple(motion for motion in job.motions if motion in whole)
         targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
         mixed, simulated = mixed_clips(job, assets, run, needed)
@@ -194,11 +195,6 @@ def mixed_clips(
         swinging=simulated is not None and simulated.swinging,
     )  # fmt: skip
     return [clip for clip in clips if clip.name in vertices_of], vertices_of
-
-
-def is_whole(outcome: Outcome | None) -> bool:
-    """Return whether a simulation has reached its last frame."""
-    return outcome is not None and bool(outcome.result["whole"])
 
 
 def facts_of(model: TrainedModel) -> dict[str, Any]:
