@@ -27,7 +27,7 @@ from benchmarks.runner.task import Outcome, Task
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS
 from tests.benchmarks.runner.tasks_by_hand import InProcess
-from tests.benchmarks.runner.test_cell_tasks import finish, outcome_of, plan_of
+from tests.benchmarks.runner.test_cell_tasks import finish, plan_of
 
 
 def write(name, dies, context, needed):
@@ -174,16 +174,6 @@ def test_a_network_that_learned_without_a_failed_simulation_is_another(tmp_path)
     lost = schedule.data("run", "tshirt", find_method("simulation")).id
     assert lost in schedule.training(Network("supervised", 0, "tshirt")).reads
     assert schedule.training(Network("snug", 0, "tshirt")).reads == ()
-
-
-def test_a_cell_that_was_blocked_is_run_once_nothing_blocks_it(tmp_path):
-    plan = plan_of(tmp_path, "simulation")
-    (cell,) = (t for t in tasks_of(plan) if t.kind == "cell")
-    lame = dataclasses.replace(cell, needs=(("network", "lame"),))
-    runner = run_tasks(tmp_path, task("lame", dies=True), lame)
-    blocked = runner.outcomes["cell", cell.name]
-    assert blocked.status == "failed" and "network lame" in blocked.reason
-    assert outcome_of(dataclasses.replace(plan, only=frozenset({"failed"}))).status == "ok"
 
 
 def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, monkeypatch, capsys):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import shutil
 from pathlib import Path
 
@@ -128,16 +127,6 @@ def test_what_hangs_on_a_damaged_reference_is_done_again(whole, tmp_path):
     runner, rows = done(folder)
     assert runner.reused == [CELL] and rows == whole[1]
     assert len(done(folder)[0].reused) == len(ALL)
-
-
-def test_a_number_changed_in_a_record_is_not_believed(whole, tmp_path):
-    folder = shutil.copytree(whole[0], tmp_path / "run")
-    path = folder / "cache/metrics/hanging_sheet/newton-1.json"
-    entry = json.loads(path.read_text())
-    entry["outcome"]["result"]["energy/total"] = 4.11
-    path.write_text(json.dumps(entry, indent=1, ensure_ascii=False))
-    runner, rows = done(folder)
-    assert METRICS not in runner.reused and rows == whole[1]
 
 
 def test_a_file_damaged_while_the_run_goes_on_stops_it_and_the_next_run_heals_it(tmp_path, monkeypatch):
