@@ -117,7 +117,7 @@ def worst_failures(run: Run) -> list[Failure]:
     """Return the failures that are shown."""
     failures: list[Failure] = []
     shown: Counter[str] = Counter()
-    for method, scene, _, strain, ratio in overstretched(run):
+    for method, scene, strain, ratio in overstretched(run):
         if len(failures) == MOST_FAILURES or shown[method] == OF_ONE:
             continue
         roll_outs = read_scene(run, run.frame[run.frame["scene"] == scene], [method])

@@ -23,7 +23,7 @@ from reports.statistics.pareto import NETWORK
 from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
 
 BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")  # statuses, the worst first
-STRAIN = {"motion/strain": "strain of its worst frame", "energy/strain": "mean strain"}
+STRAINS = ("motion/strain", "energy/strain")  # of the worst frame, and the mean
 
 
 def checks(run: Run) -> pd.DataFrame:
@@ -68,24 +68,20 @@ def counted(run: Run) -> dict[str, Counter[str]]:
     return {kind: Counter(rows["status"]) for kind, rows in groups.items() if len(rows)}
 
 
-def overstretched(run: Run) -> list[tuple[str, str, str, float, float]]:
+def overstretched(run: Run) -> list[tuple[str, str, float, float]]:
     """List trained networks with more strain than the reference, the worst first.
 
-    Each with method, scene, one of STRAIN, its value [J] and its ratio to the reference's.
+    Each with method, scene, strain [J] of its worst frame, else the mean, and the ratio to the reference's.
     """
     networks = [name for name in run.with_role("network") if not run.methods[name].base]
-    strains: dict[tuple[str, str], tuple[str, float, float]] = {}
-    for metric in STRAIN:
+    strains: dict[tuple[str, str], tuple[float, float]] = {}
+    for metric in STRAINS:
         rows = run.frame[(run.frame["metric"] == metric) & run.frame["usable"] & (run.frame["garment"] != "")]
         values = rows.groupby(["scene", "method"])["value"].mean()
-        for scene, method in values.index:
+        for (scene, method), value in values.items():
             base = values.get((scene, run.reference))
             if method in networks and base and (method, scene) not in strains:
-                strains[method, scene] = (
-                    metric,
-                    float(values[scene, method]),
-                    float(values[scene, method] / base),
-                )
+                strains[method, scene] = float(value), float(value / base)
     worst = [(*key, *line) for key, line in strains.items() if line[-1] > 1.0]
     return sorted(worst, key=lambda line: -line[-1])
 

@@ -190,24 +190,3 @@ def compared_excess(
     relative = relative_metric(metric).name
     rows = rows[rows["metric"].isin([metric, TOTAL, relative]) | ~rows["usable"]]
     return pair(with_relative_excess(run, rows, metric), one, other, relative)
-
-
-SHAPE = "body/shape"
-
-
-def rows_of_shapes(run: Run) -> tuple[pd.DataFrame, pd.Series]:
-    """Return the rows of scenes with a known body shape, and scene -> norm of its shape parameters.
-
-    There are none unless the shapes differ.
-    """
-    cells = run.cells("shapes")
-    known = cells[(cells["metric"] == SHAPE) & cells["usable"]]
-    norms = known.drop_duplicates("scene").set_index("scene")["value"]
-    kept = cells["scene"].isin(norms.index) if norms.nunique() > 1 else np.zeros(len(cells), bool)
-    return cells[kept], norms
-
-
-def rows_of_other_shapes(run: Run) -> pd.DataFrame:
-    """Return the rows of scenes whose body has not the mean shape."""
-    rows, norms = rows_of_shapes(run)
-    return rows[rows["scene"].isin(norms.index[norms > 0.0])]

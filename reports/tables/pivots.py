@@ -14,8 +14,6 @@ from reports.statistics.relative_excess import (
     TOTAL,
     excess_of,
     relative_metric,
-    rows_of_other_shapes,
-    rows_of_shapes,
 )
 from reports.statistics.verdicts import compare_methods
 from reports.tables.findings import NOTES, PRINTED
@@ -150,26 +148,28 @@ def _families(run: Run) -> Iterator[tuple[str, str, list[str], pd.DataFrame]]:
 
 
 METRICS = (TOTAL, "energy/strain", "energy/collision", "penetration/vertices")
+SHAPE = "body/shape"  # norm of the parameters of a shape
 OTHERS, MEAN_BODY = "other shapes", "mean shape"
 
 
 def shapes(run: Run) -> list[Table]:
     """Tabulate each method on all other bodies together and on the mean body, with its relative excess."""
-    rows, norms = rows_of_shapes(run)
+    cells = run.cells("shapes")
+    known = cells[(cells["metric"] == SHAPE) & cells["usable"]]
+    norms = known.drop_duplicates("scene").set_index("scene")["value"]
+    rows = cells[cells["scene"].isin(norms.index)]
     metrics = [run.metrics[name] for name in METRICS if name in run.metrics]
-    if rows.empty or not metrics:
+    if norms.nunique() < 2 or not metrics:
         return []
     methods = run.ordered(set(rows["method"]) - set(run.reference_ensemble))
     lines: list[tuple[Cell, ...]] = []
-    for name, part in (
-        (OTHERS, rows_of_other_shapes(run)),
-        (MEAN_BODY, rows[rows["scene"].isin(norms.index[norms == 0.0])]),
-    ):
-        cells = means(part, "method", "metric")
+    for name, scenes in ((OTHERS, norms.index[norms > 0.0]), (MEAN_BODY, norms.index[norms == 0.0])):
+        part = rows[rows["scene"].isin(scenes)]
+        all_means = means(part, "method", "metric")
         for method in methods:
             excess = None if method in (run.reference, SKINNING) else excess_of(run, part, method)
             share = (excess.effect, excess.mean) if excess else (None, None)
-            lines.append((name, method, *share, *(cells.get((method, m.name)) for m in metrics)))
+            lines.append((name, method, *share, *(all_means.get((method, m.name)) for m in metrics)))
     columns = (
         Column("scene", "Body", text=True), METHOD, Column("typical", "Typical", "%", digits=2),
         Column("mean", "Mean", "%", digits=2), *map(metric_column, metrics),
