@@ -81,6 +81,7 @@ def test_a_last_layer_of_zero_starts_at_the_template(kind, narrow):
     assert all(not p.any() for layer in network.last_layers() for p in layer.parameters())
 
 
+@pytest.mark.slow
 def test_initial_strain_at_the_papers_size_is_of_the_authors_order(body):
     """Some 200 J, where the authors report 391 J of their own training; by torch's rules 70,000 J.
 

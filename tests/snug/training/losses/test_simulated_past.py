@@ -124,6 +124,7 @@ def test_a_history_is_every_rate_once_and_no_later_one():
     assert rested[HISTORY + 5].any() and not rested[HISTORY + 7 :].any()
 
 
+@pytest.mark.slow
 def test_training_brings_the_swing_into_the_network():
     motions = [swaying(30), swaying(26, name="other", degrees=15.0)]
     trajectories = {motion.name: thrown(motion, 0.05) for motion in motions}
