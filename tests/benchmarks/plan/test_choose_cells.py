@@ -49,7 +49,7 @@ def test_the_reference_comes_first_in_every_scene():
     for cell in planned("full:garments,speed", *TESTS).cells:
         if not cell.scene.networks_only:
             first.setdefault(cell.scene.name, cell.method)
-    assert set(first.values()) == {"simulation"} and len(first) == 9
+    assert set(first.values()) == {"simulation"} and len(first) == 8
 
 
 def test_only_what_has_a_seed_is_repeated_and_the_rest_is_the_same_whatever_the_seeds():
