@@ -1,7 +1,7 @@
 from .declarations import DeclarationError as DeclarationError
 from .method import Method as Method
 from .method import MethodEntry as MethodEntry
-from .methods.outside.program import program as program
+from .methods.outside import program as program
 from .metric import Estimate as Estimate
 from .metric import Metric as Metric
 from .metric import RollOut as RollOut
