@@ -113,7 +113,7 @@ def test_a_file_of_a_body_shape_beside_clips_is_left_out(tmp_path, refused):
     shapes = subject(tmp_path / "shapes")
     (tmp_path / "01" / "b.npz").write_bytes(b"PK")
     # A shape that is named by itself was meant to be a motion.
-    for path, hint in ((f"{folder}/shape.npz", "no array of a motion"), (shapes, "holds no motion file"),
+    for path, hint in ((f"{folder}/shape.npz", "no array 'poses'"), (shapes, "holds no motion file"),
                        (folder, "b.npz")):  # fmt: skip
         refused(hint, run.main, [*WORDS, "--motions", path, *out])
 
