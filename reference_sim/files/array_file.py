@@ -122,20 +122,6 @@ def write_array(path: str | Path, array: np.ndarray) -> None:
         stream.write(array.reshape(-1).data)
 
 
-def array_names(path: str | Path) -> list[str]:
-    """Return the names of the arrays of an .npz file.
-
-    Raises:
-        ArrayFileError: no archive.
-    """
-    path = Path(path)
-    try:
-        with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
-            return [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
-    except Exception as error:
-        raise refusal(path, "", error) from None
-
-
 def _array(stream: IO[bytes]) -> np.ndarray:
     """Read the array that a stream holds and nothing else; raise whatever its bytes make numpy raise."""
     with warnings.catch_warnings():  # of headers that Python 2 wrote, and of odd bytes in them

@@ -13,7 +13,7 @@ from benchmarks.methods import METHODS
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
-from reference_sim.files.array_file import array_names
+from reference_sim.files.array_file import read_arrays
 from tests.benchmarks.plan.planned import planned
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -83,6 +83,6 @@ def test_a_failed_cell_is_a_row_and_the_rest_goes_on(tmp_path, misbehaving, caps
     shown, log = capsys.readouterr()
     assert shown.strip().splitlines()[-1] == str((out / "report.pdf").resolve())
     assert "newton-1" in log and (out / "report.pdf").stat().st_size > 1000
-    fields = array_names(RunFolder(out).curves_path("free_fall", "simulation"))
+    fields = read_arrays(RunFolder(out).curves_path("free_fall", "simulation"))
     assert {"energy/gravity", "energy/inertia", "energy/total"} <= set(fields)
     assert not [path for path in out.rglob("*") if "part" in path.name]
