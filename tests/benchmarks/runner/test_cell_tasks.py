@@ -151,7 +151,7 @@ def test_a_cell_loads_nothing_that_its_key_does_not_know(scene, tmp_path):
 )
 def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path):
     plan = plan_of(tmp_path, "newton-1", how=how)
-    runner = finish(plan, "cells", "metrics", processes=how in ("segfault", "killed"))
+    runner = finish(plan, "cells", "metrics", processes=True)  # other threads of the tests falsify its times
     outcome = runner.outcomes["cell", plan.cells[0].name]
     assert outcome.status == status and word in outcome.reason and outcome.failed and not outcome.files
     (row,) = rows_of_cell(runner, plan)

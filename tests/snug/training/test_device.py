@@ -238,11 +238,12 @@ def test_the_harness_hands_the_device_on(tmp_path):
     """An absent device is refused where the plan is made, and would be refused where training starts."""
     from benchmarks.plan.make_plan import check_machines
     from benchmarks.plan.study import read_study
+    from benchmarks.runner.networks import train
     from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 
     dressed, motion = tube_dress(), swaying(12)
-    task = training("snug", motion.name, steps=2, device="cuda")
+    job = training("snug", motion.name, steps=2, device="cuda")
     with pytest.raises(DeviceError, match="--device cuda"):
         check_machines(replace(read_study("smoke"), device="cuda"), tmp_path, "")
     with pytest.raises(DeviceError, match="--device cuda"):
-        task.run(context(tmp_path, assets_of(dressed, motion)), {})
+        train(job, context(tmp_path, assets_of(dressed, motion)), {})
