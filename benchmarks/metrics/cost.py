@@ -36,17 +36,16 @@ COST = Measurements(
         ("cost/train_frames", "1", "Training frames",
          "frames that it learned from, augmented ones included", _SIZE),
         ("cost/frame", "ms", "Inference",
-         "inference time: time of the whole run over the frames computed, one frame at a time on one thread; "
-         "the median of repeated runs"),
+         "inference time: run time divided by the number of frames, one frame at a time on one thread; "
+         "median of repeated runs"),
         ("cost/whole", "ms", "End to end",
-         "the same and what the method takes as ready: features and joint transforms of a network, the posed "
-         "body of a solver, made one frame at a time: from pose to world vertices"),
+         "end-to-end time: inference and the preparation of its inputs, from pose to world vertices"),
         ("cost/frame_p50", "ms", "Median frame",
-         "50 % of the frames take less inference time, each by its median run", {"table": ""}),
+         "median of the inference times of single frames, each by its median run", {"table": ""}),
         ("cost/frame_p95", "ms", "Frame, p95",
-         "95 % of the frames take less inference time, each by its median run"),
+         "95th percentile of the inference times of single frames, each by its median run"),
         ("cost/frame_worst", "ms", "Slowest frame",
-         "inference time of the slowest frame by its median run", {"table": ""}),
+         "inference time of the slowest frame, by its median run", {"table": ""}),
         ("cost/batch", "ms", "In batch", "time per frame and body of 16 bodies at once"),
         ("cost/spread", "%", "Spread",
          "largest less smallest repeat, as a share of their median", {"table": ""}),

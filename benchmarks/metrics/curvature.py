@@ -242,8 +242,9 @@ CURVATURE = Measurements(
         ("curvature/mean_difference", "1/m", "Difference of means",
          "area-weighted mean of H less that of the reference"),
         ("curvature/change", "1", "Change of wrinkles",
-         "mean |H - median of the vertex over frames| over mean |H - mean of all|, by area: the part of the "
-         "spread of curvature that is in time; 0 where wrinkles stay the same, at most 1"),
+         "share of the scatter of curvature that is change over time: mean |H - median of the vertex over "
+         "frames| divided by mean |H - mean of all vertices and frames|, weighted by area; 0 where "
+         "wrinkles never change, at most 1"),
         table="curvature",
     ),
     measure=measure, compare=compare, series=series,

@@ -240,14 +240,17 @@ DYNAMICS = Measurements(
     "dynamics",
     metrics_of(
         ("dynamics/quasi_static_difference", "mm", "From quasi-static",
-         "root mean square distance to the method's own answer to each pose held still"),
+         "root mean square distance to the method's own quasi-static solution"),
         ("dynamics/amplitude", "1", "Hem amplitude",
-         "amplitude of the hem's dynamic part over that of the simulation's; the dynamic part is what motion "
-         "adds to the own answer to poses held still"),
-        ("dynamics/correlation", "1", "Correlation", "cosine between the two dynamic parts"),
+         "root mean square of the hem's dynamic part (motion less the method's own quasi-static "
+         "solution), divided by the simulation's"),
+        ("dynamics/correlation", "1", "Correlation",
+         "cosine between the dynamic parts of method and simulation"),
         ("dynamics/gain", "1", "Gain",
-         "factor by which the hem answers its own quasi-static turn or shift"),
-        ("dynamics/lag", "frames", "Lag", "frames by which it comes later"),
+         "factor of the least-squares fit of the hem's turn (or shift) to that of its own quasi-static "
+         "solution, dynamics/lag frames earlier"),
+        ("dynamics/lag", "frames", "Lag",
+         "frames by which the hem follows its own quasi-static solution"),
         *((f"dynamics/common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
            f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to poses "
            "held still", {"table": "" if name in ("gain", "lag") else "dynamics"})

@@ -195,8 +195,8 @@ PRINTED_BENDING = Measurements(
     "printed_bending",
     metrics_of(
         ("energy/bending_printed", "J", "Bending, as printed",
-         "energy of the same hinges without their scale, k/2 theta^2 as the SNUG paper prints it; no part of "
-         "the total; mean over frames"),
+         "energy of the hinges as the SNUG paper prints it, k/2 theta^2; no part of the total; mean over "
+         "frames"),
         lower_is_better=True,
     ),
     measure=measure_printed_bending,

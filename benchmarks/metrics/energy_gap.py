@@ -221,23 +221,23 @@ GAP = Measurements(
     "optimality",
     metrics_of(
         ("gap/energy", "J", "Energy gap",
-         "how far frames lie above the lowest minimum found of their own time step, mean over frames"),
+         "energy of a frame above the lowest minimum found of its own time step, mean over frames"),
         ("gap/relative", "1", "Relative energy gap",
-         "the same over what skinning, or the first guess, lies above the steps of the simulation: one scale "
-         "a scene, the same for all methods"),
+         "energy gap divided by gap/scale, which is the same for all methods of a scene"),
         ("gap/scale", "J", "Scale of the gap",
-         "that scale: what skinning, or the first guess, lies above the steps of the simulation",
+         "energy of the skinned garment (without a body: of the step's first guess) above the "
+         "reference's, in the reference's time steps; mean over frames",
          {"table": "", "lower_is_better": None}),
-        ("gap/local", "J", "Local gap", "how far frames lie above the minimum below the frame itself",
+        ("gap/local", "J", "Local gap",
+         "energy of a frame above the minimum that a descent from this frame reaches, mean over frames",
          {"table": ""}),
         ("gap/refrozen", "J", "Refrozen gap",
-         "how far frames lie above the minimum below them where contact planes are searched at the frame "
-         "instead of the step's first guess"),
+         "the same with contact planes searched at the frame in place of the step's first guess"),
         ("step/distance", "mm", "One-step distance",
-         "root mean square distance of vertices between a frame and the minimum of its own time step that "
-         "lies below it, mean over frames"),
+         "root mean square distance between a frame and the local minimum of its own time step, mean over "
+         "frames"),
         ("step/curvature", "1/m", "One-step curvature error",
-         "|H - H_min| of the same vertices between a frame and that minimum, mean by its areas"),
+         "|H - H_min| between a frame and that minimum, mean by area and over frames"),
         ("gradient/norm", "1", "Gradient",
          "largest component of the gradient left in a step, in mean vertex weights"),
         table="speed", lower_is_better=True,

@@ -118,8 +118,8 @@ INTERSECTIONS = Measurements(
         ("intersections/contours", "m", "Contours",
          "length of the lines in which triangles of the cloth pass through others of it, mean over frames"),
         ("intersections/swept", "1", "Swept",
-         "pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each other "
-         "between two frames on straight ways; mean over 12 evaluated pairs of frames, needs ipctk"),
+         "pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each other on "
+         "straight ways between two frames; mean over 12 pairs of frames, needs ipctk"),
         table="intersections", lower_is_better=True,
     ),
     measure=lambda roll_out: measure_triangles(roll_out) | measure_swept(roll_out),

@@ -201,8 +201,8 @@ GEOMETRY = Measurements(
         ("penetration/depth_p99", "mm", "Depth, 99 %",
          "99 % of all vertices and frames are less deep; 0 outside", {"table": ""}),
         ("penetration/own_part_p999", "mm", "Own part, 99.9 %",
-         "99.9 % depth below the part of the body that a vertex belongs to: cloth in the fold of a hip does "
-         "not count"),
+         "99.9th percentile of the depth below the part of the body that a vertex belongs to: cloth in "
+         "the fold of a hip does not count"),
         table="penetration", lower_is_better=True,
     ),
     measure=measure, compare=compare,

@@ -18,14 +18,14 @@ The contact planes are the one difference: training keeps an anchor for each sam
 takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
 closest point.
 
-The material of PBNS itself (Bertiche et al. 2021): springs, hinges, uniform mass, squared contact.
+The material of PBNS itself (Bertiche et al. 2021), springs, hinges, uniform mass, squared contact::
 
     edges    15 (l - l0)^2                  [J]  reference_sim's StretchSpring, exactly
     bending  5e-5 |n0 - n1|^2               [J]  reference_sim's BendHinge, 5e-5 theta^2: the nearest there is
     gravity  m g y, m = 0.3 kg/m^2 A / V    [J]  the same mass for every vertex
     contact  25 max(4 mm - n.(x - c), 0)^2  [J]  on vertices, with the contact planes of all our training
 
-|n0 - n1|^2 = 4 sin^2(theta/2) = theta^2 - theta^4/12 + ...: the hinge has 3 % more at 0.6 rad, and goes on
+`|n0 - n1|^2 = 4 sin^2(theta/2) = theta^2 - theta^4/12 + ...`: the hinge has 3 % more at 0.6 rad, and goes on
 growing where a folded edge no longer resists. Constants as in the authors' own training. No inertia: a static
 method, on the mean body.
 """
@@ -133,8 +133,9 @@ def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
 class ClosedForms(torch.autograd.Function):
     """Energies of each configuration of a batch by kernels in lanes, which all add to one gradient.
 
-    apply(x (N, T, V, 3) float32, *kernels) -> as many (N, T) [J]. Differentiable once, by x alone, and only
-    in their plain sum times a number: raises ValueError for energies that are weighed against each other.
+    `apply(x, *kernels)`: x (N, T, V, 3) float32 -> as many (N, T) [J] as kernels. Differentiable once, by x
+    alone, and only in their plain sum times a number: raises ValueError for energies that are weighed against
+    each other.
     """
 
     @staticmethod
