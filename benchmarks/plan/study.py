@@ -38,9 +38,9 @@ class StudyError(ValueError):
 class Part:
     """Scenes that meet methods, and known answers; its name is the column `suite` of its rows.
 
-    A pattern has `*`, `?` or `[..]`; one that begins with `!` takes names out. In scenes, {garment} stands for
-    the first garment, {motion} for each measured motion of a scene's garment, {motion 1} for the first of
-    them, {swinging 1} for the first of a garment that swings.
+    A pattern has `*`, `?` or `[..]`; one that begins with `!` takes names out. In scenes, {garment} stands
+    for the first garment, {motion} for each measured motion of a scene's garment, {motion 1} for the first
+    of them, {swinging 1} for the first of a garment that swings.
 
     Attributes:
         question: what it answers, one line.
