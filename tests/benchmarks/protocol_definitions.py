@@ -117,7 +117,7 @@ def _motions() -> dict[str, Any]:
 def _metrics() -> dict[str, Any]:
     from benchmarks.metrics import declared
 
-    without = ("title", "table", "declared_in")  # how a report shows it
+    without = ("title", "definition", "table", "declared_in")  # prose, and how a report shows it
     return {
         name: {field: value for field, value in asdict(metric).items() if field not in without}
         for name, metric in declared().items()

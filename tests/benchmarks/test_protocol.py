@@ -82,7 +82,8 @@ def test_a_changed_formula_changes_the_energies(monkeypatch, parts):
 def test_titles_and_prose_are_no_part_of_it(monkeypatch):
     from benchmarks.metrics import declared
 
-    renamed = {name: dataclasses.replace(metric, title="Another") for name, metric in declared().items()}
+    prose = {"title": "Another", "definition": "the same in other words"}
+    renamed = {name: dataclasses.replace(metric, **prose) for name, metric in declared().items()}
     monkeypatch.setattr("benchmarks.metrics.declared", lambda: renamed)
     assert digest(protocol._metrics()) == DIGESTS["metrics"]
 
