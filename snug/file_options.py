@@ -1,4 +1,4 @@
-"""What is said of a file behind its path, as in shirt.obj,units=cm,up=z; every command reads it so.
+"""Words behind the path of a file, as in shirt.obj,units=cm,up=z; every command reads them so.
 
 Light to import; snug.garments.reading and snug.motion.files read the files.
 """
@@ -126,11 +126,14 @@ def split_words(text: str) -> tuple[str, dict[str, Any]]:
 
 def _word(text: str) -> tuple[str, Any]:
     key, equals, value = (part.strip() for part in text.partition("="))
+    name = key.replace("-", "_")
+    if not equals:
+        return name, True
     try:
         numbers = [float(word) for word in value.split()]
     except ValueError:
-        return key.replace("-", "_"), value
-    return key.replace("-", "_"), (numbers if len(numbers) > 1 else numbers[0]) if equals else True
+        return name, value
+    return name, (numbers if len(numbers) > 1 else numbers[0]) if numbers else value
 
 
 def is_garment_file(word: str) -> bool:
@@ -142,8 +145,9 @@ def parse_garment_file(text: str) -> GarmentFile:
     """Return the garment file that FILE[,key=value...] means. Raises ValueError."""
     path, words = split_words(text)
     words = {"path": path, **words}
-    if isinstance(words.get("shift"), list):
-        words["shift"] = tuple(words["shift"])
+    if "shift" in words:
+        shift = words["shift"]
+        words["shift"] = tuple(shift) if isinstance(shift, list) else (shift,)
     return _made(GarmentFile, words, text)
 
 
@@ -158,7 +162,11 @@ def _made(kind: Any, words: Mapping[str, Any], text: str) -> Any:
     for name in words:
         if name not in known:
             raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(known)}")
-    paths = {name: Path(words[name]) for name in ("path", "material", "joint_map") if name in words}
+    places = {name: words[name] for name in ("path", "material", "joint_map") if name in words}
+    for name, place in places.items():
+        if not (isinstance(place, str) and place):
+            raise ValueError(f"{text}: {name}={place}: give a path")
+    paths = {name: Path(place) for name, place in places.items()}
     try:
         return kind(**{**words, **paths})
     except ValueError as error:

@@ -28,6 +28,7 @@ import numpy as np
 
 from reference_sim.files.array_file import read_arrays, read_pickled_arrays
 from reference_sim.files.mesh_files import MESH_SUFFIXES, METRES, UP_AXES, Surface, read_mesh, read_sequence
+from snug.file_options import split_words
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
 MODULE = "benchmarks.methods.outside:make_stored"
@@ -126,25 +127,14 @@ def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any
     >>> parse_roll_out("mine=out.npz,units=cm,ms=2.2")
     ('mine', {'path': 'out.npz', 'units': 'cm', 'ms': 2.2})
     """
-    given, *pairs = text.split(",")
+    given, words = split_words(text)
     name, equals, path = (part.strip() for part in given.partition("="))
     if not (named or equals):
         stem = Path(given.rstrip("/").replace(PLACE, "")).stem
-        name, path = re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out", given.strip()
+        name, path = re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out", given
     if not (name and path):
         raise RollOutFileError(f"{text}: give NAME=FILE, with ,units=cm and the like behind it")
-    return name, {"path": path, **dict(map(_word, pairs))}
-
-
-def _word(text: str) -> tuple[str, Any]:
-    """Return key and value of key=value; of a key alone, True."""
-    key, equals, value = (part.strip() for part in text.partition("="))
-    if not equals:
-        return key, True
-    try:
-        return key, float(value)
-    except ValueError:
-        return key, value
+    return name, {"path": path, **words}
 
 
 ALIKE = ("positions", "faces", "fps", "obstacle", "obstacle_faces", "quasi_static")

@@ -159,7 +159,7 @@ MOVED = {"__builtin__": "builtins", "copy_reg": "copyreg"}
 
 
 class _Stand:
-    """What stands for an object of chumpy or scipy: its attributes, and nothing of its class."""
+    """Stand for an object of chumpy or scipy: its attributes, and nothing of its class."""
 
     state: dict[str, Any]
 

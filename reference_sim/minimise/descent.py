@@ -1,4 +1,4 @@
-"""What minimisers share: result and reason to stop, history of L-BFGS, point reached, line search, loop."""
+"""Descent, the common part of all minimisers: result, reason to stop, L-BFGS history, line search, loop."""
 
 from __future__ import annotations
 

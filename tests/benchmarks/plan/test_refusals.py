@@ -1,4 +1,4 @@
-"""What cannot be meant is one line, with status 2, and leaves nothing: fields, options, files of a user."""
+"""Refusals of fields, options and a user's files: one line, status 2, and nothing is left behind."""
 
 from __future__ import annotations
 

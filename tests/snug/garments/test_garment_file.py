@@ -237,6 +237,9 @@ def test_a_seam_that_a_program_left_open_is_refused(tmp_path, body, tube, gap):
     ("words", "expected"),
     [
         ("shift=-1 2", "give three numbers"),
+        ("shift=1", "give three numbers"),
+        ("material", "material=True: give a path"),
+        ("units=", "units=: choose from m, cm, mm, in"),
         ("uv_scale=2", "add rest=uv"),
         ("units=km", "units=km: choose from m, cm, mm, in"),
         ("unit=cm", "no word is called 'unit'; there are path, units"),
