@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference_sim.cloth import Cloth, MeshError
+from reference_sim.cloth import MeshError
 from reference_sim.files.mesh_files import Surface
 from reference_sim.geometry.topology import corner_areas
 
@@ -89,12 +89,6 @@ def rest_chart(surface: Surface, scale: float) -> np.ndarray:
             f"mesh: that is a texture and no pattern; {instead}"
         )
     return chart
-
-
-def flattened(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return a chart (F, 3, 2) [m] of a mesh at rest in space: each triangle laid flat by itself."""
-    frames = Cloth(positions, faces).frames
-    return np.concatenate([np.zeros((len(faces), 1, 2)), frames.transpose(0, 2, 1)], axis=1)
 
 
 def stretches(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:

@@ -37,7 +37,6 @@ class Body:
         parents: (24,), -1 for the root.
         pose_directions: None, or (B, 3, 9 K) [m]: pose correctives, for one unit of each entry of R - I, row
             by row, of the rotations R of joints 1 to K relative to their parents.
-        arms_lowered: None, or (2,) [rad] by which the left and the right arm hang down in the file.
         joint_names: 24 names, the same for every body.
 
     Source:
@@ -53,7 +52,6 @@ class Body:
     faces: NDArray[np.int64]
     parents: NDArray[np.int64]
     pose_directions: NDArray[np.float64] | None = None
-    arms_lowered: NDArray[np.float64] | None = None
     joint_names: ClassVar[tuple[str, ...]] = JOINT_NAMES
 
     @staticmethod

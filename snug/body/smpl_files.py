@@ -3,24 +3,21 @@
 | content | arrays, the first that is there | shape |
 | --- | --- | --- |
 | vertices | `v_template`, `vertices`, `template` | (B, 3) [m], y up, facing +z, pelvis at x = 0 |
-| faces, closed and wound outwards | `f`, `faces` | (F, 3), (F, 4) |
+| faces, closed and wound outwards | `f`, `faces` | (F, 3) |
 | weights, rows sum to one | `weights`, `blend_weights`, `lbs_weights`, `skinning_weights` | (B, J) |
 | SMPL's tree | `kintree_table`; or `parents` | (2, J); (J,) |
 | joints from vertices, dense or `csc_matrix` | `J_regressor` | (J, B) |
-| or joints | `J_template`, `joints`, `joint_template`, `J` | (J, 3) [m] |
+| or joints, of a body without shapes | `J_template`, `joints`, `joint_template`, `J` | (J, 3) [m] |
 | shapes, optional, the first ten | `shapedirs`, `shape_directions` | (B, 3, S) |
-| how shape moves joints without regressor | `J_shapedirs`, `joint_directions` | (J, 3, S) |
 | pose correctives, optional | `posedirs` | (B, 3, 9 (J - 1)) |
-| axes of the bones, optional, the identity | `rest_pose` | (J, 3), (J, 4) |
 
 J: 24 of SMPL, 52 of SMPL-H, 55 of SMPL-X. Of the latter two, fingers go into the hand, jaw and eyes into the
-head, in weights and skeleton; the hand's joint is the mean of its knuckles. A rest pose with lowered arms is
-brought to the T pose, since that is what motions are relative to.
+head, in weights and skeleton; the hand's joint is the mean of its knuckles. The arms are horizontal, since
+motions are relative to the T pose.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,15 +28,11 @@ from reference_sim.geometry.topology import boundary_loops, check_closed
 from snug.body.parametric_body import SHAPES, Body
 from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, PARENTS, BodyError
 
-ARM_JOINTS = ("shoulder", "elbow", "wrist", "hand")
-SIDE_SIGNS = (("left", 1.0), ("right", -1.0))
-
-
 JOINTS = len(JOINT_NAMES)
 FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
 MAX_VERTICES = 100_000
 MAX_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
-T_POSE, A_POSE = np.radians(10.0), np.radians(60.0)  # angles up to which arms may hang down
+T_POSE = np.radians(10.0)  # up to which arms may hang down
 
 SYNONYMS = {
     "v_template": ("v_template", "vertices", "template"),
@@ -49,9 +42,7 @@ SYNONYMS = {
     "J_regressor": ("J_regressor",),
     "J_template": ("J_template", "joints", "joint_template", "J"),
     "shapedirs": ("shapedirs", "shape_directions"),
-    "J_shapedirs": ("J_shapedirs", "joint_directions"),
     "posedirs": ("posedirs",),
-    "rest_pose": ("rest_pose",),
 }
 REQUIRED = ("v_template", "f", "weights", "kintree_table")
 
@@ -59,7 +50,7 @@ Arrays = dict[str, np.ndarray]
 
 
 def read_body(path: str | Path | None) -> Body:
-    """Read and check a user's body, and bring it to the T pose.
+    """Read and check a user's body.
 
     Args:
         path: .npz or .pkl in SMPL's layout, see the table above; None for the body of the package.
@@ -74,7 +65,7 @@ def read_body(path: str | Path | None) -> Body:
         return Body.load()
     path = Path(path)
     try:
-        return _in_t_pose(_make_body(_read_arrays(path)))
+        return _make_body(_read_arrays(path))
     except ArrayFileError as error:
         remedy = "expected an .npz of plain arrays, as numpy.savez writes, or a .pkl"
         raise BodyError(f"{error}; {remedy}") from error
@@ -111,7 +102,7 @@ def _numbers(arrays: Arrays, key: str, shape: tuple[int | None, ...]) -> np.ndar
 
 
 def _make_body(arrays: Arrays) -> Body:
-    """Make the body in the pose of its file. Raises BodyError."""
+    """Make the body. Raises BodyError."""
     template = _numbers(arrays, "v_template", (None, 3))
     count = len(template)
     if count > MAX_VERTICES:
@@ -154,13 +145,6 @@ def _skeleton(arrays: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.nd
     sums = weights.sum(axis=1, keepdims=True)
     if weights.min() < -1e-6 or np.abs(sums - 1.0).max() > 1e-3:
         raise BodyError("weights must be non-negative with rows that sum to one")
-    if "rest_pose" in arrays:  # axis-angles, or quaternions with w first or last
-        turns = np.abs(_numbers(arrays, "rest_pose", (joints, None)))
-        still = ([0, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1])
-        if not any(len(one) == turns.shape[1] and np.allclose(turns, one, atol=1e-4) for one in still):
-            raise BodyError(
-                "rest_pose gives bones axes of their own; give a body without, and its motion too"
-            )
     kept = JOINTS if joints == JOINTS else BODY_JOINTS
     wrong = [j for j in range(1, kept) if parents[j] != PARENTS[j]]
     if wrong:
@@ -192,19 +176,13 @@ def _joints(
     if "J_regressor" in arrays:
         regressor = _numbers(arrays, "J_regressor", (joints, len(template)))
         return regressor @ template, np.einsum("jv,vcs->jcs", regressor, directions)
-    if "J_template" not in arrays or ("J_shapedirs" not in arrays and directions.shape[2]):
-        raise BodyError("no joints; expected J_regressor, or joints, with shapedirs also J_shapedirs")
-    joint_directions = np.zeros((joints, 3, 0))
-    if directions.shape[2]:
-        joint_directions = _numbers(arrays, "J_shapedirs", (joints, 3, None))[:, :, :SHAPES]
-    if joint_directions.shape[2] != directions.shape[2]:
-        shapes = f"{joint_directions.shape[2]} shapes, shapedirs {directions.shape[2]}"
-        raise BodyError(f"J_shapedirs has {shapes}")
-    return _numbers(arrays, "J_template", (joints, 3)), joint_directions
+    if "J_template" not in arrays or directions.shape[2]:
+        raise BodyError("no joints; expected J_regressor, or joints of a body without shapes")
+    return _numbers(arrays, "J_template", (joints, 3)), np.zeros((joints, 3, 0))
 
 
 def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
-    """Raise BodyError unless this is a person in metres, y up, facing +z, at x = 0."""
+    """Raise BodyError unless this is a person in metres, y up, facing +z, at x = 0, arms horizontal."""
     low, high = template.min(axis=0), template.max(axis=0)
     size = high - low
     if not 0.5 < size[1] < 3.0 or max(size) > 3.0:
@@ -224,48 +202,10 @@ def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
         raise BodyError("the left shoulder is not at larger x, or the neck not above; turn it to face +z")
     if abs(at["pelvis"][0]) > 0.05:
         raise BodyError(f"the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
-
-
-def _in_t_pose(body: Body) -> Body:
-    """Return the body with horizontal arms. Raises BodyError.
-
-    The new rest pose is the one that linear blend skinning takes back to the old one exactly: each vertex is
-    moved by the inverse of the blended transform. Blending forwards would lose volume at the shoulder here,
-    and once more whenever the arm comes down. All is linear in points and joints together: shape directions
-    turn with them.
-    """
-    at = body.joint_template
-    arms = [(at[JOINT[f"{side}_wrist"]] - at[JOINT[f"{side}_shoulder"]], sign) for side, sign in SIDE_SIGNS]
-    lowered = np.array([np.arctan2(-arm[1], sign * arm[0]) for arm, sign in arms])
-    if np.abs(lowered).max() <= T_POSE:
-        return body
-    degrees = " and ".join(f"{angle:.0f}" for angle in np.degrees(lowered))
-    if np.abs(lowered).max() > A_POSE:
-        raise BodyError(f"the arms hang by {degrees} degrees; give the body in T pose or A pose (to 60)")
-    if body.pose_directions is not None:
-        raise BodyError(f"the arms hang by {degrees} degrees; posedirs need a T pose, leave them out")
-    turns = np.broadcast_to(np.eye(3), (JOINTS, 3, 3)).copy()  # in the world: each arm as one piece
-    for (side, sign), angle in zip(SIDE_SIGNS, lowered, strict=True):
-        c, s = np.cos(angle), sign * np.sin(angle)
-        turns[[JOINT[f"{side}_{part}"] for part in ARM_JOINTS]] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
-    points = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
-    joints = np.concatenate([body.joint_template[..., None], body.joint_directions], axis=2)
-    moved = joints.copy()
-    for joint, parent in enumerate(PARENTS):
-        if parent >= 0:
-            moved[joint] = moved[parent] + turns[parent] @ (joints[joint] - joints[parent])
-    back = turns.transpose(0, 2, 1)
-    blended = np.einsum("vj,jab->vab", body.skinning_weights, back)
-    shift = np.einsum("vj,jak->vak", body.skinning_weights, joints - back @ moved)
-    points = np.linalg.solve(blended, points - shift)
-    return replace(
-        body,
-        template=points[..., 0],
-        shape_directions=points[..., 1:],
-        joint_template=moved[..., 0],
-        joint_directions=moved[..., 1:],
-        arms_lowered=lowered,
-    )
+    for side in ("left", "right"):
+        arm = at[f"{side}_wrist"] - at[f"{side}_shoulder"]
+        if (angle := abs(np.arctan2(arm[1], abs(arm[0])))) > T_POSE:
+            raise BodyError(f"the {side} arm is {np.degrees(angle):.0f} degrees off the T pose; lift it")
 
 
 def _faces(arrays: Arrays, template: np.ndarray) -> np.ndarray:
@@ -274,13 +214,11 @@ def _faces(arrays: Arrays, template: np.ndarray) -> np.ndarray:
     Small holes, as the eyes of SMPL-X, are closed by fans of triangles. Raises BodyError.
     """
     faces = arrays["f"]
-    if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu" or faces.size == 0:
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu" or faces.size == 0:
         raise BodyError(f"f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)")
     faces = faces.astype(np.int64)
     if faces.min() < 0 or faces.max() >= len(template):
         raise BodyError(f"f names vertex {faces.max()}; the body has {len(template)}")
-    if faces.shape[1] == 4:
-        faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     try:
         for loop in boundary_loops(faces):
             around = np.linalg.norm(template[loop] - template[np.roll(loop, 1)], axis=1).sum()

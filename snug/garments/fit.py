@@ -8,7 +8,7 @@ squares with the far ones held back (Huber), begun from many places. How high a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,39 +83,16 @@ class Fit:
         return float(uneven / self.size + self.at_ends)
 
 
-def pose_in_file(body: Body) -> Array:
-    """Return the pose (24,3) [rad] that a body has in its file, in which garments were made for it."""
-    pose = np.zeros((len(body.joint_names), 3))
-    if body.arms_lowered is None:
-        return pose
-    pose[body.joint_names.index("left_shoulder"), 2] = -body.arms_lowered[0]
-    pose[body.joint_names.index("right_shoulder"), 2] = body.arms_lowered[1]
-    return pose
-
-
-def body_as_in_file(body: Body) -> Body:
-    """Return the mean body with template and joints as its file has them."""
-    if body.arms_lowered is None:
-        return body
-    pose, here = pose_in_file(body)[None], np.zeros((1, 3))
-    moved = body.transforms(pose, here)[0]
-    joints = np.einsum("jab,jb->ja", moved[..., :3], body.joint_template) + moved[..., 3]
-    return replace(body, template=body.vertices(pose, here)[0], joint_template=joints)
-
-
 class DressForm:
-    """The mean body as its file has it, to measure distances to.
+    """The unposed mean body, to measure distances to.
 
     Attributes:
-        body: in T pose.
-        posed: the same in the pose of its file.
-        skin: the surface of `posed`.
+        body: that is dressed.
+        skin: its surface.
     """
 
     def __init__(self, body: Body) -> None:
-        self.body, self.posed = body, body_as_in_file(body)
-        body = self.posed
-        self.height = body.height
+        self.body, self.height = body, body.height
         self.low, self.high = body.template.min(axis=0), body.template.max(axis=0)
         self.skin = Obstacle(body.template, body.faces)
         at_ends = np.isin(body.faces, np.flatnonzero(skin_following(body, ENDS)))

@@ -149,7 +149,7 @@ def find_weights(
     limbs that the garment encloses. One tube around both legs is smoothed below the hips as a skirt is.
 
     Args:
-        body: in the pose that the garment was made for.
+        body: that the garment was made for.
         positions: (V,3) [m].
         faces: (F,3), wound outward.
         legs: whether each leg has its own opening.

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.array_file import ArrayFileError, read_arrays
 from reference_sim.files.mesh_files import METRES, Surface, read_mesh, to_metres_y_up
-from reference_sim.files.uv_chart import flattened, join_seams, rest_chart, stretches
+from reference_sim.files.uv_chart import join_seams, rest_chart, stretches
 from reference_sim.geometry.topology import corner_angles
 from reference_sim.material import Material, MaterialError
 from snug.body.parametric_body import Body
 from snug.file_options import GarmentFile
-from snug.garments.fit import DressForm, find_placement, pose_in_file
+from snug.garments.fit import DressForm, find_placement
 from snug.garments.garment import (
     Garment,
     GarmentError,
@@ -28,7 +28,6 @@ from snug.garments.garment import (
     name_openings,
     open_seam,
     piece_of_faces,
-    smooth_weights,
 )
 
 Array = NDArray[np.float64]
@@ -39,7 +38,6 @@ OUTWARD = 0.5  # share of the area that looks away from the skin, below which a 
 SLIVERS = "slivers slow the simulation down: remesh"
 LOOSE = "a piece that is not sewn on falls off: merge the vertices along its seams"
 OK, NOTE, UNUSABLE = "ok", "note", "unusable"  # levels of a finding
-UNPOSED_SMOOTHING = 20  # rounds over borrowed weights at 1000 vertices, as recipes have it
 AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2], lightest and heaviest cloth: beyond them a unit is mistaken
 
 
@@ -77,7 +75,7 @@ def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
 
     Args:
         file: a mesh file, or such a file with its units, axis, rest shape and material.
-        body: in T pose; a garment made for its lowered arms is brought to the T pose.
+        body: in T pose, for which the garment was made.
 
     Raises:
         GarmentError: file, problem, remedy.
@@ -268,14 +266,10 @@ def _make_garment(
     material: Material,
     authored: Array | None,
 ) -> Garment | None:
-    """Return the garment, its openings and its weights; None where it has no opening.
-
-    The surface lies on the body as its file has it: there openings and weights are found, and from there
-    vertices are brought to the T pose by the inverse of their blended transforms. Its rest shape stays.
-    """
+    """Return the garment, its openings and its weights; None where it has no opening."""
     positions, faces = surface.positions, surface.faces
     try:
-        loops = name_openings(form.posed, positions, faces)
+        loops = name_openings(form.body, positions, faces)
     except ValueError as error:
         examination.add("openings", str(error), "separate them", UNUSABLE)
         return None
@@ -285,16 +279,9 @@ def _make_garment(
         return None
     examination.add("openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in loops.items()))
     legs = "left_leg" in loops or "right_leg" in loops
-    weights, nearest, followed = find_weights(form.posed, positions, faces, legs=legs, authored=authored)
+    weights, nearest, followed = find_weights(form.body, positions, faces, legs=legs, authored=authored)
     source = "of the closest skin" if authored is None else "as they came with it"
     examination.add("weights", f"{source}; encloses {', '.join(followed)}")
-    if form.body.arms_lowered is not None:
-        chart = flattened(positions, faces) if chart is None else chart
-        smoothing = UNPOSED_SMOOTHING * len(positions) / 1000 if authored is None else 0
-        smoothed = smooth_weights(weights, faces, round(smoothing))
-        positions = _in_t_pose(form.body, positions, smoothed)
-        text = "made for lowered arms, brought to the T pose; its rest shape is as it was made"
-        examination.add("pose", text)
     # A garment without neck and sleeves hangs from its waist, and contact without friction does not hold it.
     hangs = any(name in loops for name in ("neck", "left_sleeve", "right_sleeve"))
     pins = np.empty(0, dtype=np.int64) if hangs else np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
@@ -312,10 +299,3 @@ def _make_garment(
         rest_uv=chart,
         authored_weights=authored is not None,
     )
-
-
-def _in_t_pose(body: Body, positions: Array, weights: Array) -> Array:
-    """Return positions (V,3) [m], made for the body as its file has it, on the body in T pose."""
-    moved = body.transforms(pose_in_file(body)[None], np.zeros((1, 3)))[0]
-    blended = np.einsum("vj,jab->vab", weights, moved)
-    return np.linalg.solve(blended[..., :3], (positions - blended[..., 3])[..., None])[..., 0]

@@ -122,7 +122,6 @@ def plain_arrays(body: Body) -> dict[str, np.ndarray]:
         "blend_weights": body.skinning_weights,
         "joints": body.joint_template,
         "parents": body.parents,
-        "rest_pose": np.zeros((24, 3)),
     }
 
 
@@ -141,7 +140,6 @@ def _another() -> Body:
 BODIES: Mapping[str, Callable[[], Body]] = {
     "package": Body.load,
     "other_mesh": lambda: read_again(with_hands(smpl_arrays(_another()), face=True)),
-    "a_pose": lambda: read_again(plain_arrays(lowered(_another(), 40.0))),
     "heavy": lambda: reshaped(Body.load(), beta_1=2.5),
     "slim": lambda: reshaped(Body.load(), beta_1=-2.5),
     "third_shape": lambda: reshaped(Body.load(), beta_2=2.5),

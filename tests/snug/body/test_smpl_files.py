@@ -8,7 +8,7 @@ import pytest
 from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import JOINT_NAMES, BodyError
+from snug.body.skeleton import BodyError
 from snug.body.smpl_files import read_body
 from tests.snug.body.other_bodies import (
     lowered,
@@ -28,13 +28,12 @@ def small(body):
 
 @pytest.fixture(scope="module")
 def layouts(small):
-    """Return arrays of the body layouts that users have: SMPL, SMPL-H, SMPL-X, A pose and plain."""
+    """Return arrays of the body layouts that users have: SMPL, SMPL-H, SMPL-X and plain."""
     smpl = smpl_arrays(small)
     return {
         "SMPL": smpl,
         "SMPL-H": with_hands(smpl, face=False),
         "SMPL-X": with_hands(smpl, face=True),
-        "A pose": plain_arrays(lowered(small, 40.0)),
         "plain": plain_arrays(small),
     }
 
@@ -49,7 +48,7 @@ def saved(path, arrays):
 
 
 @pytest.mark.parametrize("ending", [".npz", ".PKL"])
-@pytest.mark.parametrize("layout", ["SMPL", "SMPL-H", "SMPL-X", "A pose", "plain"])
+@pytest.mark.parametrize("layout", ["SMPL", "SMPL-H", "SMPL-X", "plain"])
 def test_every_layout_gives_the_same_body(small, layouts, layout, ending, tmp_path):
     user = read_body(saved(tmp_path / f"user{ending}", layouts[layout]))
     np.testing.assert_allclose(user.template, small.template, atol=1e-12)
@@ -63,23 +62,6 @@ def test_every_layout_gives_the_same_body(small, layouts, layout, ending, tmp_pa
         np.testing.assert_allclose(user.shaped(betas), small.shaped(betas), atol=1e-12)
     else:
         assert user.shape_count == 0
-
-
-def test_shapes_of_an_a_pose_are_lifted_with_it(small, tmp_path):
-    """The person of a shape, in the A pose, has a T pose that skinning takes back to it."""
-    betas = np.array([1.0, -0.7, 0.4])
-    low = lowered(small, 40.0)
-    shapes = {"shapedirs": 0.02 * np.random.default_rng(0).normal(size=(*small.template.shape, 3))}
-    shapes["J_shapedirs"] = 0.01 * np.random.default_rng(1).normal(size=(24, 3, 3))
-    shapes["J_shapedirs"][:, 0] = 0.0
-    user = read_body(saved(tmp_path / "a.npz", plain_arrays(low) | shapes))
-    poses = np.zeros((1, 24, 3))
-    poses[0, [JOINT_NAMES.index("left_shoulder"), JOINT_NAMES.index("right_shoulder")], 2] = np.radians(
-        [-40.0, 40.0]
-    )
-    shift = (low.joint_template[0] - user.joint_template[0])[None]
-    back = user.vertices(poses, shift, betas)[0]
-    np.testing.assert_allclose(back, low.template + shapes["shapedirs"] @ betas, atol=1e-12)
 
 
 def test_pose_correctives_are_what_smpl_says(small, layouts, tmp_path):
@@ -165,12 +147,11 @@ def moved_joint(regressor):
         (changed("kintree_table", lambda t: t[:, :23]), "(2, 23)"),
         (lambda a: a | {"f": a["f"][a["v_template"][a["f"], 1].min(axis=1) > 0.12]}, "a hole at vertex"),
         (changed("f", lambda f: f[:, ::-1]), "inside out"),
-        (changed("f", lambda f: f[:, [0, 1, 2, 2]]), "no closed surface"),  # each quad has one without area
+        (changed("f", lambda f: f[:, [0, 1, 2, 2]]), "shape (any, 3)"),
         (changed("f", lambda f: f + 1), "vertex 1000"),
-        (lambda a: a | {"rest_pose": np.full((24, 3), 0.2)}, "rest_pose"),
         (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
     ],
-    ids=range(21),
+    ids=range(20),
 )
 def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     path = saved(tmp_path / "broken.npz", change(layouts["SMPL"]))
@@ -180,13 +161,9 @@ def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     assert says in message and str(path) in message and "\n" not in message
 
 
-@pytest.mark.parametrize(
-    ("degrees", "arrays", "says"),
-    [(75.0, {}, "to 60"), (40.0, {"posedirs": np.zeros((1000, 3, 207))}, "leave them out")],
-)
-def test_arms_that_hang_too_low_are_refused(small, tmp_path, degrees, arrays, says):
-    path = saved(tmp_path / "low.npz", plain_arrays(lowered(small, degrees)) | arrays)
-    with pytest.raises(BodyError, match=says):
+def test_arms_that_hang_down_are_refused(small, tmp_path):
+    path = saved(tmp_path / "low.npz", plain_arrays(lowered(small, 40.0)))
+    with pytest.raises(BodyError, match="left arm is 40 degrees off the T pose"):
         read_body(path)
 
 

@@ -15,14 +15,12 @@ from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
 from snug.file_options import GarmentFile, parse_garment_file
-from snug.garments.fit import DressForm, pose_in_file
+from snug.garments.fit import DressForm
 from snug.garments.garment import GarmentError
 from snug.garments.reading import examine_file, read_garment
 from snug.garments.templates import find_template
-from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.training import train_network
-from tests.snug.body.other_bodies import lowered, plain_arrays, read_again
 from tests.snug.garments.garment_files import doubled_along, own_chart, saved, z_up
 from tests.snug.training.dressing import tube_dress
 
@@ -123,21 +121,6 @@ def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
     left, right = (read.skinning_weights[read.hem][middle, body.joint_names.index(f"{side}_hip")]
                    for side in ("left", "right"))  # fmt: skip
     assert np.abs(left - right).max() < 0.2 and min(left.min(), right.min()) > 0.2
-
-
-def test_a_garment_made_for_lowered_arms_is_brought_to_the_t_pose_with_its_rest_shape(tmp_path, body, shirt):
-    filed = lowered(body, 40.0)
-    read_body = read_again(plain_arrays(filed))
-    pose = pose_in_file(read_body)[None]
-    hanging = Motion("file", np.repeat(pose, 2, axis=0), np.zeros((2, 3)), fps=30.0)
-    made = DressedBody(read_body, shirt).skinned(hanging, smoothing=20)[0]
-    read = read_garment(GarmentFile(path=saved(tmp_path, shirt, positions=made)), read_body)
-    assert read.loops.keys() == shirt.loops.keys()
-    # Skinned into the pose of the file it is what was made, and that is where it has no strain.
-    back = DressedBody(read_body, read).skinned(hanging, smoothing=20)[0]
-    np.testing.assert_allclose(back, made, atol=1e-5)
-    assert StretchStVK(read.cloth()).value_and_gradient(made)[0] < 1e-12
-    np.testing.assert_allclose(read.rest_positions, shirt.rest_positions, atol=0.03)
 
 
 def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
