@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from reference_sim.command_line import Parser, command
 from snug.file_options import GARMENT_WORDS, parse_garment_file
 
+if TYPE_CHECKING:
+    from snug.body.parametric_body import Body
+    from snug.garments.garment import Garment
+
 PROGRAM = "snug.check"
-USABLE, UNUSABLE, UNREADABLE = 0, 1, 2
-LEVEL_MARKS = {"ok": "", "note": "note", "unusable": "NO"}
 EXAMPLES = """examples:
   python -m snug.check shirt.obj                              on the body of the package
   python -m snug.check shirt.obj dress.ply --body mine.npz    on your own
@@ -21,7 +24,7 @@ EXAMPLES = """examples:
 beside a mesh: <name>.weights.npz with an array "weights" (V, 24) has skinning weights, which are kept as
 they are.
 
-exit status: 0 all can be used, 1 one cannot, 2 one cannot be read"""
+exit status: 0 all can be used, 1 one cannot"""
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -29,12 +32,38 @@ def make_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Read garments as benchmarks.run and snug.train do, and print a short table: size, "
-        "place on the body, rest shape, winding, openings, weights, and what mends them.",
+        "place on the body, rest shape, openings, or what mends them.",
         epilog=f"{EXAMPLES}\n\n{GARMENT_WORDS}",
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, VTK, STL or OFF")
     parser.add_argument("--body", metavar="FILE", help="a body of your own (default: that of the package)")
     return parser
+
+
+def describe(garment: Garment, body: Body) -> Iterator[tuple[str, str]]:
+    """Yield what a garment on a body is, by matter."""
+    import numpy as np
+
+    from reference_sim.files.uv_chart import stretches
+    from reference_sim.geometry.topology import corner_angles
+    from reference_sim.obstacle import Obstacle
+    from snug.garments.fit import measure_fit
+    from snug.garments.garment import piece_of_faces
+
+    positions, faces = garment.rest_positions, garment.faces
+    fit = measure_fit(body, Obstacle(body.template, body.faces), positions)
+    yield "mesh", f"{len(positions)} vertices, {len(faces)} triangles"
+    yield "pieces", f"{piece_of_faces(faces).max() + 1}"
+    yield "smallest angle", f"{np.degrees(corner_angles(positions, faces).min()):.1f} degrees"
+    yield "size", " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0)) + " m"
+    yield "below the skin", f"{fit.below:.1%} of the vertices, the deepest by {1e3 * fit.depth:.1f} mm"
+    if garment.rest_uv is not None:
+        strain = np.abs(stretches(positions[faces], garment.rest_uv) - 1).max()
+        yield "UV chart", f"stretched by up to {strain:.0%} on the mesh"
+    yield "openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in garment.loops.items())
+    yield "pinned", f"{len(garment.pins)} vertices"
+    material = garment.material
+    yield "material", f"{material.areal_density:.3g} kg/m^2, {material.membrane_modulus:.3g} N/m"
 
 
 @command(PROGRAM)
@@ -44,23 +73,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     files = list(map(parse_garment_file, options.files))
     # NumPy and more, which --help does not need.
     from snug.body.smpl_files import read_body
-    from snug.garments.fit import DressForm
     from snug.garments.garment import GarmentError
-    from snug.garments.reading import examine_file
+    from snug.garments.reading import read_garment
 
-    form, status = DressForm(read_body(options.body)), USABLE
+    body, status = read_body(options.body), 0
     for file in files:
         try:
-            examination = examine_file(file, form)
+            garment = read_garment(file, body)
         except GarmentError as error:
             print(f"{PROGRAM}: {error}", file=sys.stderr)
-            status = UNREADABLE
+            status = 1
             continue
-        print(f"{file.path}: {'cannot be used' if examination.unusable else 'can be used'}")
-        for finding in examination.findings:
-            remedy = f"; {finding.remedy}" if finding.remedy else ""
-            print(f"  {LEVEL_MARKS[finding.level]:<5}{finding.matter:<18}{finding.text}{remedy}")
-        status = max(status, UNUSABLE if examination.unusable else USABLE)
+        print(f"{file.path}: can be used")
+        for matter, text in describe(garment, body):
+            print(f"  {matter:<18}{text}")
     return status
 
 

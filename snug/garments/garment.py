@@ -142,7 +142,7 @@ BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both le
 
 def find_weights(
     body: Body, positions: Array, faces: Index, *, legs: bool, authored: Array | None
-) -> tuple[Array, Index, tuple[str, ...]]:
+) -> tuple[Array, Index]:
     """Find the skinning weights of a garment on the unposed body.
 
     They are the authored ones, or blended from the three corners of the closest face of the skin, among the
@@ -156,17 +156,17 @@ def find_weights(
         authored: (V,24), or None.
 
     Returns:
-        Weights (V,24), nearest vertices of the body (V,), and names of the joints that the garment follows.
+        Weights (V,24), and nearest vertices of the body (V,).
     """
-    followed = enclosed_limbs(body, positions, faces)
-    skin = np.asarray(body.faces)[skin_following(body, followed)[body.faces].all(axis=1)]
+    followed = skin_following(body, enclosed_limbs(body, positions, faces))
+    skin = np.asarray(body.faces)[followed[body.faces].all(axis=1)]
     search = FaceSearch(skin, body.template[skin].mean(axis=1))
     search.refit(body.template)
     closest = search.nearest(positions)
     corners = skin[closest.faces]
     nearest = corners[np.arange(len(corners)), closest.barycentric.argmax(axis=1)]
     if authored is not None:
-        return authored, nearest, followed
+        return authored, nearest
     weights = np.einsum("va,vaj->vj", closest.barycentric, body.skinning_weights[corners])
     below = joint_position(body, "left_hip")[1] - positions[:, 1]
     if not legs and below.max() > BELOW_HIPS:
@@ -174,7 +174,7 @@ def find_weights(
         smooth = smooth_weights(weights, faces, round(SKIRT_SMOOTHING * len(positions) / 1000))
         share = np.clip(below / BELOW_HIPS, 0.0, 1.0)[:, None]
         weights = (1 - share) * weights + share * smooth
-    return weights, nearest, followed
+    return weights, nearest
 
 
 def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...]:
