@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -187,8 +186,7 @@ def test_what_a_task_declares_holds_all_that_it_imports(task):
     declared = {file.relative_to(root).as_posix() for place in TASKS[task] for file in _files_of(place)}
     missing = set()
     for path in sorted(name for name in declared if name.endswith(".py")):
-        package = ".".join(Path(path).parent.parts)
-        for _, name in imports(ast.parse((root / path).read_text(encoding="utf-8")), package):
+        for _, name in imports(ast.parse((root / path).read_text(encoding="utf-8"))):
             if name.split(".")[0] in LAYERS:
                 needed = file_behind(name)
                 if needed not in declared and not needed.startswith(CARRYING):

@@ -22,14 +22,8 @@ TOGETHER = (
     "python -m benchmarks.run smoke --scenes hanging_sheet,./curtain.py"
     " --methods simulation,newton-1,./held.py,./explicit.py --set metrics=./height.py -o "
 )
-LONG = (
-    "A known answer",
-    "How to add something",
-    "An energy",
-    "A program",
-    "A network of your own",
-    "A recipe",
-)  # tests/benchmarks/plan/test_user_files.py: the first and the third
+WITHOUT_RESULTS = ("How to add something", "An energy")
+LONG = (*WITHOUT_RESULTS, "A known answer", "A program", "A network of your own", "A recipe")
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 MOST_TERMS, MOST_COLUMNS = 20, 7
@@ -51,13 +45,8 @@ def blocks(text: str) -> Iterator[tuple[str, str, str]]:
         yield (match[1] or "").strip(), match[2], match[3]
 
 
-def sections(text: str) -> dict[str, str]:
-    """Title -> text, of the parts under "# " and "## "."""
-    parts = re.split(r"^##? (.+)$", text, flags=re.M)
-    return dict(zip(parts[1::2], parts[2::2]))
-
-
-SECTIONS = sections(EXTEND.read_text(encoding="utf-8"))
+PARTS = re.split(r"^##? (.+)$", EXTEND.read_text(encoding="utf-8"), flags=re.M)
+SECTIONS = dict(zip(PARTS[1::2], PARTS[2::2]))
 
 
 @pytest.fixture(scope="module")
@@ -81,36 +70,30 @@ def run(folder: Path, line: str) -> None:
     assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
 
 
-def commands(folder: Path, title: str, out: Path) -> None:
-    """Run the commands of a section, in their order."""
-    for _, language, content in blocks(SECTIONS[title]):
-        if language == "sh":
-            run(folder, content.replace("DIR", str(out)).rstrip())
-
-
-def rows_of(folder: Path) -> list[dict[str, str]]:
+def judge(title: str, folder: Path) -> None:
+    """Hold the rows of a run, and its folder, to what the section says."""
     with (folder / "results.csv").open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
-
-
-def judge(title: str, rows: list[dict[str, str]], folder: Path) -> None:
-    """Hold rows of a run, and its folder, to what the section says."""
+        rows = list(csv.DictReader(stream))
     assert rows and all(row["status"] == "ok" for row in rows)
+
+    def values(metric: str, scene: str = "") -> dict[str, float]:
+        found = [row for row in rows if row["metric"] == metric and scene in ("", row["scene"])]
+        return {row["method"]: float(row["value"]) for row in found}
+
     if title == "A method":
-        sheet = [row for row in rows if (row["scene"], row["metric"]) == ("hanging_sheet", "energy/total")]
-        total = {row["method"]: float(row["value"]) for row in sheet}
+        total = values("energy/total", "hanging_sheet")
         # In n frames backward Euler falls (n + 1) / n times as far.
         assert total["explicit-200"] == pytest.approx(total["simulation"], rel=0.2)
         assert total["held"] > total["simulation"]  # it keeps its height
     if title == "A network of your own":
-        skinned = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/strain"}
+        skinned = values("energy/strain")
         assert skinned["pose-network"] != skinned["skinning"] > 0.0  # a little trained, on another motion
     if title == "A program":
-        off = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "exact/distance"}
+        off = values("exact/distance")
         assert off.keys() == {"simulation", "fall"} and max(off.values()) < 1e-9
     if title == "A scene":
         # The section on energies gives the curtain its wind, which does work on it.
-        wind = {row["method"]: float(row["value"]) for row in rows if row["metric"] == "energy/wind"}
+        wind = values("energy/wind", "curtain")
         assert wind["simulation"] < 0.0 > wind["newton-1"]
         assert {row["scene"] for row in rows if row["metric"] == "energy/wind"} == {"curtain"}
     if title == "A metric":
@@ -124,15 +107,17 @@ def judge(title: str, rows: list[dict[str, str]], folder: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("title", [*JOINED, *LONG])
 def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
-    commands(user, title, tmp_path)
-    if title not in ("How to add something", "An energy"):  # they leave no results
-        judge(title, rows_of(tmp_path), tmp_path)
+    for _, language, content in blocks(SECTIONS[title]):
+        if language == "sh":
+            run(user, content.replace("DIR", str(tmp_path)).rstrip())
+    if title not in WITHOUT_RESULTS:
+        judge(title, tmp_path)
 
 
 def test_a_method_a_scene_and_a_metric_of_the_examples_run_together(user, tmp_path):
     run(user, TOGETHER + str(tmp_path))
     for title in JOINED:
-        judge(title, rows_of(tmp_path), tmp_path)
+        judge(title, tmp_path)
 
 
 def test_every_example_is_tested():
@@ -141,17 +126,9 @@ def test_every_example_is_tested():
 
 
 def test_the_lines_of_python_in_the_readme_run(tmp_path):
-    (code,) = [
-        text
-        for _, language, text in blocks((ROOT / "README.md").read_text(encoding="utf-8"))
-        if language == "python"
-    ]
-    small = {
-        "cells=20": "cells=4",
-        "pins=[0, 20]": "pins=[0, 4]",
-        "frames=60": "frames=3",
-    }
-    for whole, part in small.items():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = [text for _, language, text in blocks(readme) if language == "python"]
+    for whole, part in (("cells=20", "cells=4"), ("pins=[0, 20]", "pins=[0, 4]"), ("frames=60", "frames=3")):
         assert whole in code
         code = code.replace(whole, part)
     (tmp_path / "lines.py").write_text(code, encoding="utf-8")
@@ -180,18 +157,11 @@ def prose(path: Path) -> str:
     return re.sub(r"`[^`\n]*`", "", text)
 
 
-def glossary_terms(text: str) -> list[str]:
-    """First cells of the first table."""
-    lines = text.partition("\nNetworks:")[0].splitlines()
-    return [line.split("|")[1].strip() for line in lines if line.startswith("| ")][2:]
-
-
 def test_the_glossary_explains_every_private_term_that_a_page_uses_and_is_short():
-    terms = glossary_terms(GLOSSARY)
-    assert len(terms) <= MOST_TERMS
-    explained = " ".join(terms)
+    lines = GLOSSARY.partition("\nNetworks:")[0].splitlines()
+    terms = [line.split("|")[1].strip() for line in lines if line.startswith("| ")][2:]
     used = [term for term in PRIVATE if any(term in prose(path).lower() for path in PAGES)]
-    assert [term for term in used if term not in explained] == []
+    assert len(terms) <= MOST_TERMS and [term for term in used if term not in " ".join(terms)] == []
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)

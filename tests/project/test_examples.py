@@ -5,31 +5,21 @@ from __future__ import annotations
 import doctest
 import importlib
 import inspect
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-LAYERS = ("reference_sim", "snug", "benchmarks", "reports")
-EXAMPLES = [
-    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-    for layer in LAYERS
-    for path in sorted((ROOT / layer).rglob("*.py"))
-    if ">>>" in path.read_text(encoding="utf-8")
-]
-FACES = sorted(
-    ".".join(stub.parent.relative_to(ROOT).parts)
-    for layer in LAYERS
-    for stub in (ROOT / layer).rglob("__init__.pyi")
-)
+from tests.project.test_layers import LAYERS, ROOT, modules_of
+
+EXAMPLES = [name for layer in LAYERS for name, source in modules_of(layer).items() if ">>>" in source]
+STUBS = [stub for layer in LAYERS for stub in sorted((ROOT / layer).rglob("__init__.pyi"))]
+FACES = [".".join(stub.parent.relative_to(ROOT).parts) for stub in STUBS]
 
 
 @pytest.mark.parametrize("module", EXAMPLES)
 def test_the_examples_of_a_module_give_what_they_say(module):
     loaded = importlib.import_module(module)
-    assert any(
-        test.examples for test in doctest.DocTestFinder().find(loaded)
-    )  # else numba's wrapper hides them
+    found = doctest.DocTestFinder().find(loaded)
+    assert any(test.examples for test in found)  # else numba's wrapper hides them
     assert doctest.testmod(loaded).failed == 0
 
 

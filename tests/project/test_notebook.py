@@ -18,36 +18,34 @@ SMALL = {
 CELLS = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
 
 
-def sources(*, slow: bool) -> list[str]:
-    """Return the code of the cells; of those marked as slow only where they are asked for."""
-    code = [cell for cell in CELLS if cell["cell_type"] == "code"]
-    return [
-        "".join(cell["source"]) for cell in code if slow or "slow" not in cell["metadata"].get("tags", ())
-    ]
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """A function that runs the cells in one namespace, as Jupyter does, and returns it.
 
-
-def run(cells: list[str], changes: dict[str, str]) -> dict:
-    """Run the cells in one namespace, which a front end of Jupyter does too; return the namespace."""
-    code = "\n".join(cells)
-    for whole, part in changes.items():
-        assert whole in code
-        code = code.replace(whole, part)
-    names: dict = {"__name__": "notebook"}
-    exec(compile(code, str(NOTEBOOK), "exec"), names)
-    return names
-
-
-@pytest.fixture(autouse=True)
-def without_a_screen():
+    slow: with the cells that are marked so.
+    """
+    monkeypatch.chdir(tmp_path)
     before = matplotlib.get_backend()
     matplotlib.use("Agg")
-    yield
+
+    def run_cells(*, slow: bool) -> dict:
+        cells = [cell for cell in CELLS if cell["cell_type"] == "code"]
+        wanted = [cell for cell in cells if slow or "slow" not in cell["metadata"].get("tags", ())]
+        code = "\n".join("".join(cell["source"]) for cell in wanted)
+        for whole, part in SMALL.items():
+            assert whole in code
+            code = code.replace(whole, part)
+        names: dict = {"__name__": "notebook"}
+        exec(compile(code, str(NOTEBOOK), "exec"), names)
+        return names
+
+    yield run_cells
     matplotlib.pyplot.close("all")
     matplotlib.use(before)
 
 
-def test_the_cells_run_and_the_trained_network_is_nearer_the_simulation_than_a_brief_training(capsys):
-    names = run(sources(slow=False), SMALL)
+def test_the_cells_run_and_the_trained_network_is_nearer_the_simulation_than_a_brief_training(run, capsys):
+    names = run(slow=False)
     energies = {name: values.mean() for name, values in names["energies"].items()}
     assert list(energies) == ["SNUG", "SNUG, a minute", "Simulation"]
     assert energies["Simulation"] < energies["SNUG"] < energies["SNUG, a minute"]
@@ -56,10 +54,9 @@ def test_the_cells_run_and_the_trained_network_is_nearer_the_simulation_than_a_b
 
 
 @pytest.mark.slow
-def test_the_scenes_own_score_runs_too(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names = run(sources(slow=True), SMALL)
-    assert names["scored"]["status"] == "ok" and names["scored"]["metrics"]["energy/total"]["unit"] == "J"
+def test_the_scenes_own_score_runs_too(run):
+    scored = run(slow=True)["scored"]
+    assert scored["status"] == "ok" and scored["metrics"]["energy/total"]["unit"] == "J"
 
 
 def test_no_output_is_stored_that_could_grow_stale():

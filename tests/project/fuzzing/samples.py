@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import pickle
 from collections.abc import Callable
@@ -52,20 +51,7 @@ def polydata(suffix: str) -> Callable[[], bytes]:
 
 
 def arrays(**named: np.ndarray) -> Callable[[], bytes]:
-    def make() -> bytes:
-        stream = io.BytesIO()
-        np.savez_compressed(stream, **named)
-        return stream.getvalue()
-
-    return make
-
-
-def smpl_arrays() -> dict[str, np.ndarray]:
-    body = Body.load()
-    keep = {"v_template": body.template, "weights": body.skinning_weights, "J_template": body.joint_template}
-    parents = np.stack([body.parents, np.arange(24)]).astype(np.int64)
-    directions = {"shapedirs": body.shape_directions, "J_shapedirs": body.joint_directions}
-    return keep | directions | {"kintree_table": parents, "f": body.faces}
+    return lambda: written(".npz", lambda path: np.savez_compressed(path, **named))
 
 
 def amass_arrays() -> dict[str, np.ndarray]:
@@ -83,8 +69,8 @@ def hood_arrays() -> dict[str, np.ndarray]:
     return {"pred": roll_out()["positions"], "cloth_faces": FACES} | body
 
 
-def pickled(arrays: Callable[[], dict[str, np.ndarray]]) -> Callable[[], bytes]:
-    return lambda: pickle.dumps(arrays())
+def pickled(arrays: dict[str, np.ndarray]) -> Callable[[], bytes]:
+    return lambda: pickle.dumps(arrays)
 
 
 def shirt() -> bytes:
@@ -99,18 +85,18 @@ def bvh_text() -> bytes:
     return bvh(poses, clip["trans"], 60.0).encode()
 
 
+def rolled_out() -> Trajectory:
+    fields = {"iterations": np.arange(2.0)}
+    positions, seconds = roll_out()["positions"], np.array([0.0, 0.1])
+    return Trajectory(positions, FACES, seconds, np.zeros(2), "ok", frame_fields=fields)
+
+
 def point_cache() -> bytes:
-    positions = roll_out()["positions"]
-    made = Trajectory(positions, FACES, np.array([0.0, 0.1]), np.zeros(2), "ok")
-    return write_point_cache("made.pc2", made)[0].read_bytes()
+    return written(".pc2", lambda path: write_point_cache(path, rolled_out()))
 
 
 def trajectory() -> bytes:
-    made = Trajectory(
-        np.stack([CORNERS, CORNERS + 0.1]), FACES, np.array([0.0, 0.1]), np.zeros(2), "ok",
-        frame_fields={"iterations": np.arange(2.0)},
-    )  # fmt: skip
-    return written(".vtkhdf", made.save)
+    return written(".vtkhdf", rolled_out().save)
 
 
 def model() -> TrainedModel:
