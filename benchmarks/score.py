@@ -16,18 +16,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from benchmarks.external.roll_out_files import (
-    FileConventions,
-    RollOutFileError,
-    RollOutOption,
-    parse_roll_out,
-    roll_out_of,
-)
+from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, parse_roll_out
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import REPLACED, add_study_options, study_of
 from benchmarks.plan.plan import Plan
-from benchmarks.plan.study import Study, StudyError, read_study
+from benchmarks.plan.study import Study, StudyError, option, read_study
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from benchmarks.timing import one_thread
@@ -48,17 +42,17 @@ MISSING = "missing"  # status of a roll-out that a run ended before
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
   python -m benchmarks.score mine.npz --scene tshirt/kick -o scored
-  python -m benchmarks.score mine.pc2,units=cm,up=z,match-vertices --scene tshirt/kick
-  python -m benchmarks.score theirs=frames/,fps=60,ms=2.2 --scene hanging_sheet
+  python -m benchmarks.score mine.pc2,units=cm,up=z --scene tshirt/kick
+  python -m benchmarks.score theirs=frames/,ms=2.2 --scene hanging_sheet
   python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
   python -m benchmarks.score mine.npz --scene tshirt/kick --json --no-report > numbers.json
   python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
 
 ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
   cloth_faces, obstacle, obstacle_faces; .pc2 and .pc16 with their .obj; a folder or a quoted pattern of
-  meshes, one a frame. In world coordinates, the scene's first frame first. Other units, axes, rates and
-  orders of vertices are refused with the words that mend them: units=cm, up=z, fps=60, match-vertices;
-  other-mesh compares surfaces alone, ms=2.2 says what a frame takes.
+  meshes, one a frame. In world coordinates, one position for each frame and vertex of the scene, in their
+  order. units=cm and up=z say what the file has instead of metres and y up; other-mesh compares surfaces
+  alone, ms=2.2 says what a frame takes.
 
 exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cannot be read or does not belong
   to the scene: one line says why and nothing is written; 130 interrupted."""
@@ -171,27 +165,26 @@ def plan_score(
     Raises:
         ValueError: one line for the first thing that cannot be met.
     """
-    option = roll_out_of(*parse_roll_out(roll_out, named=False))
-    if rest_mesh and option.stated.other_mesh:
+    name, table = parse_roll_out(roll_out, named=False)
+    stored = read_study(options=[option(roll_out, "rollouts", {name: table})]).rollouts[name]
+    if rest_mesh and stored.other_mesh:
         raise RollOutFileError("other-mesh compares with a scene: give --scene, not --rest-mesh")
     scenes = []
     if rest_mesh:
         from benchmarks.scenes.from_roll_out import declared  # loads the simulator
 
-        scenes = [declared(option, str(rest_mesh))]
+        scenes = [declared(stored, str(rest_mesh))]
         scene = scenes[0].name
-        # The rate that the user has stated of the file is now that of the scene.
-        option = replace(option, stated=replace(option.stated, fps=None))
     parts = {name: replace(part, cases=()) for name, part in study.parts.items()}  # some have a scene's name
     plan = make_plan(
-        replace(study, parts=parts, scenes=(scene,), methods=MEASURED_BESIDE, rollouts={option.name: option}),
+        replace(study, parts=parts, scenes=(scene,), methods=MEASURED_BESIDE, rollouts={name: stored}),
         folder=folder, command=command_line, scenes=scenes,
     )  # fmt: skip
     if len(plan.scenes) != 1:
         raise StudyError(f"{scene}: name one scene; see python -m benchmarks.run --list")
     cells = []
     for cell in (_reference(cell, reference) for cell in plan.cells):
-        suites = (*cell.suites, SOLVED_AGAIN) if report or cell.method == option.name else cell.suites
+        suites = (*cell.suites, SOLVED_AGAIN) if report or cell.method == name else cell.suites
         # Without a report nobody looks at times and gaps of what the roll-out is compared with.
         entry = replace(cell.entry, timed=cell.entry.timed and report)
         cells.append(replace(cell, entry=entry, suites=tuple(dict.fromkeys(suites))))
@@ -207,7 +200,7 @@ def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
         return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
     from benchmarks.methods.outside import entry_of  # loads numpy
 
-    stored = RollOutOption("reference", str(given), FileConventions(), role="reference")
+    stored = RollOutOption("reference", str(given), role="reference")
     entry = entry_of(stored, cell.scene.name)
     if entry is None:
         raise RollOutFileError(f"--reference {stored.path_for(cell.scene.name)}: no such file")

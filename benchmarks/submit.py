@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from pathlib import Path
 
-from benchmarks.external.roll_out_files import PLACE, FileConventions, RollOutOption
+from benchmarks.external.roll_out_files import PLACE, RollOutOption
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import Plan
 from benchmarks.plan.study import StudyError, read_fields, read_study
@@ -151,9 +151,7 @@ class Entry:
             ValueError: one line for what cannot be met.
         """
         metadata = self.metadata
-        option = RollOutOption(
-            self.name, str(self.path / metadata.roll_outs), FileConventions(), metadata.milliseconds
-        )
+        option = RollOutOption(self.name, str(self.path / metadata.roll_outs), ms=metadata.milliseconds)
         programs = (str(self.path / metadata.program),) if metadata.program else ()
         study = replace(
             read_study("full"),

@@ -16,18 +16,16 @@ is executed.
 
 from __future__ import annotations
 
-import glob
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from reference_sim.files.array_file import read_arrays, read_pickled_arrays
-from reference_sim.files.mesh_files import MESH_SUFFIXES, METRES, UP_AXES, Surface, read_mesh, read_sequence
+from reference_sim.files.mesh_files import MESH_SUFFIXES, METRES, UP_AXES, read_mesh, read_sequence
 from snug.file_options import split_words
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
@@ -40,43 +38,36 @@ class RollOutFileError(ValueError):
 
 
 @dataclass(frozen=True)
-class FileConventions:
-    """Unit, up axis and frames per second of a roll-out's file, and what its vertices are.
+class RollOutOption:
+    """One roll-out, and what its file does not state itself.
 
-    match_vertices: the scene's in another order. other_mesh: those of another mesh of the same garment.
+    Attributes:
+        name: of the method.
+        path: file, folder or pattern; {scene} stands for the scene's name, its slashes as hyphens.
+        units: of the file, "m", "cm", "mm" or "in".
+        up: vertical axis of the file.
+        fps: frames per second; they have to be the scene's.
+        other_mesh: whether its vertices are those of another mesh of the same garment.
+        ms: declared time of a frame [ms].
+        role: of the method.
     """
 
+    name: str
+    path: str
     units: str = "m"
     up: str = "y"
     fps: float | None = None
-    match_vertices: bool = False
     other_mesh: bool = False
+    ms: float | None = None
+    role: str = "external"
 
     def __post_init__(self) -> None:
         for what, value, known in (("units", self.units, tuple(METRES)), ("up", self.up, UP_AXES)):
             if value not in known:
                 raise RollOutFileError(f"{what}={value}: choose from {', '.join(known)}")
-        if self.fps is not None and not 0.0 < self.fps < 1e6:
-            raise RollOutFileError(f"fps={self.fps}: give a positive number of frames per second")
-        if self.match_vertices and self.other_mesh:
-            raise RollOutFileError(
-                "match_vertices and other_mesh: another mesh has no vertex to match, give one"
-            )
-
-
-@dataclass(frozen=True)
-class RollOutOption:
-    """One roll-out: its name, its path, what is said of the file, and the declared time of a frame [ms]."""
-
-    name: str
-    path: str
-    stated: FileConventions
-    declared_ms: float | None = None
-    role: str = "external"
-
-    def __post_init__(self) -> None:
-        if (ms := self.declared_ms) is not None and not 0.0 < ms < 1e9:
-            raise RollOutFileError(f"declared time {ms} ms: give a positive number of milliseconds a frame")
+        for what, number in (("fps", self.fps), ("ms", self.ms)):
+            if number is not None and not 0.0 < number < 1e9:
+                raise RollOutFileError(f"{what}={number}: give a positive number")
         if not re.fullmatch(rf"\w[{CHARACTERS}]*", self.name):
             raise RollOutFileError(
                 f"{self.path}: the name '{self.name}' has other than letters, digits and _-+., or "
@@ -91,31 +82,6 @@ class RollOutOption:
     def path_for(self, scene: str) -> str:
         """Return the path of the roll-out in a scene."""
         return self.path.replace(PLACE, scene.replace("/", "-"))
-
-
-FIELDS: dict[str, type] = {
-    "path": str, "units": str, "up": str, "fps": float, "match_vertices": bool, "other_mesh": bool,
-    "ms": float,
-}  # fmt: skip
-
-
-def roll_out_of(name: str, table: Mapping[str, Any]) -> RollOutOption:
-    """Return the roll-out of that name with the fields of a study's table. Raises RollOutFileError.
-
-    >>> roll_out_of("mine", {"path": "out.npz", "units": "cm"}).stated.units
-    'cm'
-    """
-    values = {key.replace("-", "_"): value for key, value in table.items()}
-    for key, value in values.items():
-        if key not in FIELDS:
-            raise RollOutFileError(f"unknown word '{key}'; there are {', '.join(FIELDS)}")
-        if FIELDS[key] is float and type(value) not in (int, float):
-            raise RollOutFileError(f"{key}={value} is no number")
-        if FIELDS[key] is not float and type(value) is not FIELDS[key]:
-            wanted = "say it, or leave it out" if FIELDS[key] is bool else "give a text"
-            raise RollOutFileError(f"{key}={value}: {wanted}")
-    path, declared = values.pop("path", ""), values.pop("ms", None)
-    return RollOutOption(name, path, FileConventions(**values), declared)
 
 
 def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any]]:
@@ -166,7 +132,7 @@ class StoredRollOut:
 
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
-    """Read a file, a folder or a pattern of files; a process reads it once, until it changes.
+    """Read a file, a folder or a pattern of files.
 
     Raises:
         RollOutFileError: one line with the file, for whatever is wrong.
@@ -178,7 +144,18 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
     ...     read_roll_out(f"{folder}/mine.npz").positions.shape
     (5, 3, 3)
     """
-    return _read(str(path), _state(str(path)))
+    path = str(path)
+    suffix = Path(path).suffix.lower()
+    suffixes = (*_READERS, *MESH_SUFFIXES)
+    if suffix not in suffixes and not (Path(path).is_dir() or "*" in path):
+        raise RollOutFileError(
+            f"{path}: unknown kind of roll-out: give one of {', '.join(suffixes)}, or a folder"
+        )
+    try:
+        return _checked(_READERS.get(suffix, _meshes)(path))
+    except Exception as error:  # a damaged file can fail in nearly every way, and none is this program's own
+        why = " ".join(str(error).split())[:300] or type(error).__name__
+        raise RollOutFileError(why if path in why else f"{path}: {why}") from None
 
 
 def first_not_finite(positions: np.ndarray) -> tuple[int, int] | None:
@@ -192,49 +169,6 @@ def first_not_finite(positions: np.ndarray) -> tuple[int, int] | None:
     """
     bad = np.argwhere(~np.isfinite(positions).all(axis=-1))
     return (int(bad[0, 0]), int(bad[0, 1])) if len(bad) else None
-
-
-def read_rest_mesh(path: str | Path) -> Surface:
-    """Read the mesh of a cloth at rest; a process reads it once, until it changes. Raises MeshError."""
-    return _read_mesh(str(path), _state(str(path)))
-
-
-def forget_roll_outs() -> None:
-    """Free the memory of what has been read."""
-    _read.cache_clear()
-    _read_mesh.cache_clear()
-
-
-def _state(path: str) -> tuple[tuple[str, int, int], ...]:
-    """Names, times and sizes of the files that a path means: these tell a change without opening any."""
-    given = Path(path)
-    files = sorted(given.iterdir()) if given.is_dir() else sorted(map(Path, glob.glob(path))) or [given]
-    if given.suffix.lower() in (".pc2", ".pc16"):
-        files.append(given.with_suffix(".obj"))
-    stats = ((file.name, file.stat()) for file in files if file.is_file())
-    return tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
-
-
-@cache
-def _read_mesh(path: str, state: object) -> Surface:
-    return read_mesh(path)
-
-
-@cache
-def _read(path: str, state: object) -> StoredRollOut:
-    suffix = Path(path).suffix.lower()
-    suffixes = (*_READERS, *MESH_SUFFIXES)
-    if suffix not in suffixes and not (Path(path).is_dir() or "*" in path):
-        raise RollOutFileError(
-            f"{path}: unknown kind of roll-out: give one of {', '.join(suffixes)}, or a folder"
-        )
-    reader = _READERS.get(suffix, _meshes)
-    try:
-        return _checked(reader(path))
-    except Exception as error:  # a damaged file can fail in nearly every way, and none is this program's own
-        why = " ".join(str(error).split())[:300] or type(error).__name__
-        named = why if path in why else f"{path}: {why}"
-        raise RollOutFileError(named) from None
 
 
 def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:

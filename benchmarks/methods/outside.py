@@ -12,7 +12,7 @@ import os
 import shlex
 import subprocess
 import tempfile
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,6 @@ import numpy as np
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import (
     MODULE,
-    FileConventions,
     RollOutFileError,
     RollOutOption,
     first_not_finite,
@@ -38,20 +37,23 @@ from reference_sim.trajectory import Trajectory
 
 @dataclass
 class Stored(Method):
-    """Positions of a file, once they have been shown to belong to the scene."""
+    """Positions of a file, once they have been shown to belong to the scene; fields as of a RollOutOption."""
 
     path: str
-    stated: FileConventions
+    units: str = "m"
+    up: str = "y"
+    fps: float | None = None
+    other_mesh: bool = False
 
     def prepare(self, scene: BuiltScene) -> None:
         """Read the file and compare it with the scene. Raises RollOutFileError."""
-        self.scene = scene
+        self.scene, stored = scene, read_roll_out(self.path)
         try:
-            self.stored, self.done = fit_to_scene(read_roll_out(self.path), scene, self.stated)
+            self.stored = fit_to_scene(
+                stored, scene, units=self.units, up=self.up, fps=self.fps, other_mesh=self.other_mesh
+            )
         except RollOutFileError as error:
-            raise RollOutFileError(
-                str(error) if self.path in str(error) else f"{self.path}: {error}"
-            ) from None
+            raise RollOutFileError(f"{self.path}: {error}") from None
 
     def run(self) -> Trajectory:
         """Return the roll-out of the file."""
@@ -59,29 +61,28 @@ class Stored(Method):
 
     def quasi_static(self) -> Trajectory | None:
         """Return the quasi-static solutions of the file; None where it has none."""
-        held = None if self.stated.other_mesh else self.stored.quasi_static
+        held = None if self.other_mesh else self.stored.quasi_static
         return None if held is None else self._trajectory(held)
 
     def _trajectory(self, positions: np.ndarray) -> Trajectory:
-        stored = self.stored
-        changes, place = "; ".join(self.done), first_not_finite(positions)
+        stored, place = self.stored, first_not_finite(positions)
         where = "frame {}, vertex {}".format(*place) if place else ""
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
         claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
         return Trajectory(
             positions=positions,
-            faces=np.asarray(stored.faces if self.stated.other_mesh else self.scene.cloth.faces),
+            faces=np.asarray(stored.faces if self.other_mesh else self.scene.cloth.faces),
             times=np.arange(len(positions)) * self.scene.dt,
             status="diverged" if where else "ok",
-            reason=f"{self.path}: {where}: a position is not finite" if where else changes,
-            provenance={"method": "stored roll-out", "file": Path(self.path).name, "changes": changes},
+            reason=f"{self.path}: {where}: a position is not finite" if where else "",
+            provenance={"method": "stored roll-out", "file": Path(self.path).name},
             frame_fields={"converged": claims},
         )
 
 
-def make_stored(*, models: Path, seed: int, path: str, digest: str, **stated: object) -> Stored:
+def make_stored(*, models: Path, seed: int, path: str, digest: str, **stated: Any) -> Stored:
     """Make the roll-out of that file, without seed or model; digest: of its content, for the cache."""
-    return Stored(path, FileConventions(**stated))  # type: ignore[arg-type]
+    return Stored(path, **stated)
 
 
 def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
@@ -90,18 +91,19 @@ def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
     if option.places and not Path(path).exists() and not glob.glob(path):
         return None
     stored = read_roll_out(path)
-    declared = option.declared_ms is not None
+    declared = option.ms is not None
+    stated = {name: getattr(option, name) for name in ("units", "up", "fps", "other_mesh")}
     return MethodEntry(
         name=option.name,
         label=option.name,
         description=f"roll-out of {Path(path).name}" + ", time as its author says" * declared,
         module=MODULE,
-        options={"path": path, "digest": digest(stored), **asdict(option.stated)},
+        options={"path": path, "digest": digest(stored), **stated},
         dtype=stored.dtype,
         gives_first_frame=True,
         timed=False,
-        declared_ms=option.declared_ms,
-        other_mesh=option.stated.other_mesh,
+        declared_ms=option.ms,
+        other_mesh=option.other_mesh,
         static_known=False,
         role=option.role,
     )
@@ -182,7 +184,7 @@ class Program(Stored):
             super().prepare(self.scene)
             declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
         declared_time = {} if declared is None else {"declared_ms": _milliseconds(declared)}
-        provenance = {"method": "program", "changes": list(self.done), **declared_time}
+        provenance = {"method": "program", **declared_time}
         return replace(super().run(), provenance=provenance)
 
     def _execute(self, arguments: list[str], output: Path) -> None:
@@ -229,4 +231,4 @@ def _milliseconds(seconds: np.ndarray) -> float:
 
 def make_program(*, models: Path, seed: int, command: str, seconds: float) -> Program:
     """Make a fresh one; it has no model."""
-    return Program("", FileConventions(), command=command, seconds=seconds, seed=seed)
+    return Program("", command=command, seconds=seconds, seed=seed)

@@ -53,7 +53,7 @@ SHORT = {  # field -> its placeholder in help; those of a scene first
 OF_SCENES = tuple(SHORT)[:4]
 SINGLE = ("body", "garment", "trained")  # given once
 WORDS = {  # what now stands behind a path: former options
-    "ROLLOUT,units=cm": "units up fps match-vertices other-mesh declared-ms name",
+    "ROLLOUT,units=cm": "units up fps other-mesh declared-ms name",
     "--motions PATH,up=z": "motion-up motion-fps joint-map repair",
     "--garment FILE,units=cm": "garment-units garment-up garment-shift garment-rest garment-uv-scale "
     "garment-material",

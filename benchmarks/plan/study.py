@@ -15,7 +15,7 @@ from types import UnionType
 from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
 
 from benchmarks.assets import FEWEST_FRAMES, LIBRARY
-from benchmarks.external.roll_out_files import RollOutOption, roll_out_of
+from benchmarks.external.roll_out_files import RollOutOption
 from benchmarks.presets import Preset, find_preset
 from snug.file_options import GarmentFile, MotionFileOptions
 from snug.trained import FOLDER
@@ -102,8 +102,7 @@ class Study:
         trained: networks of the package (true), or of the run in a folder, in place of training; methods
             whose network is not there are skipped, those of your own files trained.
         rollouts: name -> file of another program's roll-out, as a method; or a table: path, units, up, fps,
-            match_vertices, other_mesh, ms. The path may have {scene}, the scene's name with hyphens for
-            slashes.
+            other_mesh, ms. The path may have {scene}, the scene's name with hyphens for slashes.
         device: where networks train, cpu or cuda.
         show: pictures and films that the documents show; a study that has it is published.
     """
@@ -156,7 +155,11 @@ def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> s
 FILE = "study.toml"  # of a study that is a folder
 PACKAGED = Path(__file__).parents[1] / "studies"
 FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
-HIDDEN = {Study: ("written", "origin"), Preset: ("name", "description")}  # attributes that no file gives
+HIDDEN = {
+    Study: ("written", "origin"),
+    RollOutOption: ("role",),
+    Preset: ("name", "description"),
+}  # attributes that no file gives
 WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
 Field = tuple[str, ...]
@@ -360,8 +363,8 @@ class _Reader:
         if not isinstance(table, Mapping):
             self.refuse(field, f"{table!r}: give a table")
         if kind is RollOutOption:
-            place = {"path": str(self.layer(field).folder / str(table.get("path", "")))}
-            return self.checked(field, lambda: roll_out_of(field[-1], {**table, **place}))
+            path = self.layer(field).folder / str(table.get("path", ""))
+            table = {**table, "name": field[-1], "path": str(path)}
         if kind is Preset:  # changes to the sizes that `base` names
             table = dict(table)
             base = self.checked((*field, "base"), lambda: find_preset(table.pop("base", "quick")))

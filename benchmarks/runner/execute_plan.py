@@ -140,8 +140,6 @@ def check_roll_outs(plan: Plan) -> Assets | None:
     stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
     if not stored:
         return None
-    from benchmarks.external.roll_out_files import forget_roll_outs  # loads numpy
-
     try:
         assets = plan.open_assets() if plan.garments else None
     except ValueError:
@@ -154,7 +152,6 @@ def check_roll_outs(plan: Plan) -> Assets | None:
         except ValueError:
             continue  # of a scene that cannot be built the run says so itself, for all methods
         cell.entry.make(models=plan.folder, seed=0).prepare(scene)
-    forget_roll_outs()  # each task that takes one reads it in its own process
     return assets
 
 

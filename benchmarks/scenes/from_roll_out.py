@@ -9,8 +9,7 @@ import sys
 
 import numpy as np
 
-from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, read_rest_mesh, read_roll_out
-from benchmarks.external.scene_fit import LONGEST_STRETCH, mean_stretch
+from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, read_roll_out
 from benchmarks.provenance import digest
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth, MeshError
@@ -19,13 +18,14 @@ from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK
-from reference_sim.files.mesh_files import METRES, UP_AXES, to_metres_y_up
+from reference_sim.files.mesh_files import METRES, UP_AXES, read_mesh, to_metres_y_up
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
 UPRIGHT = 1.5  # times its height a body that stands or sits is wide at most, with its arms out
+LONGEST_STRETCH = 3.0  # times as long as at rest, edges in the mean: their vertices are no neighbours
 MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 
@@ -38,7 +38,7 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
     Raises:
         RollOutFileError: an unreadable file, or half a body.
     """
-    stated, stored = option.stated, read_roll_out(option.path)
+    stored = read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
     gone = [name for name, half in halves.items() if half is None]
     if len(gone) == 1:
@@ -47,13 +47,13 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
             "obstacle_faces (G,3), or neither"
         )
     if stored.obstacle is not None:
-        extents = np.ptp(to_metres_y_up(stored.obstacle, up=stated.up), axis=1).mean(axis=0)
+        extents = np.ptp(to_metres_y_up(stored.obstacle, up=option.up), axis=1).mean(axis=0)
         height, length = extents[1], extents.max()
         if length > UPRIGHT * height:
-            (other,) = {*UP_AXES} - {stated.up}
+            (other,) = {*UP_AXES} - {option.up}
             print(
-                f"{option.path}: with up={stated.up} the obstacle is {height:.3g} {stated.units} high and "
-                f"{length:.3g} {stated.units} long: if it is a body that stands, give up={other}",
+                f"{option.path}: with up={option.up} the obstacle is {height:.3g} {option.units} high and "
+                f"{length:.3g} {option.units} long: if it is a body that stands, give up={other}",
                 file=sys.stderr,
             )
     return Scene(
@@ -61,8 +61,8 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
         description=f"the cloth and the body of {option.name}'s own roll-out",
         module=__name__,
         options={
-            "path": option.path, "rest_mesh": rest_mesh, "units": stated.units, "up": stated.up,
-            "fps": stated.fps, "digests": (digest(stored), digest(read_rest_mesh(rest_mesh))),
+            "path": option.path, "rest_mesh": rest_mesh, "units": option.units, "up": option.up,
+            "fps": option.fps, "digests": (digest(stored), digest(read_mesh(rest_mesh))),
         },
         obstacle=not gone,
     )  # fmt: skip
@@ -78,14 +78,15 @@ def build(
     if len(positions) < MIN_FRAMES:
         raise RollOutFileError(f"{path}: {len(positions)} frames; at least {MIN_FRAMES} are needed")
     try:
-        rest = read_rest_mesh(rest_mesh)
+        rest = read_mesh(rest_mesh)
         if len(rest.positions) != positions.shape[1]:
             raise RollOutFileError(
                 f"{rest_mesh}: {len(rest.positions)} vertices, {path} has {positions.shape[1]}: give the "
                 "mesh that the roll-out was made with"
             )
         cloth = Cloth(to_metres_y_up(rest.positions, units=units, up=up), rest.faces, Material())
-        stretch = mean_stretch(positions[0], cloth)
+        ends = positions[0][cloth.edges]
+        stretch = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean() / cloth.edge_lengths.mean()
         if stretch > LONGEST_STRETCH or stretch < 1.0 / LONGEST_STRETCH:
             raise RollOutFileError(
                 f"{rest_mesh}: in the first frame of {path} its edges have {stretch:.3g} times their length: "

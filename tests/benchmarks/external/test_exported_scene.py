@@ -12,7 +12,7 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks import export, score
-from benchmarks.external.roll_out_files import FileConventions, RollOutOption
+from benchmarks.external.roll_out_files import RollOutOption
 from benchmarks.external.scene_files import facts_of, readme, write_motion, write_obj, write_scene
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.methods import find_method
@@ -84,7 +84,7 @@ def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray
 
 def measured_of(scene, path: Path) -> dict:
     """Its rows beside the simulation's, a second opinion left out."""
-    entry = entry_of(RollOutOption("mine", str(path), FileConventions()), scene.name)
+    entry = entry_of(RollOutOption("mine", str(path)), scene.name)
     method = entry.make(models=Path(), seed=0)
     method.prepare(scene)
     return rows_beside(scene, entry, method.run(), method.quasi_static())

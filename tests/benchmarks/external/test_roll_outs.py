@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import dataclasses
 import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.external import roll_out_files as files
+from benchmarks.external import scene_fit
 from benchmarks.external.roll_out_files import (
-    FileConventions,
     RollOutFileError,
     RollOutOption,
+    StoredRollOut,
+    parse_roll_out,
     read_roll_out,
 )
-from benchmarks.external.scene_fit import MIRRORS, _check_sides
 from benchmarks.methods import find_method
-from benchmarks.methods.outside import Stored, entry_of
+from benchmarks.methods.outside import entry_of
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.plan.study import option, read_study
 from benchmarks.runner.cells import judge
 from benchmarks.runner.measurements import measured
 from benchmarks.scenes.from_roll_out import declared
@@ -79,7 +79,7 @@ def write(kind: str, folder: Path, positions: np.ndarray = X, faces: np.ndarray 
 
 def rows(path: str, **stated) -> dict:
     """Every number that is measured of the file, in suite speed."""
-    option = RollOutOption("mine", path, FileConventions(**stated))
+    option = RollOutOption("mine", path, **stated)
     entry = entry_of(option, SCENE.name)
     method = entry.make(models=Path(), seed=0)
     method.prepare(SCENE)
@@ -133,48 +133,35 @@ def test_half_an_obstacle_is_refused(kept, tmp_path):
     np.savez(tmp_path / "mine.npz", positions=X, faces=FACES, **{kept: held[kept]})
     gone = next(name for name in held if name != kept)
     with pytest.raises(RollOutFileError, match=rf"mine.npz: holds half a body: {gone} is absent"):
-        declared(RollOutOption("mine", str(tmp_path / "mine.npz"), FileConventions()), "rest.obj")
-
-
-def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
-    path, read = write("npz", tmp_path), []
-    reader = files._READERS[".npz"]
-    monkeypatch.setitem(files._READERS, ".npz", lambda path: read.append(path) or reader(path))
-    assert read_roll_out(path) is read_roll_out(path) and len(read) == 1
-    np.savez(path, positions=2.0 * X, faces=FACES)
-    assert np.array_equal(read_roll_out(path).positions, 2.0 * X) and len(read) == 2
-
-
-def test_hinges_as_printed_are_those_of_the_unscaled_energy():
-    from reference_sim.energies import BendHinge
-
-    unscaled = BendHinge(SCENE.cloth, scaling="none")
-    mean = np.mean([unscaled.value_and_gradient(x)[0] for x in X[SCENE.warm_up :]])
-    metrics = direct(X)
-    assert metrics["energy/bending_printed"] == pytest.approx(mean, rel=1e-14)
-    assert metrics["energy/bending_printed"] > 2.0 * metrics["energy/bending"]
+        declared(RollOutOption("mine", str(tmp_path / "mine.npz")), "rest.obj")
 
 
 # --- what does not belong to the scene -------------------------------------------------------------------
 
 ORDER = RANDOM.permutation(49)
 PLACE = np.argsort(ORDER)
+CENTRES, THIRDS = thirds(X, FACES)
 Z_UP = 100.0 * X[..., [0, 2, 1]] * [1.0, -1.0, 1.0]  # (x, -z, y) in centimetres
+PLACED = "write metres, y up .* world coordinates, and the vertices in the order"
+OTHER = {"other_mesh": True}
 WRONG = {
-    "centimetres, z up": (Z_UP, FACES, {}, "give units=cm up=z"),
-    "z up": (Z_UP, FACES, {"units": "cm"}, "give up=z"),
-    "metres called cm": (X, FACES, {"units": "cm"}, "give units=m"),
-    "reordered": (X[:, ORDER], PLACE[FACES], {}, "give match-vertices"),
-    "reordered, without faces": (X[:, ORDER], None, {}, "give match-vertices"),
-    "another mesh": (X, np.roll(FACES, 1) % 49, {"match_vertices": True}, "no vertex can be matched"),
+    "centimetres": (100.0 * X, FACES, {}, PLACED),
+    "z up": (Z_UP, FACES, {"units": "cm"}, PLACED),
+    "metres called cm": (X, FACES, {"units": "cm"}, PLACED),
+    "reordered": (X[:, ORDER], PLACE[FACES], {}, "triangles join other vertices"),
+    "reordered, without faces": (X[:, ORDER], None, {}, PLACED),
     "a vertex less": (X[:, 1:], None, {}, "has 48 vertices, the cloth of hanging_sheet 49"),
-    "a frame less": (X[1:], None, {}, "has 7 frames, .* the scene has 8"),
-    "twice the frames": (np.repeat(X, 2, axis=0)[1:], None, {}, "give fps=60"),
-    "feet": (X / 0.3048, FACES, {}, "write metres"),
-    "elsewhere": (X + np.array([0.0, 1.0, 0.0]), FACES, {}, "world coordinates"),
-    "mirrored": (X * [-1.0, 1.0, 1.0], FACES, {}, "m if it is mirrored in x: write the world's x, y, z"),
-    "half a turn": (X * [-1.0, 1.0, -1.0], FACES, {}, "turned by 180 degrees about y"),
+    "a frame less": (X[1:], None, {}, "has 7 frames, the scene has 8"),
+    "another rate": (X, None, {"fps": 60.0}, "has 60 frames a second, the scene 30"),
+    "elsewhere": (X + np.array([0.0, 1.0, 0.0]), FACES, {}, PLACED),
+    "mirrored": (X * [-1.0, 1.0, 1.0], FACES, {}, PLACED),
+    "half a turn": (X * [-1.0, 1.0, -1.0], FACES, {}, PLACED),
     "no start": (np.where(TIME == 0.0, np.nan, X), FACES, {}, "is not finite"),
+    "another mesh, no faces": (CENTRES, None, OTHER, "has no triangles: add those of its own mesh"),
+    "another mesh, centimetres": (100.0 * CENTRES, THIRDS, OTHER, PLACED),
+    "another mesh, elsewhere": (CENTRES + 1.0, THIRDS, OTHER, PLACED),
+    "vertex -1": (X, FACES - 1, {}, "faces names vertex -1 of 49"),
+    "vertex 49": (X, FACES + 1, {}, "faces names vertex 49 of 49"),
 }
 
 
@@ -192,16 +179,15 @@ def test_a_position_that_is_not_finite_is_named_by_frame_and_vertex(tmp_path):
     exploded = X.copy()
     exploded[5, 11:, 1] = np.inf
     path = write("npz", tmp_path, exploded)
-    method = entry_of(RollOutOption("mine", path, FileConventions()), SCENE.name).make(models=Path(), seed=0)
+    method = entry_of(RollOutOption("mine", path), SCENE.name).make(models=Path(), seed=0)
     method.prepare(SCENE)
     assert method.run().status == "diverged"
     assert method.run().reason == f"{path}: frame 5, vertex 11: a position is not finite"
 
 
-def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
+def test_unit_and_axis_are_mended_when_they_are_given(tmp_path):
     expected = direct(X)
-    path = write("npz", tmp_path, Z_UP[:, ORDER], PLACE[FACES])
-    metrics = rows(path, units="cm", up="z", match_vertices=True)
+    metrics = rows(write("npz", tmp_path, Z_UP), units="cm", up="z")
     assert metrics.keys() == expected.keys()
     for name in expected:
         ours, theirs = ([*of[name][:2], *dict(of[name].moved).values()] if isinstance(of[name], Estimate)
@@ -209,30 +195,25 @@ def test_units_axes_and_order_are_mended_when_they_are_given(tmp_path):
         np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", MIRRORS)
-def test_a_way_that_is_mirrored_or_turned_is_refused_and_one_that_lags_or_explodes_is_not(name):
-    time = np.linspace(0.0, 1.0, 40)[:, None]
-    expected = np.hstack([time, 0.9 + 0.0 * time, 0.3 + time**2])
-    turned = expected.copy()
-    turned[:, [0, 2]] = expected[:, [0, 2]] @ np.array(MIRRORS[name], dtype=float)
-    with pytest.raises(RollOutFileError, match=f"its way lies .* {name}"):
-        _check_sides(turned, expected, "its way")
-    late = np.roll(expected, 5, axis=0)
-    late[30:] *= [1e9, -1e9, np.inf]
-    _check_sides(late, expected, "its way")
-
-
-CENTRES, THIRDS = thirds(X, FACES)
+def test_a_roll_out_that_explodes_is_a_result_and_one_of_another_motion_is_not(monkeypatch):
+    way = np.linspace(0.0, 2.0, SCENE.frames)[:, None, None] * [0.0, 0.0, 1.0]
+    carried = SCENE.start + way
+    monkeypatch.setattr(scene_fit, "expected_positions", lambda scene: carried)
+    late = carried.copy()
+    late[5:] = np.inf
+    scene_fit.fit_to_scene(StoredRollOut(late), SCENE)
+    with pytest.raises(RollOutFileError, match=r"from frame 1 on its centre lies .* where the body carries"):
+        scene_fit.fit_to_scene(StoredRollOut(SCENE.start - way), SCENE)
 
 
 def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_path):
     np.savez(tmp_path / "mine.npz", positions=100.0 * CENTRES, faces=THIRDS, quasi_static=CENTRES)
-    option = RollOutOption("mine", str(tmp_path / "mine.npz"), FileConventions("cm", other_mesh=True))
+    option = RollOutOption("mine", str(tmp_path / "mine.npz"), "cm", other_mesh=True)
     entry = entry_of(option, SCENE.name)
     method = entry.make(models=Path(), seed=0)
     method.prepare(SCENE)
     trajectory = method.run()
-    assert "another mesh of 121 vertices" in trajectory.reason and method.quasi_static() is None
+    assert method.quasi_static() is None
     state = judge(trajectory, Reading(0.0), SCENE, truncated=False, other_mesh=True)
     assert state[0] == "ok" and judge(trajectory, Reading(0.0), SCENE, truncated=False)[0] == "failed"
     group = SceneRollOuts(SCENE, gap_samples=2)
@@ -243,69 +224,27 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
     assert set(metrics) == {"surface/chamfer", "surface/normals"} and metrics["surface/chamfer"] < 1e-9
 
 
+def test_an_option_says_everything_of_a_roll_out():
+    name, table = parse_roll_out("mine=out/{scene}.pc2,units=cm,up=z,fps=60,other-mesh,ms=2.2")
+    option = RollOutOption(name, **table)
+    assert option == RollOutOption("mine", "out/{scene}.pc2", "cm", "z", 60.0, True, 2.2)
+    assert option.path_for("tshirt/kick") == "out/tshirt-kick.pc2"
+    assert entry_of(option, "tshirt/kick") is None  # there is no file for that scene
+    assert parse_roll_out("out/my run_{scene}.npz,up=z", named=False)[0] == "my-run"  # the file's
+
+
 @pytest.mark.parametrize(
-    ("given", "remedy"),
-    [({"positions": CENTRES}, "has no triangles: add those of its own mesh"),
-     ({"positions": X[:, ORDER], "faces": PLACE[FACES]}, "give match-vertices"),
-     ({"positions": 100.0 * CENTRES, "faces": THIRDS}, "give units=cm"),
-     ({"positions": CENTRES + 1.0, "faces": THIRDS}, "world coordinates"),
-     ({"positions": CENTRES[1:], "faces": THIRDS}, "has 7 frames")],
+    ("text", "hint"),
+    [("mine", "NAME=FILE"), ("=a.npz", "NAME=FILE"), ("a b=a.npz", "letters"),
+     ("m=a.npz,x", "no field is called 'x'"), ("m=a.npz,units=inch", "choose from m, cm, mm"),
+     ("m=a.npz,fps=fast", "give a number"), ("m=a.npz,fps=-1", "positive"), ("m=a.npz,ms=0", "positive"),
+     ("m=a.npz,other-mesh=", "give true or false")],
 )  # fmt: skip
-def test_another_mesh_has_to_be_in_the_scenes_place_and_time(given, remedy, tmp_path):
-    np.savez(tmp_path / "mine.npz", **given)
-    with pytest.raises(RollOutFileError, match=remedy):
-        rows(str(tmp_path / "mine.npz"), other_mesh=True)
-    with pytest.raises(RollOutFileError, match="give one"):
-        FileConventions(match_vertices=True, other_mesh=True)
-
-
-def test_a_rate_that_is_the_scenes_own_up_to_rounding_changes_nothing(tmp_path):
-    scene = dataclasses.replace(SCENE, dt=1 / 29.97)
-    assert 1 / scene.dt != 29.97
-    method = Stored(write("npz", tmp_path), FileConventions(fps=29.97))
-    method.prepare(scene)
-    assert method.run().reason == ""
-    method = Stored(write("npz", tmp_path), FileConventions(fps=30.0 + 1e-9))
-    method.prepare(SCENE)
-    assert method.run().reason == ""
-
-
-@pytest.mark.parametrize(("wrong", "says"), [(-1, "faces names vertex -1 of 49"), (60, "vertex 60 of 49")])
-def test_the_vertex_that_triangles_name_wrongly_is_said(wrong, says, tmp_path):
-    faces = np.where(np.arange(len(FACES))[:, None] == 3, wrong, FACES)
-    np.savez(tmp_path / "mine.npz", positions=X, faces=faces)
-    with pytest.raises(RollOutFileError, match=says):
-        read_roll_out(tmp_path / "mine.npz")
-
-
-def test_a_file_that_states_another_rate_has_to_be_re_timed(tmp_path):
-    halves = np.stack([X[:-1], (X[:-1] + X[1:]) / 2], axis=1).reshape(-1, 49, 3)
-    fine = np.concatenate([halves, X[-1:]])
-    path = str(tmp_path / "mine.npz")
-    np.savez(path, positions=fine, fps=60.0)
-    with pytest.raises(RollOutFileError, match=r"states 60 .* give fps=60"):
-        rows(path)
-    assert rows(path, fps=60.0) == direct(X)  # every second frame, as it is
-    np.savez(path, positions=X[::2])
-    with pytest.raises(RollOutFileError, match="has 4 frames"):
-        rows(path)
-    method = Stored(path, FileConventions(fps=15.0))
-    with pytest.raises(RollOutFileError, match="scene has 8"):
-        method.prepare(SCENE)  # its last frame comes before the scene's
-    np.savez(path, positions=np.concatenate([X[::2], 2 * X[-1:] - X[-2:-1]]))
-    method.prepare(SCENE)
-    assert np.allclose(method.stored.positions[1], (X[0] + X[2]) / 2) and "linear" in method.run().reason
-    assert np.array_equal(method.stored.positions[::2], X[::2])
-
-
-def test_vertices_without_triangles_are_matched_by_the_start_alone(tmp_path):
-    at_rest = np.concatenate([SCENE.start[None], X[1:]])
-    path = str(tmp_path / "mine.npz")
-    np.savez(path, positions=at_rest[:, ORDER])
-    assert rows(path, match_vertices=True) == direct(at_rest)
-    np.savez(path, positions=at_rest[:, ORDER] + 0.1)
-    with pytest.raises(RollOutFileError, match="add its triangles"):
-        rows(path, match_vertices=True)
+def test_a_wrong_option_is_one_line(text, hint):
+    with pytest.raises(ValueError, match=hint) as refused:
+        name, table = parse_roll_out(text)
+        read_study(options=[option("--rollout", "rollouts", {name: table})])
+    assert "\n" not in str(refused.value)
 
 
 # --- damaged files ---------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.external.roll_out_files import FileConventions, RollOutFileError, RollOutOption
+from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption
 from benchmarks.external.scene_files import write_obj
 from benchmarks.scenes.from_roll_out import declared
 from tests.benchmarks.runner.tasks_by_hand import small_scene
@@ -27,7 +27,7 @@ def declare(folder: Path, *, rest_scale: float = 1.0, body: np.ndarray = STANDIN
         obstacle_faces=TETRAHEDRON,
     )  # fmt: skip
     write_obj(folder / "rest.obj", rest_scale * SHEET.cloth.rest_positions, SHEET.cloth.faces, None)
-    option = RollOutOption("pred", str(folder / "pred.npz"), FileConventions(up=up))
+    option = RollOutOption("pred", str(folder / "pred.npz"), up=up)
     return declared(option, str(folder / "rest.obj"))
 
 
