@@ -133,34 +133,40 @@ def remove_recording_errors(raw: RawMotion, *, repair: bool) -> RawMotion:
             other units.
     """
     poses, path = (np.where(np.isfinite(x), x, np.nan) for x in (raw.poses, raw.translations))
-    _check_units(raw.path, poses, path)
+    angles = np.linalg.norm(poses, axis=2)
+    if (angles[:, 1:] > MAX_ANGLE).any() or (angles[:, 0] > MAX_ROOT_ANGLE).any():
+        raise MotionError(f"{raw.path}: a joint turns by more than a person's; write radians, not degrees")
+    if (np.abs(path) > MAX_DISTANCE).any():
+        raise MotionError(f"{raw.path}: the root is more than {MAX_DISTANCE:g} m away; write metres")
     tracks = [(name, poses[:, joint], True) for joint, name in enumerate(JOINT_NAMES)]
-    errors: dict[str, list[str]] = {}
-    wrong, stays = np.zeros(len(poses), dtype=bool), ""
+    errors, any_wrong, stays = [], np.zeros(len(poses), dtype=bool), False
     for name, track, turns in [*tracks, ("the root's path", path, False)]:
-        missing = ~np.isfinite(track).all(axis=1)
-        if missing.all():
+        wrong = ~np.isfinite(track).all(axis=1)
+        if wrong.all():
             raise MotionError(f"{raw.path}: {name} is not finite in any frame; export it again")
-        gaps = [(f"{name} is not finite", first, last) for first, last in _runs(missing)]
-        _bridge(track, gaps, turns)
-        spans = _spans_around(_jumps(track, turns, raw.fps), raw.fps, len(track))
-        leaps = [(f"{name} jumps", first, last) for first, last in spans]
-        _bridge(track, leaps, turns)
-        for what, first, last in gaps + leaps:
-            errors.setdefault(what, []).append(f"{first}-{last}")
-            wrong[first : last + 1] = True
-        for frame in _jumps(track, turns, raw.fps)[:1]:
-            stays = stays or f"{name} jumps after frame {frame}"
+        _interpolate(track, wrong, turns)
+        for first, last in _leaps(track, turns, raw.fps):
+            wrong[max(first + 1 - UNTRUSTED, 0) : last + UNTRUSTED + 1] = True
+        if wrong.any():
+            frames = np.flatnonzero(wrong)
+            runs = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
+            errors.append(f"{name} in frames {_short([f'{run[0]}-{run[-1]}' for run in runs])}")
+            any_wrong |= wrong
+            _interpolate(track, wrong, turns)
+            stays = stays or bool(_leaps(track, turns, raw.fps))
     if not errors:
         return raw
-    named = _short([f"{what} in frames {_short(spans)}" for what, spans in errors.items()])
-    share = f"recording errors in {100 * wrong.mean():.0f} % of the frames"
-    if wrong.mean() > MAX_WRONG:
-        raise MotionError(f"{raw.path}: {share} ({named}); check frame rate and units, export it again")
+    named = _short(errors)
+    problem = f"jumps, or numbers that are not finite: {named}"
+    if any_wrong.mean() > MAX_WRONG:
+        share = f"{100 * any_wrong.mean():.0f} % of the frames"
+        raise MotionError(f"{raw.path}: {problem}, {share}; check frame rate and units, export it again")
     if not repair:
-        raise MotionError(f"{raw.path}: {named}; add ,repair behind the path to interpolate, or cut the clip")
+        raise MotionError(
+            f"{raw.path}: {problem}; add ,repair behind the path to interpolate, or cut the clip"
+        )
     if stays:
-        raise MotionError(f"{raw.path}: {stays} and stays where it is then; cut the clip there")
+        raise MotionError(f"{raw.path}: {problem}; a jump is left by interpolation, so cut the clip there")
     return replace(raw, poses=poses, translations=path, source=f"{raw.source}; repaired: {named}")
 
 
@@ -168,57 +174,31 @@ def _short(names: list[str]) -> str:
     return ", ".join(names[:MAX_NAMED]) + f" and {len(names) - MAX_NAMED} more" * (len(names) > MAX_NAMED)
 
 
-def _check_units(file: Path, poses: np.ndarray, path: np.ndarray) -> None:
-    angles = np.linalg.norm(poses, axis=2)
-    angles[:, 0] *= MAX_ANGLE / MAX_ROOT_ANGLE
-    for frame, joint in np.argwhere(angles > MAX_ANGLE)[:1]:
-        name = JOINT_NAMES[joint]
-        raise MotionError(f"{file}: {name} turns too far in frame {frame}; write radians, not degrees")
-    for frame in np.flatnonzero((np.abs(path) > MAX_DISTANCE).any(axis=1))[:1]:
-        raise MotionError(
-            f"{file}: the root is more than {MAX_DISTANCE:g} m away in frame {frame}; write metres"
-        )
+def _leaps(track: np.ndarray, turns: bool, fps: float) -> list[tuple[int, int]]:
+    """Return the first and the last jump of each error of a track (T, 3).
 
-
-def _jumps(track: np.ndarray, turns: bool, fps: float) -> np.ndarray:
-    """Return the frames k of a track (T, 3) with a jump to frame k + 1."""
+    A jump k is one from frame k to frame k + 1; jumps in quick succession bound one error.
+    """
     steps = np.diff(track, axis=0)
     if turns:
         rotations = rotation_matrices(track)
         steps = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
     limit = MAX_TURN_SPEED if turns else MAX_ROOT_SPEED
-    return np.flatnonzero(np.linalg.norm(steps, axis=1) * fps > limit)
+    jumps = np.flatnonzero(np.linalg.norm(steps, axis=1) * fps > limit)
+    groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > SAME_ERROR * fps) + 1)
+    return [(group[0], group[-1]) for group in groups if len(group)]
 
 
-def _spans_around(jumps: np.ndarray, fps: float, frames: int) -> list[tuple[int, int]]:
-    """Return first and last frame that is not trusted around each error of a clip.
-
-    An error is a jump, or all between jumps in quick succession.
-    """
-    groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > SAME_ERROR * fps) + 1) if len(jumps) else []
-    ends = ((int(group[0]) + 1 - UNTRUSTED, int(group[-1]) + UNTRUSTED) for group in groups)
-    return [(max(first, 0), min(last, frames - 1)) for first, last in ends]
-
-
-def _runs(mask: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield first and last index of each run of true entries of a mask (T,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return ((int(start), int(stop) - 1) for start, stop in zip(edges[::2], edges[1::2]))
-
-
-def _bridge(track: np.ndarray, spans: list[tuple[str, int, int]], turns: bool) -> None:
-    """Fill the frames first to last of each span, in place, unless they are all of the track (T, 3)."""
-    for _, first, last in spans:
-        before, after = first - 1, last + 1
-        if before < 0 and after >= len(track):
-            continue
-        if before < 0 or after >= len(track):
-            track[first:after] = track[after if before < 0 else before]
-            continue
-        share = np.linspace(0.0, 1.0, after - before + 1)[1:-1]
-        start, end = (np.tile(track[k], (after - first, 1)) for k in (before, after))
-        straight = start + share[:, None] * (end - start)
-        track[first:after] = slerp(start, end, share) if turns else straight
+def _interpolate(track: np.ndarray, wrong: np.ndarray, turns: bool) -> None:
+    """Fill the wrong frames (T,) of a track (T, 3), in place, from the good ones around them, if any."""
+    frames, good = np.flatnonzero(wrong), np.flatnonzero(~wrong)
+    if not (len(frames) and len(good)):
+        return
+    place = np.searchsorted(good, frames)
+    before, after = good[np.maximum(place - 1, 0)], good[np.minimum(place, len(good) - 1)]
+    share = np.where(after > before, (frames - before) / np.maximum(after - before, 1), 0.0)
+    straight = track[before] + share[:, None] * (track[after] - track[before])
+    track[frames] = slerp(track[before], track[after], share) if turns else straight
 
 
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
@@ -226,7 +206,6 @@ TO_Y_UP = {
     "y": np.eye(3),
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
 }
-_SIGNED_AXES = ("x", "y", "z", "-x", "-y", "-z")
 MAX_LYING_COSINE = 0.3  # between the vertical and the way from ankles to head: below it a body lies or crawls
 MAX_RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
 
@@ -250,29 +229,24 @@ def turn_y_up(raw: RawMotion, up: str) -> RawMotion:
     ankles = joints[:, [JOINT["left_ankle"], JOINT["right_ankle"]]].mean(axis=1)
     directions = joints[:, JOINT["head"]] - ankles
     directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
-    signed = np.concatenate([directions, -directions], axis=1)
-    shares = np.bincount(signed.argmax(axis=1), minlength=6) / len(directions)
-    likely = _SIGNED_AXES[int(shares.argmax())]
-    share = f"{100 * shares.max():.0f} % of the frames"
-    if up and (directions[:, _SIGNED_AXES.index(up)] > MAX_LYING_COSINE).mean() <= 0.5:
-        problem = f"with {up} up the body lies on its back or side: it stands"
-    elif not up and (shares.max() <= 0.5 or likely not in TO_Y_UP):
-        problem = "the body stands neither along y nor along z:"
-    else:
-        problem = ""
-    if problem:
-        remedy = "turn the root's rotation and path so that y or z is up, or give a clip that stands"
-        if likely in TO_Y_UP:
-            remedy = f"add ,up={likely} behind the path, or give a clip that stands"
-        raise MotionError(f"{raw.path}: {problem} along {likely} in {share}; {remedy}")
-    rise = float(np.ptp(joints[..., _SIGNED_AXES.index(up or likely)].min(axis=1)))
+    nearest = np.concatenate([directions, -directions], axis=1).argmax(axis=1)
+    shares = {axis: np.mean(nearest == "xyz".index(axis)) for axis in TO_Y_UP}
+    axis = up or max(shares, key=lambda axis: shares[axis])
+    share = f"{100 * shares[axis]:.0f} % of the frames"
+    along = "xyz".index(axis)
+    stands = (directions[:, along] > MAX_LYING_COSINE).mean() if up else shares[axis]
+    if stands <= 0.5:
+        raise MotionError(
+            f"{raw.path}: the body stands along {axis} in {share} only; add ,up=y or ,up=z behind the path, "
+            "turn the root's rotation and path, or give a clip that stands"
+        )
+    rise = float(np.ptp(joints[..., along].min(axis=1)))
     if not up and rise > MAX_RISE:
         raise MotionError(
-            f"{raw.path}: the body points along {likely} in {share}, and its lowest joint moves by "
-            f"{rise:.3g} m along it; if {likely} is up and the path in metres add ,up={likely}"
+            f"{raw.path}: the body points along {axis} in {share}, and its lowest joint moves by "
+            f"{rise:.3g} m along it; if {axis} is up and the path in metres add ,up={axis}"
         )
-    turn = TO_Y_UP[up or likely]
-    note = f"{up} up as given" if up else f"{likely} up, as the body stands in {share}"
-    poses = raw.poses.copy()
+    note = f"{up} up as given" if up else f"{axis} up, as the body stands in {share}"
+    poses, turn = raw.poses.copy(), TO_Y_UP[axis]
     poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
     return replace(raw, poses=poses, translations=raw.translations @ turn.T, source=f"{raw.source}; {note}")

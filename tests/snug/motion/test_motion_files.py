@@ -136,10 +136,10 @@ class TestUpAxis:
     @pytest.mark.parametrize(
         ("turn", "up", "says"),
         [
-            (Y_UP, "z", "with z up the body lies .* along y in 100 %.*,up=y"),
-            (TO_Z_UP, "y", "with y up .*,up=z"),
-            (np.diag([1.0, -1.0, -1.0]), "", "neither along y nor along z: along -y"),
-            (np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]), "", "neither along y nor along z: along x"),
+            (Y_UP, "z", "stands along z in 0 % .*,up=y"),
+            (TO_Z_UP, "y", "stands along y in 0 %"),
+            (np.diag([1.0, -1.0, -1.0]), "", "in 0 % of the frames only"),
+            (np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]), "", "in 0 % of the frames only"),
         ],
     )
     def test_a_body_on_its_back_is_refused(self, tmp_path, turn, up, says):
@@ -165,7 +165,7 @@ class TestUpAxis:
         crawling = write(
             tmp_path / "crawl.npz", Motion("", np.zeros((60, 24, 3)), away @ crawl), turn @ crawl
         )
-        assert refused(crawling, "lowest joint moves by 1.5 m|stands neither")
+        assert refused(crawling, "lowest joint moves by 1.5 m|stands along")
 
 
 def spike(frame, joint="right_elbow", by=2.5):
@@ -179,9 +179,9 @@ def spike(frame, joint="right_elbow", by=2.5):
 class TestRecordingErrors:
     def test_a_joint_that_jumps_is_named_or_mended(self, tmp_path):
         path = write(tmp_path / "clip.npz", KICK, poses=spike(20))
-        assert refused(path, "right_elbow jumps in frames 18-22; add ,repair")
+        assert refused(path, "right_elbow in frames 18-22; add ,repair")
         motion, whole = read(path, repair=True), read(write(tmp_path / "whole.npz", KICK))
-        assert "repaired: right_elbow jumps in frames 18-22" in motion.source
+        assert "repaired: right_elbow in frames 18-22" in motion.source
         assert 0 < angles(motion.poses, whole.poses).max() < 0.2  # the shortest arc over six frames
 
     @pytest.mark.parametrize("form", ["poses", "rotations"])
@@ -191,7 +191,7 @@ class TestRecordingErrors:
         trans = KICK.translations.copy()
         trans[-1, 1] = np.inf
         np.savez(tmp_path / "clip.npz", trans=trans, fps=30.0, **{form: array})
-        named = "left_knee is not finite in frames 5-6, the root's path is not finite in frames 39-39"
+        named = "left_knee in frames 5-6, the root's path in frames 39-39"
         assert refused(tmp_path / "clip.npz", f"{named}; add ,repair")
         motion = read(tmp_path / "clip.npz", repair=True)
         np.testing.assert_array_equal(motion.translations[-1], KICK.translations[-2])
@@ -205,22 +205,22 @@ class TestRecordingErrors:
         still = write(tmp_path / "whole.npz", KICK, poses=poses.copy())
         poses[at, JOINT["neck"]] = [0.0, 2.6, 0.0]
         path = write(tmp_path / "clip.npz", KICK, poses=poses)
-        assert refused(path, "neck jumps in frames")
+        assert refused(path, "neck in frames")
         assert angles(read(path, repair=True).poses, read(still).poses).max() < 1e-7
 
     def test_a_root_that_jumps_and_comes_back_is_mended_and_one_that_stays_is_not(self, tmp_path):
         trans = KICK.translations.copy()
         trans[11] += [1.0, 0.0, 0.0]
         path = write(tmp_path / "clip.npz", KICK, trans=trans)
-        assert refused(path, "the root's path jumps in frames 9-13")
+        assert refused(path, "the root's path in frames 9-13")
         assert np.abs(read(path, repair=True).translations - KICK.translations).max() < 0.05
         trans[11:] += [9.0, 0.0, 0.0]
         path = write(tmp_path / "clip.npz", KICK, trans=trans)
-        assert refused(path, "path jumps after frame .* cut the clip", repair=True)
+        assert refused(path, "left by interpolation, so cut the clip", repair=True)
 
     def test_too_many_are_not_mended(self, tmp_path):
         poses = KICK.poses.copy()
         for frame in range(5, 34, 7):  # so near to each other that nothing between two of them is trusted
             poses[frame] = spike(frame)[frame]
         path = write(tmp_path / "spikes.npz", KICK, poses=poses)
-        assert refused(path, "in 82 % of the frames .* check frame rate and units", repair=True)
+        assert refused(path, "82 % of the frames; check frame rate and units", repair=True)
