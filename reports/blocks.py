@@ -17,8 +17,6 @@ from reports.figures.charts import (
     dots,
     energy_series,
     error_of_page_one,
-    known_answers,
-    training_curves,
 )
 from reports.figures.figure import Figure, Picture
 from reports.finished_run import Run
@@ -109,12 +107,9 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     Heading("Body shapes"),
     TableBlock("shapes"),
     Heading("Validation"),
-    Figure("known_answers", known_answers),
     TableBlock("validation", left_out=("pass", "reported")),
     Heading("Stress"),
     TableBlock("extremes", left_out=("converged",)),
-    Heading("Training"),
-    Figure("training", training_curves),
     Heading("How cells, checks and stress tests ended"),
     TableBlock("endings"),
     TableBlock("unfinished"),

@@ -1,6 +1,6 @@
 """python -m reports.build RUN_DIR: tables, figures, page and PDF of a finished run.
 
-Reads run.json, results.csv, frame_energies.csv, trajectories and models in RUN_DIR, and nothing else; writes
+Reads run.json, results.csv, frame_energies.csv and trajectories in RUN_DIR, and nothing else; writes
 tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes.
 Of a run without trajectories, pictures of roll-outs that lie in figures/ stay and stand in the PDF.
 """
@@ -50,14 +50,14 @@ def build_report(run_dir: str | Path) -> Built:
     # Heavy: not needed for --help.
     from reports.blocks import FIGURES, Report
     from reports.figures.figure import draw_figures
-    from reports.finished_run import read_run_with_trainings
+    from reports.finished_run import read_run
     from reports.page.write_page import write_page
     from reports.pdf import write_pdf
     from reports.tables import make_tables, write_tables
     from reports.text.text_table import answer
 
     folder = RunFolder(run_dir)
-    run = read_run_with_trainings(folder)
+    run = read_run(folder)
     tables = make_tables(run)
     write_tables(folder.tables, tables.values())
     if folder.trajectories.is_dir():  # else pictures of roll-outs that are gone stay

@@ -1,8 +1,7 @@
-"""A finished run: its rows, declarations, stored roll-outs and trainings, as its folder holds them."""
+"""A finished run: its rows, declarations and stored roll-outs, as its folder holds them."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,7 +15,7 @@ from benchmarks.metric import Metric
 from benchmarks.results import run_folder
 from benchmarks.results.protocol import is_member, one_protocol
 from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, ResultsError, Row
-from benchmarks.results.run_folder import RunFolder, model_path
+from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
 from reference_sim.trajectory import Trajectory, TrajectoryError
 
@@ -72,52 +71,6 @@ def without_folder(folder: RunFolder | None, problem: object) -> str:
     return str(problem).replace(f"{folder.path}/", "") if folder else str(problem)
 
 
-# By the unit of the loss, of the energies and of simulated vertices: their squares, or two bands of them.
-PANELS = {
-    "J": "physics loss [J per frame]",
-    "cm²": "vertex loss [cm²]",
-    "cm": "vertex loss of two bands [cm]",
-}
-
-
-@dataclass(frozen=True)
-class History:
-    """Loss of one model over its training.
-
-    unit: of the loss. rows: for every few steps, step, seconds, loss and terms, at some the value on held-out
-    motions.
-    """
-
-    method: str
-    unit: str
-    rows: list[dict[str, float]]
-    garment: str = ""
-
-    @property
-    def panel(self) -> str:
-        """Title of the panel of this kind of loss."""
-        return PANELS.get(self.unit, f"loss [{self.unit}]")
-
-    def column(self, name: str) -> np.ndarray:
-        """Return one number of every logged step (N,), nan where it was not logged."""
-        return np.array([row.get(name, np.nan) for row in self.rows], dtype=float)
-
-
-def read_history(path: Path, method: str) -> History | None:
-    """Return the history in a model file, None without one. Raises ValueError for a broken file."""
-    from safetensors import SafetensorError, safe_open
-
-    try:
-        with safe_open(path, "numpy") as stored:
-            header: Any = json.loads((stored.metadata() or {}).get("snug", "{}"))
-    except (OSError, ValueError, RecursionError, SafetensorError) as error:
-        raise ValueError(f"{path}: no safetensors header ({error})") from None
-    if not isinstance(header, dict):
-        raise ValueError(f"{path}: its entry 'snug' is a {type(header).__name__}, no table")
-    rows = header.get("history") or []
-    return History(method, header.get("unit", ""), rows) if len(rows) > 1 else None
-
-
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster
 SUITES = ("garments", "speed", "validation", "extremes", "shapes")  # that have tables of their own
 
@@ -141,7 +94,7 @@ class Run:
     frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table` (of
     its metric) and `case` (the check or stress test that it is, else empty). changed: files that are not as
     the run wrote them. protocol: of its rows; empty where all are a user's own. frame_energies: lines of
-    frame_energies.csv, empty without the file. histories: of the trainings. roll_outs: reads stored roll-outs
+    frame_energies.csv, empty without the file. roll_outs: reads stored roll-outs
     when they are asked for. problems: a sentence for each file that could not be read, added to while
     roll-outs are read.
     """
@@ -153,7 +106,6 @@ class Run:
     changed: Sequence[str] = ()
     protocol: str = ""
     frame_energies: pd.DataFrame = field(default_factory=pd.DataFrame)
-    histories: Sequence[History] = ()
     roll_outs: RollOuts = field(default_factory=RollOuts)
     problems: list[str] = field(default_factory=list)
     _cells: dict[tuple[str, ...], pd.DataFrame] = field(default_factory=dict, init=False)
@@ -303,12 +255,6 @@ def _cases(frame: pd.DataFrame, declared: Mapping[str, Any]) -> list[str]:
     return [places.get(pair) or places.get((pair[0], "")) or "" for pair in pairs]
 
 
-def read_run_with_trainings(folder: RunFolder) -> Run:
-    """Read a run and how its networks were trained. Raises ResultsError for a folder that holds no run."""
-    run = read_run(folder)
-    return replace(run, histories=_read_histories(folder, run))
-
-
 def read_run(folder: RunFolder) -> Run:
     """Read rows and declarations of a run; its roll-outs are read when they are asked for.
 
@@ -330,21 +276,3 @@ def read_run(folder: RunFolder) -> Run:
         frame_energies=run_folder.read_frame_energies(folder.frame_energies_path),
         roll_outs=RollOuts(folder, run.problems),
     )
-
-
-def _read_histories(folder: RunFolder, run: Run) -> list[History]:
-    """Read the training of every network in the run's folder, garment by garment."""
-    histories: list[History] = []
-    networks = run.frame[run.frame["garment"] != ""][["garment", "method", "seed"]].drop_duplicates()
-    for garment, rows in networks.groupby("garment", sort=False):
-        for _, method, seed in rows.itertuples(index=False):
-            path = model_path(folder.models_of(str(garment)), method, seed)
-            if not path.is_file():
-                continue
-            try:
-                history = read_history(path, method)
-            except ValueError as error:
-                run.problems.append(without_folder(folder, error))
-            else:
-                histories += [replace(history, garment=str(garment))] if history else []
-    return histories

@@ -1,4 +1,4 @@
-"""Charts of the report: error and total cost against time, energies, losses, dots, checks.
+"""Charts of the report: error and total cost against time, energies, dots.
 
 Relative excess takes the place of the total energy where the run has it. It spans decades and may be below
 zero, so its dots stand on the scale of its statistics, arcsinh(x / 1 %).
@@ -17,7 +17,7 @@ import pandas as pd
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import SOFTENING
 from reports.figures.figure import Drawing
-from reports.figures.plane import SOLVERS, draw_points, of_page_one, write_labels
+from reports.figures.plane import SOLVERS, curves_of, draw_points
 from reports.figures.plotting import (
     arcsinh_axis,
     few,
@@ -29,9 +29,8 @@ from reports.figures.plotting import (
     style,
     wrapped,
 )
-from reports.finished_run import PANELS, History, Run, shown_seeds
+from reports.finished_run import Run, shown_seeds
 from reports.statistics.means_and_spreads import Mean, means, value_of
-from reports.statistics.outcomes import checks, tolerances_away
 from reports.statistics.pareto import (
     ERRORS,
     Point,
@@ -46,7 +45,6 @@ from reports.statistics.pareto import (
     time_label,
 )
 from reports.statistics.relative_excess import RELATIVE_EXCESS, TOTAL, excess_of, with_relative_excess
-from reports.tables.table import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,15 +66,16 @@ def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequenc
     """Draw one error of a scene in a wide panel, solvers stopped early as one curve."""
     time = run_time(rows)
     figure, (axes,) = new_panels(1)
-    curves = of_page_one(run, points)
+    curves = curves_of(run, points)
     reference = value_of(rows, run.reference, time)
     drawn = draw_points(axes, run, curves, reference, indistinct(run, rows, metric.name))
     axes.set(xlabel=time_label(time), ylabel=metric.heading)
-    fit(figure)
-    write_labels(axes, drawn)
+    fit(figure, drawn.entries, markers=True)
     caption = f"{rows['scene'].iloc[0]}: lower left is better. Pale line: the best at each time."
-    if any(curve.aside for curve in curves):
-        caption += f" {SOLVERS.label} are joined where none is faster and as accurate; the others are faint."
+    for solvers in (curve for curve in curves if curve.look is SOLVERS):
+        first, last = (run.label(solvers.points[end].method) for end in (0, -1))
+        caption += f" {SOLVERS.label}: from {first} to {last}"
+        caption += "; faint: solvers that another beats in both." if solvers.aside else "."
     caption += " Grey: within the reference's uncertainty." if drawn.band else ""
     if drawn.below:
         names = ", ".join(run.label(method) for method in run.ordered(drawn.below))
@@ -157,36 +156,6 @@ def _frames(run: Run) -> tuple[str, pd.DataFrame]:
     return scene, frames[(frames["scene"] == scene) & (frames["seed"] == frames["method"].map(seeds))]
 
 
-def training_curves(run: Run) -> Iterator[Drawing]:
-    """Draw the loss of every training, a figure for each garment, the first under the plain name."""
-    for place, garment in enumerate(dict.fromkeys(history.garment for history in run.histories)):
-        name = f"training_{file_name(garment)}" if place else "training"
-        histories = [history for history in run.histories if history.garment == garment]
-        shown = leading(run, {history.method for history in histories})
-        histories = [history for history in histories if history.method in shown]
-        if histories:
-            yield _draw_garment(run, name, garment, histories)
-
-
-def _draw_garment(run: Run, name: str, garment: str, histories: Sequence[History]) -> Drawing:
-    known = dict.fromkeys((*PANELS.values(), *(h.panel for h in histories)))
-    titles = [title for title in known if any(h.panel == title for h in histories)]
-    figure, panels = new_panels(len(titles), 2)
-    for axes, title in zip(panels, titles):
-        of_panel = [history for history in histories if history.panel == title]
-        for history in of_panel:
-            look, seconds = style(run, history.method), history.column("seconds")
-            axes.plot(seconds, history.column("loss"), color=look.colour, linestyle=look.line, linewidth=1.1)
-        axes.set(xlabel="training time [s]", title=title)
-        # Gravity may make losses negative.
-        if min(history.column("loss").min() for history in of_panel) > 0.0:
-            log_axis(axes, "y")
-    shown = leading(run, {history.method for history in histories})
-    fit(figure, [style(run, method) for method in shown])
-    caption = f"{garment}: training loss against wall time; one curve per model and seed."
-    return Drawing(figure, name, caption)
-
-
 METRICS = (TOTAL, "curvature/error", "penetration/vertices")
 MOST_METHODS = 24  # methods that have room below each other
 
@@ -246,26 +215,3 @@ def _draw_panel(
         if bar is not None:
             axes.plot([bar] * 2, [place - 0.36, place + 0.36], color="#111111", linewidth=1.4)
     return shown
-
-
-LOWEST = 1e-6  # tolerances away: what is nearer is drawn here
-
-
-def known_answers(run: Run) -> Iterator[Drawing]:
-    """Draw in order how many tolerances two checks or more lie from their answers."""
-    away = [tolerances_away(row) for row in checks(run).itertuples()]
-    known = sorted(float(x) for x in away if x is not None and math.isfinite(x))
-    if len(known) < 2:
-        return
-    figure, (axes,) = new_panels(1)
-    heights = np.maximum(known, LOWEST)
-    axes.plot(range(1, len(known) + 1), heights, "o", color="#0072B2", markersize=3)
-    axes.axhline(1.0, color="#D55E00", linewidth=1.2)
-    axes.annotate("tolerance", (1, 1.0), (0, 3), textcoords="offset points", fontsize=8, color="#B04A00")
-    axes.set_ylim(LOWEST / 2.0, max(3.0, 2.0 * heights[-1]))
-    axes.set(xlabel="checks, in order", ylabel="tolerances away")
-    log_axis(axes, "y")
-    fit(figure)
-    caption = f"{len(known)} checks with a known answer: distance from it over the tolerance"
-    caption += f"; {number(LOWEST, 1)} stands for all that is less."
-    yield Drawing(figure, "known_answers", caption)

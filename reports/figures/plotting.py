@@ -212,12 +212,15 @@ def new_panels(count: int, columns: int = 1, **more: Any) -> tuple[Figure, list[
     return figure, panels[:count]
 
 
-def fit(figure: Figure, entries: Sequence[Style] = (), height: float = PANEL) -> None:
+def fit(
+    figure: Figure, entries: Sequence[Style] = (), height: float = PANEL, *, markers: bool = False
+) -> None:
     """Draw a legend above the panels, and give the figure the height at which each is so high [inches].
 
     Call it when all that takes room is drawn; panels stay where they are from then on.
     """
     if entries:
+        entries = entries if markers else [replace(look, marker="") for look in entries]
         widest = _legend(figure, entries, 1)
         width = widest.get_window_extent().width
         widest.remove()
@@ -312,9 +315,10 @@ def _legend(figure: Figure, entries: Sequence[Style], columns: int) -> Legend:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=look.colour, linestyle=look.line, label=wrapped(look.label, 30))  # type: ignore[arg-type]
+        Line2D([], [], color=look.colour, linestyle=look.line, marker=look.marker, markersize=4.0,
+               label=wrapped(look.label, 30))
         for look in entries
-    ]
+    ]  # fmt: skip
     return figure.legend(
         handles=handles,
         loc="outside upper center",

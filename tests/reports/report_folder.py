@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +15,6 @@ from reference_sim import Trajectory
 from reports.blocks import Report
 from reports.finished_run import RollOuts, Run, make_run
 from reports.tables import make_tables
-from snug.kinds import find_kind
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
 METHODS = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
@@ -175,16 +172,6 @@ def sheet(height: float) -> tuple[np.ndarray, np.ndarray]:
         [np.stack([corner, corner + 1, corner + 5], 1), np.stack([corner, corner + 5, corner + 4], 1)]
     )
     return np.repeat(points[None], FRAMES, axis=0), faces
-
-
-def write_model(path: Path, kind: str, **last: float) -> None:
-    """The header of a safetensors file, with a short history; best at step 3 on held-out motions."""
-    history = [{"step": s, "seconds": 0.1 * s, "loss": 2.0 / s, **last} for s in (1, 2, 4)]
-    metadata = {"kind": kind, "unit": find_kind(kind).unit, "history": history}
-    metadata["summary"] = {"training_frames": 90, "validation": {"best_step": 3}}
-    header = json.dumps({"__metadata__": {"snug": json.dumps(metadata)}}).encode()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(struct.pack("<Q", len(header)) + header)
 
 
 def all_rows() -> list[Row]:

@@ -9,13 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from safetensors.numpy import save_file
 
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build
-from reports import finished_run as training
 from reports.blocks import FIGURES
 from reports.figures.figure import draw_figures
 from reports.finished_run import make_run, read_run
@@ -34,10 +32,9 @@ from tests.reports.report_folder import (
     run_of,
     sheet,
     write_mesh,
-    write_model,
 )
 
-OLD = ("energy_series_flag.svg", "training_tunic.svg")
+OLD = ("energy_series_flag.svg", "dots_tunic.svg")
 KEPT = ("mine.png", "map.txt", "gap-relative_against_cost-frame.svg")
 
 
@@ -57,8 +54,6 @@ def made(tmp_path_factory) -> RunFolder:
         f"{scene},{m},0,{k / 30},{0.1 * k},0.1" for scene in SCENES for m in METHODS for k in range(3)
     ]
     run.frame_energies_path.write_text("\n".join(["scene,method,seed,seconds,strain,bending", *energies, ""]))
-    write_model(run.models / "snug-seed0.safetensors", "snug", strain=0.1)
-    write_model(run.models / "supervised-seed0.safetensors", "supervised", vertices=2.0)
     run.figures.mkdir()
     for name in (*OLD, *KEPT):
         (run.figures / name).write_bytes(b"")
@@ -85,7 +80,7 @@ def test_every_file_of_the_report_is_there(made):
     wanted = ("energies", "curvature", "cost", "validation", "extremes", "unfinished")
     assert {f"{name}.csv" for name in wanted} <= names
     pictures = {path.name for path in made.figures.iterdir()}
-    for stem in ("energy_series_tshirt-walk", "error_against_time", "training", "dots"):
+    for stem in ("energy_series_tshirt-walk", "error_against_time", "dots"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
     assert {"frames_tshirt-walk.png", "failures.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
@@ -152,11 +147,9 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     path = run.trajectory_path(SCENES[0], "snug")
     path.parent.mkdir(parents=True)
     path.write_bytes(b"no mesh")
-    (run.models).mkdir()
-    (run.models / "snug-seed0.safetensors").write_bytes(b"\xff" * 20)
     assert build.main([str(tmp_path)]) == 1
     streams = capsys.readouterr()
-    assert "tshirt-walk/snug.vtkhdf" in streams.err and "snug-seed0.safetensors" in streams.err
+    assert "tshirt-walk/snug.vtkhdf" in streams.err
     assert streams.out.splitlines()[-1] == str(run.report_path) and run.report_path.is_file()
     assert streams.out.startswith("Method ") and "the relative excess is: SNUG" in streams.out
 
@@ -227,23 +220,6 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
     assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
     (heat,) = (column for column in tables["energies"].columns if column.name == "energy/heat")
     assert (heat.title, heat.unit) == ("Heat", "J")
-
-
-@pytest.mark.parametrize("text", ["[1]", "[" * 100_000])
-def test_a_header_that_is_no_table_is_a_value_error(text, tmp_path):
-    save_file({"w": np.zeros(1, np.float32)}, tmp_path / "a.safetensors", metadata={"snug": text})
-    with pytest.raises(ValueError, match=r"a\.safetensors: (its entry|no safetensors header)"):
-        training.read_history(tmp_path / "a.safetensors", "snug")
-
-
-def test_histories_come_from_the_models_headers(made, tmp_path):
-    history = training.read_history(made.models / "snug-seed0.safetensors", "snug")
-    assert history is not None and history.method == "snug" and history.panel == training.PANELS["J"]
-    assert history.column("loss").tolist() == [2.0, 1.0, 0.5]
-    for kind in ("supervised", "tailornet", "dynamic"):
-        write_model(tmp_path / kind, kind)
-    taught = [training.read_history(tmp_path / kind, kind) for kind in ("supervised", "tailornet", "dynamic")]
-    assert len({history.panel for history in taught}) == 3
 
 
 GAPS = {

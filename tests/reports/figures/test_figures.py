@@ -1,15 +1,14 @@
-"""Figures of the report and the histories of trainings that some are drawn from."""
+"""Styles of methods and figures of the report."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from reports import finished_run
-from reports.figures import charts, plotting
-from reports.figures.charts import dots, training_curves
+from reports.figures import plotting
+from reports.figures.charts import dots
 from reports.figures.plotting import file_name, printable
-from reports.finished_run import read_run_with_trainings, shown_seeds
-from tests.reports.report_folder import row, run_folder, run_of, write_model
+from reports.finished_run import shown_seeds
+from tests.reports.report_folder import row, run_of
 
 
 def test_methods_keep_their_order_and_their_look():
@@ -49,26 +48,6 @@ def test_a_panel_of_curves_shows_five_methods_the_reference_and_the_users_among_
     run = run_of([*(row(method=name) for name in names), row(method="mine", role="external")])
     five = ["simulation", "skinning", "snug", "pbns", "mine"]
     assert sorted(plotting.few(run, run.methods)) == sorted(five)
-
-
-def test_a_checkpoint_is_no_method(tmp_path, monkeypatch):
-    folder = run_folder(tmp_path, [row(), row(method="pbns")])
-    write_model(folder.models / "snug-seed0.safetensors", "snug", strain=0.1)
-    write_model(folder.models / ".pbns-seed0.checkpoint.safetensors", "pbns", strain=0.1)
-    read = []
-    monkeypatch.setattr(finished_run, "read_history", lambda path, method: read.append(path))
-    assert read_run_with_trainings(folder).histories == []
-    assert [path.name for path in read] == ["snug-seed0.safetensors"]
-
-
-def test_every_garment_has_its_training_curves(tmp_path):
-    folder = run_folder(tmp_path, [row(), row("tunic/stop")])
-    assert list(training_curves(read_run_with_trainings(folder))) == []
-    for garment in ("tshirt", "tunic"):
-        write_model(folder.models_of(garment) / "snug-seed0.safetensors", "snug", strain=0.1)
-    drawings = list(training_curves(read_run_with_trainings(folder)))
-    assert [drawing.name for drawing in drawings] == ["training", "training_tunic"]
-    assert [drawing.caption.partition(":")[0] for drawing in drawings] == ["tshirt", "tunic"]
 
 
 def test_a_dot_stands_for_each_motion_and_seed():
@@ -116,20 +95,6 @@ def test_names_in_any_letters_give_files_that_the_report_finds():
         == "tshirt-U-8DF3U-8DC3-clip"
         == file_name(printable("tshirt/跳跃@clip"))
     )
-
-
-def test_checks_are_drawn_by_their_tolerances_in_order():
-    more = {
-        "suite": "validation",
-        "method": "simulation",
-        "metric": "check",
-        "expected": 0.0,
-        "tolerance": 2.0,
-    }
-    rows = [row(f"case {k}", value=v, **more) for k, v in enumerate((1.0, 0.5, 0.0))]
-    (drawing,) = charts.known_answers(run_of(rows))
-    heights = drawing.canvas.axes[0].get_lines()[0].get_ydata()
-    assert list(heights) == [charts.LOWEST, 0.25, 0.5]
 
 
 def test_the_first_seed_that_came_to_its_end_is_shown():

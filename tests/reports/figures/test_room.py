@@ -17,7 +17,7 @@ from reference_sim import Trajectory
 from reports.blocks import FIGURES
 from reports.figures.figure import Drawing
 from reports.figures.plotting import PAGE_WIDTH
-from reports.finished_run import History, RollOuts, Run
+from reports.finished_run import RollOuts, Run
 from tests.reports.report_folder import mesh, row, run_of, sheet
 
 LEAST = 4.0  # [cm] that a panel is wide and high on paper
@@ -80,31 +80,21 @@ def rows_of_all():
         more = {"suite": "speed", "role": "solver", "family": "newton", "level": k}
         for name, x in {"cost/frame": 9.0 * k, "gap/energy": 0.3 / k**3, "curvature/error": 5.0 / k}.items():
             rows.append(row(scene, f"newton-{k}", name, x, **more))
-    for k in range(60):
-        more = {"suite": "validation", "expected": 0.0, "tolerance": 1.0}
-        rows.append(row(f"case {k}", "simulation", "check", 0.01 * k, **more))
     return rows
 
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    checks = {f"case {k}": {"suite": "validation", "scene": f"case {k}"} for k in range(60)}
     labels = {name: {"label": LABELS.get(name, name.replace("-", " ").capitalize())} for name in ROLES}
-    run = run_of(rows_of_all(), cases=checks, methods=labels)
+    run = run_of(rows_of_all(), methods=labels)
     lines = [
         (SCENES[0], method, 0, k / 30, *(0.01 * (2 + place + np.sin(k / 5 + place)) for _ in range(3)))
         for place, method in enumerate(ROLES)
         for k in range(FRAMES)
     ]
     columns = ["scene", "method", "seed", "seconds", "strain", "bending", "inertia"]
-    histories = [
-        History(method, unit, [{"step": k, "seconds": k, "loss": 1.0 / k} for k in range(1, 9)], "tshirt")
-        for method, role in ROLES.items()
-        for unit in ("J", "cm²", "cm")
-        if role == "network"
-    ]
     energies = pd.DataFrame(lines, columns=columns)
-    return replace(run, roll_outs=Kept(), frame_energies=energies, histories=histories)
+    return replace(run, roll_outs=Kept(), frame_energies=energies)
 
 
 @pytest.fixture(scope="module")

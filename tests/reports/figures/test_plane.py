@@ -1,0 +1,42 @@
+"""Curves of the plane of run time and error."""
+
+from __future__ import annotations
+
+from reports.figures.plane import curves_of, draw_points
+from reports.figures.plotting import new_figure
+from reports.statistics.pareto import Point
+from tests.reports.report_folder import row, run_of
+
+# method: run time, error
+POINTS = {
+    "snug": (0.2, 0.02), "skinning": (0.1, 0.6), "lbfgs-5": (8.0, 0.016), "lbfgs-20": (13.0, 0.0018),
+    "newton-1": (10.0, 0.26), "newton-4": (24.0, 0.0008), "snug+lbfgs-1": (7.0, 0.015),
+    "snug+lbfgs-4": (7.5, 0.014), "simulation-perturbed-1e-4": (40.0, 1e-9),
+}  # fmt: skip
+
+
+def curves(*methods: str):
+    run = run_of([row(method=name) for name in methods])
+    return curves_of(run, [Point(name, *POINTS[name]) for name in methods])
+
+
+def test_solvers_stopped_early_are_one_curve_and_variants_of_the_reference_stand_alone_or_not_at_all():
+    *alone, solvers, started = curves(*POINTS)
+    assert [curve.look.label for curve in alone] == ["SNUG", "Skinning alone"]
+    assert [p.method for p in solvers.points] == ["lbfgs-5", "lbfgs-20", "newton-4"]
+    assert [p.method for p in solvers.aside] == ["newton-1"]
+    assert [p.method for p in started.points] == ["snug+lbfgs-1", "snug+lbfgs-4"]
+    assert started.look.colour == alone[0].look.colour != solvers.look.colour
+    assert started.look.label == "SNUG + solver"
+    assert len(curves("simulation-perturbed-1e-4")) == 1
+
+
+def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
+    axes = new_figure(3, 3).subplots()
+    run = run_of([row(method=method) for method in ("snug", "newton-8")])
+    points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
+    drawn = draw_points(axes, run, curves_of(run, points), 20.0, band=0.0)
+    assert drawn.below == {"newton-8"}
+    low, high = axes.get_ylim()
+    heights = [line.get_ydata()[0] for line in axes.get_lines() if line.get_marker() not in ("", "None")]
+    assert len(heights) == 2 and all(low < height < high for height in heights)
