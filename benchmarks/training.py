@@ -21,12 +21,10 @@ class Simulated:
         mixed: frames of augmented clips for each original frame, up to 20,000. The clips are the same for
             every training and seed, see snug.training.augmentation.make_shared_clips.
         method: name of the method that simulates.
-        swinging: whether the clips turn to and fro and stop, see snug.training.augmentation.
     """
 
     mixed: int = 0
     method: str = "simulation"
-    swinging: bool = False
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from snug.named_recipes import (
-    DYNAMIC,
     HANDLES,
     NCS,
     NEAREST_POSES,
@@ -40,7 +39,6 @@ class Kind:
         recipe: options of network and training, unless others are named.
         targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed offsets
             (snug.training.simulated_data).
-        past: whether its inertia is that of a simulation's previous frames (snug.training.simulated_data).
         fitted: whether it is fitted in one go, in place of training steps (snug.networks.fitted).
         closed_form: whether it trains faster by snug.kernels.gru.
         cost: time of a step, where one of SNUG's takes 1.
@@ -51,7 +49,6 @@ class Kind:
     architecture: str
     recipe: Recipe = DEFAULT
     targets: str = "energies"
-    past: bool = False
     fitted: bool = False
     closed_form: bool = False
     cost: float = 1.0
@@ -94,8 +91,6 @@ KINDS = {
              recipe=NEAREST_POSES, targets="vertices", fitted=True),
         Kind(name="pose-regression", label="Ridge on principal components",
              architecture="fitted.PoseRegression", recipe=POSE_REGRESSION, targets="vertices", fitted=True),
-        Kind(name="dynamic", label="SNUG, dynamic", architecture="regressor.MotionPerceptron", recipe=DYNAMIC,
-             past=True, closed_form=True),
         _handles(20, 0.4),
         _handles(40, 0.4),
         _handles(80, 0.5),

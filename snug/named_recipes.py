@@ -13,8 +13,8 @@ from snug.recipe import DEFAULT, TERMS, Recipe, RecipeError
 
 # Not the text's, besides what it does not state (docs/method.md lists all): inputs are divided by their
 # spread (TrainingSet.input_statistics); weights are borrowed from the skin of the bones that the garment
-# covers; d(x) is taken to cached points of the skin, which walk with the cloth and of which `contact_refresh`
-# searches a few anew in a step (the text computes it anew; searching all 48 frames would take several times
+# covers; d(x) is taken to cached points of the skin, which walk with the cloth and of which a few are
+# searched anew in a step (the text computes it anew; searching all 48 frames would take several times
 # as long as the rest of a step); only to skin that the rule of regions allows; the garment that the offsets
 # are added to follows the shape of the body; the number of steps is fixed; and hinges are scaled, as its
 # authors have since corrected the text: every network is evaluated with scaled hinges, and trained on printed
@@ -89,18 +89,6 @@ NCS = replace(
     batch=32,
 )
 PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_samples="vertices")
-
-# Inertia about a simulation's past begins at joules, which are no divergence.
-DYNAMIC = replace(
-    DEFAULT,
-    name="dynamic",
-    initialisation="torch",
-    learning_rate=1.5e-3,
-    adam_epsilon=1e-8,
-    mixed=0.0,
-    pretraining=2000,
-    spike=20.0,
-)
 
 
 def _without(term: str) -> Recipe:

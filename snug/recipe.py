@@ -46,8 +46,7 @@ class Recipe:
         weight_decay: share, times the rate, taken off each weight in a step (AdamW, Loshchilov and Hutter
             2019).
         schedule: of the learning rate: `cosine` (half a cosine, down to a hundredth at the last step),
-            `epochs` (a tenth after `drop_after_epochs` epochs) or `constant`.
-        drop_after_epochs: see `schedule`.
+            or `epochs` (a tenth after ten epochs).
         h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
         remembered: add that noise to the state which the network last had after the frame before (see
             snug.training.training_set), instead of to zero. Not for networks that learn simulated
@@ -68,12 +67,8 @@ class Recipe:
         contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
         contact_stiffness: of ContactPenalty, per area of cloth [J/m^5]; None takes the simulator's default.
         contact_margin: of ContactPenalty; None takes the simulator's default.
-        contact_refresh: frames searched for contact after a step, as a share of the batch's frames, at most
-            one of each window; in between anchors walk with the cloth.
         mixed: frames of augmented motions (snug.training.augmentation) for each frame of a
             training motion, up to 20,000; not for networks that learn simulated vertices.
-        mixed_turn: standard deviation of their added turns [rad].
-        mixed_lift: share of their thighs that are lifted.
         terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
             snug.recipe. Leaving one out is an ablation, and it is then never evaluated.
         inertia_form: `equation_5` (the inertia of each frame with two before it in its window, through
@@ -86,11 +81,8 @@ class Recipe:
             snug.training.physics_loss, with its own stiffness and margin of contact).
         bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints
             them; without effect with material `pbns`.
-        pretraining: updates before those by the energies, for a network that learns from a simulated past,
-            see snug.training.simulated_data.
         spike: a window above this many joules a frame is named and counted, and its step's gradient clipped;
             further measures: see snug.training.divergence_guard.
-        gradient_limit: norm to which the gradient of such a step is clipped; 0.3 is usual at 1000 vertices.
     """
 
     name: str = "default"
@@ -104,7 +96,6 @@ class Recipe:
     adam_epsilon: float = 1e-7
     weight_decay: float = 0.1
     schedule: str = "cosine"
-    drop_after_epochs: int = 10
     h0_sigma: float = 0.05
     remembered: bool = True
     window: int = 3
@@ -117,17 +108,12 @@ class Recipe:
     contact_samples: str = "all"
     contact_stiffness: float | None = None
     contact_margin: float | None = None
-    contact_refresh: float = 0.01
     mixed: float = 12.0
-    mixed_turn: float = 0.1
-    mixed_lift: float = 0.25
     terms: tuple[str, ...] = TERMS
     inertia_form: str = "equation_5"
     material: str = "stvk"
     bending: str = "length_area"
-    pretraining: int = 0
     spike: float = 2.0
-    gradient_limit: float = 1.0
 
     def __post_init__(self) -> None:
         for option, allowed in (
@@ -135,7 +121,7 @@ class Recipe:
             ("velocity_frame", ("root", "world")),
             ("initialisation", INITIALISATIONS),
             ("inertia_form", INERTIA_FORMS),
-            ("schedule", ("cosine", "epochs", "constant")),
+            ("schedule", ("cosine", "epochs")),
             ("contact_samples", ("all", "vertices")),
             ("material", ("stvk", "springs", "pbns")),
             ("bending", ("length_area", "none")),
@@ -150,18 +136,16 @@ class Recipe:
             raise RecipeError(
                 "recipe option window: inertia needs two frames before the one it judges, so >= 3"
             )
-        sizes = ("smoothing", "h0_sigma", "shape_range", "contact_refresh", "pretraining")
-        for option in ("weight_decay", "mixed", "mixed_turn", "mixed_lift", "shape_share", *sizes):
+        for option in ("smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed"):
             if not getattr(self, option) >= 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         if self.shape_of == "clip" and self.shape_range and not self.mixed:
             raise RecipeError(
                 "recipe option shape_of='clip': mixed clips get the shapes, so mixed above zero"
             )
-        for option in ("mixed_lift", "shape_share"):
-            if getattr(self, option) > 1.0:
-                raise RecipeError(f"recipe option {option}={getattr(self, option)}: a share, so at most 1")
-        for option in ("learning_rate", "adam_epsilon", "output_scale", "gradient_limit", "spike"):
+        if self.shape_share > 1.0:
+            raise RecipeError(f"recipe option shape_share={self.shape_share}: a share, so at most 1")
+        for option in ("learning_rate", "adam_epsilon", "output_scale", "spike"):
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
 

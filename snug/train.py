@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
     from snug.networks.trained_model import TrainedModel
 
-MODELS = [name for name, kind in KINDS.items() if not (kind.fitted or kind.past)]
+MODELS = [name for name, kind in KINDS.items() if not kind.fitted]
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
 GONE = {
     "--threads": "a training has one thread",

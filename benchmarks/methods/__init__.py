@@ -20,7 +20,7 @@ from benchmarks.declarations import by_name
 from benchmarks.method import MethodEntry
 from benchmarks.methods import declared_networks
 from benchmarks.methods.declared_networks import EQUAL_DATA, network
-from benchmarks.methods.declared_solvers import SOLVERS, warm_started
+from benchmarks.methods.declared_solvers import SOLVERS
 
 # They run when they are named: further baselines, ablations of SNUG, post-processing, the bound.
 FURTHER_METHODS = (
@@ -28,7 +28,6 @@ FURTHER_METHODS = (
     *declared_networks.HANDLES,
     *declared_networks.FLOORS,
     *declared_networks.RECIPES,
-    *warm_started("snug-dynamic", "SNUG, dynamic", "fast-lbfgs"),
     *declared_networks.POST_PROCESSED,
     MethodEntry(
         name="direct-optimisation",

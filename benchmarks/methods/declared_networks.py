@@ -12,18 +12,15 @@ from typing import Any
 from benchmarks.method import MethodEntry, Reporting
 from benchmarks.training import Simulated, Training
 from snug.kinds import KINDS
-from snug.named_recipes import ABLATIONS, DYNAMIC, PAPER, PBNS_SPRINGS
+from snug.named_recipes import ABLATIONS, PAPER, PBNS_SPRINGS
 
 TRAININGS = {
-    # Each kind by its own recipe; `dynamic` learns from other simulations, as `snug-dynamic`.
     **{
         name: Training(name, kind.recipe, None if kind.physics else Simulated())
         for name, kind in KINDS.items()
-        if not kind.past
     },
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    "snug-dynamic": Training("dynamic", DYNAMIC, Simulated(mixed=4, method="fast-lbfgs-40", swinging=True)),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
 }
 
@@ -94,9 +91,6 @@ NETWORKS = (
     network("pose-regression", "",
             "no network: ridge regression from the pose to principal components of simulated offsets",
             seeded=False, role="baseline"),
-    network("snug-dynamic", "SNUG, dynamic",
-            "SNUG that learns its dynamics from a simulation, the rest from the energies",
-            base="snug", pairing_group="snug"),
     network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
             base="snug", pairing_group="snug"),
 )  # fmt: skip

@@ -97,7 +97,6 @@ class MixedClips:
         clips: name of all of them.
         part: number of these: those that `part` + 1 augmented frames for each original one have, and `part`
             have not.
-        swinging: see benchmarks.training.Simulated.
     """
 
     scene: Scene
@@ -105,7 +104,6 @@ class MixedClips:
     motions: tuple[str, ...]
     clips: str
     part: int
-    swinging: bool = False
 
 
 def simulate_clips(mixed: MixedClips, context: Context, needed: Needed) -> Outcome:
@@ -120,7 +118,7 @@ def simulate_clips(mixed: MixedClips, context: Context, needed: Needed) -> Outco
     left_out: dict[str, str] = {}
     vertices = len(assets.garments[mixed.scene.garment].rest_positions)
     before, clips = (
-        make_shared_clips(assets.named(mixed.motions), share, vertices=vertices, swinging=mixed.swinging)
+        make_shared_clips(assets.named(mixed.motions), share, vertices=vertices)
         for share in (mixed.part, mixed.part + 1)
     )
     new = clips[len(before) :]

@@ -189,11 +189,7 @@ def mixed_clips(
     if twice := sorted(vertices_of.keys() & set(job.motions)):
         raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
     vertices = len(assets.garments[job.garment].rest_positions)
-    simulated = job.chosen.simulated if job.chosen else None
-    clips = make_shared_clips(
-        assets.named(job.motions), len(job.clips), vertices=vertices,
-        swinging=simulated is not None and simulated.swinging,
-    )  # fmt: skip
+    clips = make_shared_clips(assets.named(job.motions), len(job.clips), vertices=vertices)
     return [clip for clip in clips if clip.name in vertices_of], vertices_of
 
 

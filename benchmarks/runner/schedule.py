@@ -245,20 +245,18 @@ class Schedule:
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
         """Return the task that simulates one part of the augmented clips of these motions."""
-        sort, entry = "swinging" if simulated.swinging else "mixed", find_method(simulated.method)
-        clips = f"{garment}/{sort}-{len(motions)}"
+        entry = find_method(simulated.method)
+        clips = f"{garment}/mixed-{len(motions)}"
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
         of_scene = self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"))
         mixed_of = {name: self.inputs.motion(name) for name in motions}
-        mixed = MixedClips(
-            scene=scene, entry=entry, motions=motions, clips=clips, part=part, swinging=simulated.swinging
-        )
+        mixed = MixedClips(scene=scene, entry=entry, motions=motions, clips=clips, part=part)
         return Task(
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
-            label=_label(f"{garment}, {sort} clips of {len(motions)} motions, part {part}", entry),
+            label=_label(f"{garment}, mixed clips of {len(motions)} motions, part {part}", entry),
             stage="ground truth", silent=True, run=partial(simulate_clips, mixed),
             seconds=FRAME * sum(map(self._frames, motions)),
-            inputs=of_scene["inputs"] | {"part": part, "swinging": simulated.swinging, "motions": mixed_of},
+            inputs=of_scene["inputs"] | {"part": part, "motions": mixed_of},
             code=(*of_scene["code"], *MIXING),
         )  # fmt: skip
 

@@ -18,7 +18,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ Record = dict[str, dict[str, str]]  # name of a result -> field -> its value as 
 # What may be called otherwise in another version: options of a run, places that a name is imported from. Of
 # several the first is taken that the checkout knows, so that one table serves both versions.
 FURTHER = (
-    "simulation,snug-dynamic,santesteban2019,tailornet,nearest-poses,pose-regression,handles-20,ncs,ncs-static,"
+    "simulation,santesteban2019,tailornet,nearest-poses,pose-regression,handles-20,ncs,ncs-static,"
     "handles-80-dynamic,pbns-springs,snug-floor,handles-20-floor,snug+cleanup,snug-data-converged-12,"
     "direct-optimisation"
 )
@@ -60,7 +59,6 @@ COLUMNS = ("unit", "value", "status", "expected", "tolerance", "uncertainty", "m
 
 VERTICES, FRAMES = 350, 20  # of the short trainings
 STEPS = {"snug-paper": 100}  # of all others 60
-PRETRAINING = 30  # at most, so that both halves of a training by two losses are seen
 
 
 def find(name: str) -> Any:
@@ -162,10 +160,9 @@ def record_trainings() -> Record:
     record = {}
     trainings = find("trainings")
     for name in ("pbns", *sorted(set(trainings) - {"pbns"})):
-        recipe = trainings[name].recipe
         model = snug.train_network(
             trainings[name].kind, dressed, motions, steps=STEPS.get(name, 60), seed=0, trajectories=targets,
-            recipe=replace(recipe, pretraining=min(recipe.pretraining, PRETRAINING)), progress=False,
+            recipe=trainings[name].recipe, progress=False,
         )  # fmt: skip
         targets = targets or {m.name: snug.roll_out(model, dressed, m).positions for m in motions}
         weights = {n: digest(tensor.numpy()) for n, tensor in model.network.state_dict().items()}

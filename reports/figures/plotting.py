@@ -58,7 +58,6 @@ KNOWN = {
     "supervised": Style("", "#E69F00", "s", (0.0, (6.0, 1.5))),
     "snug": Style("", "#0072B2", "o"),
     "snug-paper": Style("", "#94A000", "o", "-."),
-    "snug-dynamic": Style("", "#CC3311", "o"),
     "snug-shapes": Style("", "#EE3377", "o", ":"),
     "newton": Style("Newton", "#D55E00", "P"),
     "lbfgs": Style("L-BFGS", "#CC79A7", "X"),
@@ -72,8 +71,6 @@ KNOWN = {
     "snug+lbfgs": Style("SNUG + L-BFGS", "", "X", "-."),
     "snug+fast-lbfgs": Style("SNUG + fast L-BFGS", "", "X", "--"),
     "snug+newton": Style("SNUG + Newton", "", "P", "-."),
-    "snug-dynamic+lbfgs": Style("SNUG, dynamic + L-BFGS", "", "X", "-."),
-    "snug-dynamic+fast-lbfgs": Style("SNUG, dynamic + fast L-BFGS", "", "X", "--"),
     "skinning+lbfgs": Style("Skinning + L-BFGS", "", "X", "-."),
     # So has the least that a network's own space allows.
     "handles-floor": Style("Floor of handles", "", "p", ":"),

@@ -3,75 +3,24 @@
 Everything a network or its loss sees is relative to the pelvis (the posed joint 0) of its own frame: the
 static energies do not depend on where a person stands, float32 keeps its digits, and the zero of gravity is
 the pelvis. World positions come back by adding the pelvis, in float64.
-
-Inputs with a history serve secondary motion: poses and the root's velocity do not tell of turning on the
-spot, nor of a stop, and cloth is moved by the accelerations of the joints that it hangs on. Rates are in the
-axes of the joint that turns (of the root for translations), so that it does not matter where north is. The
-longer ago a motion was, the coarser it need be known.
 """
 
 from __future__ import annotations
-
-from itertools import pairwise
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from snug.body.parametric_body import SHAPES, Body
-from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.body.skeleton import rotation_matrices
 from snug.body.skinning import skin
 from snug.garments.garment import Garment, smooth_weights
 from snug.motion.motion import Motion
 from snug.networks.ncs import joint_motion
 from snug.recipe import Recipe
 
-# Trunk, thighs and upper arms carry cloth; their rates are inputs. Of the trunk the accelerations too.
-RATED_JOINTS = (
-    "pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar",
-    "left_shoulder", "right_shoulder",
-)  # fmt: skip
-TRUNK_JOINTS = ("pelvis", "spine1", "spine2", "spine3")
-SPANS = (1, 1, 1, 1, 1, 2, 2, 3, 3, 4, 4)  # frames that one mean of a history is over, the latest first
-HISTORY = sum(SPANS)  # frames: three quarters of a second, in which a swing dies down by some two thirds
-
-
-def motion_rates(motion: Motion) -> np.ndarray:
-    """Return the rates (T, 48) of a motion by backward differences; the first frame is at rest.
-
-    Columns: root velocity [m/s] and acceleration [m/s^2]; angular velocity [rad/s] of each of RATED_JOINTS;
-    angular acceleration [rad/s^2] of each of TRUNK_JOINTS.
-    """
-    fps = motion.fps
-    rotations = rotation_matrices(motion.poses[:, [JOINT[name] for name in RATED_JOINTS]])
-    turns = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:]) * fps  # in the joint's own axes
-    turns = np.concatenate([np.zeros((1, *turns.shape[1:])), turns])
-    velocity = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * fps
-    acceleration = np.diff(velocity, axis=0, prepend=velocity[:1]) * fps
-    to_root = np.swapaxes(rotations[:, 0], -1, -2)
-    trunk = turns[:, [RATED_JOINTS.index(name) for name in TRUNK_JOINTS]]
-    spins = np.diff(trunk, axis=0, prepend=trunk[:1]) * fps
-    parts = (
-        (to_root @ velocity[..., None])[..., 0],
-        (to_root @ acceleration[..., None])[..., 0],
-        turns.reshape(len(turns), -1),
-        spins.reshape(len(turns), -1),
-    )
-    return np.concatenate(parts, axis=1)
-
-
-def motion_history(motion: Motion) -> np.ndarray:
-    """Return means (T, 48 x 11) of the rates over SPANS, this frame's first; a motion begins at rest."""
-    rates = motion_rates(motion)
-    padded = np.concatenate([np.zeros((HISTORY - 1, rates.shape[1])), rates])
-    delayed = [padded[HISTORY - 1 - frames :][: len(rates)] for frames in range(HISTORY)]
-    ends = np.cumsum((0, *SPANS))
-    return np.concatenate([sum(delayed[a:b]) / (b - a) for a, b in pairwise(ends)], axis=1)
-
-
-# The sets of inputs, and the number of earlier frames that each is made from: rates are first and second
-# differences.
-FEATURE_SETS = {"motion": 1, "pose": 0, "pose_shape": 0, "history": HISTORY + 1, "joint_motion": 2}
+# The sets of inputs, and the earlier frames that each is made from, for first and second differences.
+FEATURE_SETS = {"motion": 1, "pose": 0, "pose_shape": 0, "joint_motion": 2}
 
 
 class DressedBody:
@@ -161,8 +110,7 @@ class DressedBody:
             recipe: gives the form of the pose and the axes of the velocity.
             betas: shape numbers; None is the mean body.
             feature_set: `pose`; `motion`: pose, root velocity and shape; `pose_shape`: pose and shape, with
-                zeros behind it up to SHAPES numbers; `history`: pose and the rates of root and joints, now
-                and before (snug.networks.dressed_body); `joint_motion`: pose and rates of single joints
+                zeros behind it up to SHAPES numbers; `joint_motion`: pose and rates of single joints
                 (snug.networks.ncs), whatever the recipe says.
             still: as if each pose were held, whatever came before it.
 
@@ -179,8 +127,6 @@ class DressedBody:
         if feature_set == "motion":
             velocity = _root_velocity(motion, rotations[:, 0], recipe.velocity_frame)
             parts.append(velocity * (not still))
-        if feature_set == "history":
-            parts.append(motion_history(motion) * (not still))
         if feature_set in ("motion", "pose_shape"):
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
             if feature_set == "pose_shape":

@@ -16,7 +16,7 @@ from snug.networks.tensor_file import TensorFileError, read_tensors, write_tenso
 from snug.recipe import Recipe
 from snug.trained import trained_networks
 
-MODEL_FORMAT = "snug-model-9"
+MODEL_FORMAT = "snug-model-10"
 _OPTIONAL = ("fps", "triangles", "origin")  # files of before have not all of them
 _COPIED = ("unit", "seed", "steps", "seconds", "setup_seconds", "history", "summary")
 
@@ -35,7 +35,7 @@ class TrainedModel:
         recipe: options of network and training.
         seed: of everything random.
         steps: number of updates.
-        seconds: wall time of the steps, contact search and pretraining included [s].
+        seconds: wall time of the steps, contact search included [s].
         setup_seconds: wall time of preprocessing: motions and first contact anchors [s].
         history: one dict for every few steps: step, seconds, loss and each term [unit, mean over frames].
         summary: numbers and names of high windows, of updates left out, of returns to good weights.

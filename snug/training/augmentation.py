@@ -8,118 +8,22 @@ axis, lifts some thighs, hangs each arm at a random distance from the torso, and
 comes too near to it. Legs that always come as a pair show no lunge; a network that has met no thigh as high
 as in a squat lets it through the hem; and people, unlike tables of angles, let their arms hang close to the
 torso and turned in their sockets. Every part stays continuous in time, so velocities keep their meaning.
-
-Secondary motion shows after a turn and a stop, and few motions have either. In a swinging motion each clip is
-played at another speed; its trunk turns to and fro about the vertical, a random share of it from the pelvis;
-at a random frame the body stops dead and holds still for up to a second. Joined into one long motion they
-need one settled start, and the ways between them are motions too. Half of the clips are pieces of the
-original motions: mixed ones alone hardly come near a pose that people take, and there the network then
-stretches the cloth.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import torch
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
 from snug.kinds import Kind
-from snug.motion.motion import (
-    Motion,
-    arm_clearance,
-    heading,
-    lap_clearance,
-    mirror_motion,
-    resample,
-    smoothstep,
-    transition,
-    turn_about_vertical,
-)
-from snug.motion.posture import SPINE_SHARES
+from snug.motion.motion import Motion, arm_clearance, lap_clearance, mirror_motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import DEFAULT, Recipe
 from snug.training.training_set import TrainingSet
-
-ORIGINAL_SHARE = 0.5  # of the clips: pieces of the original motions
-SPEEDS = (0.6, 1.5)
-SWING_HERTZ = (0.35, 1.8)  # of the turns
-MAX_DEGREES, MAX_DEGREE_HERTZ = 65.0, 60.0  # to one side; and that times the frequency of the turns
-HELD_FRAMES = 40  # frames, at most
-TRANSITION_FRAMES = 16  # frames from one clip to the next
-VERTICAL = np.array([0.0, 1.0, 0.0])
-
-
-def make_swinging_motion(
-    clips: Sequence[Motion], name: str, *, seed: int, originals: Sequence[Motion] = ()
-) -> Motion:
-    """Join the clips, changed so, to one motion; deterministic for a seed. 60 frames become some 80.
-
-    Args:
-        clips: mixed clips.
-        name: of the motion.
-        seed: of all random choices.
-        originals: motions of which pieces take the place of a share ORIGINAL_SHARE of the clips.
-    """
-    random = np.random.default_rng(seed)
-    joined = _swing(_choose_clip(clips[0], originals, random), random)
-    for clip in clips[1:]:
-        after = _swing(_choose_clip(clip, originals, random), random)
-        height = after.translations[0] * VERTICAL
-        # Each goes on the way the last one faced: to turn about on the spot in half a second is no motion.
-        after = turn_about_vertical(after, heading(joined.poses[-1]) - heading(after.poses[0]))
-        way = transition(joined.poses[-1], after.poses[0], TRANSITION_FRAMES + 1)[1:-1]
-        # Horizontally it goes on where it was; it rises and falls with the timing of the joints.
-        goal = joined.translations[-1] * [1.0, 0.0, 1.0] + height
-        rise = goal - joined.translations[-1]
-        s = np.linspace(0.0, 1.0, TRANSITION_FRAMES + 1)[1:-1, None]
-        lifted = joined.translations[-1] + rise * smoothstep(s)
-        joined = joined.followed_by(
-            replace(
-                after,
-                poses=np.concatenate([way, after.poses]),
-                translations=np.concatenate([lifted, after.translations + goal]),
-            )
-        )
-    return replace(joined, name=name, kind="swinging")
-
-
-def _choose_clip(clip: Motion, originals: Sequence[Motion], random: np.random.Generator) -> Motion:
-    """Return the clip or, with probability ORIGINAL_SHARE, a piece of an original motion.
-
-    The piece is mirrored half of the time.
-    """
-    if not originals or random.random() >= ORIGINAL_SHARE:
-        return clip
-    source = originals[int(random.integers(len(originals)))]
-    if random.random() < 0.5:
-        source = mirror_motion(source)
-    start = int(random.integers(max(1, source.frames - clip.frames + 1)))
-    return source.cut(start, start + clip.frames)
-
-
-def _swing(clip: Motion, random: np.random.Generator) -> Motion:
-    """Play a clip at another speed, turn its trunk to and fro, stop it at some frame and hold it."""
-    clip = resample(replace(clip, fps=clip.fps * _draw_between(SPEEDS, random)), clip.fps)
-    poses, hertz = clip.poses.copy(), _draw_between(SWING_HERTZ, random)
-    degrees = min(MAX_DEGREES, MAX_DEGREE_HERTZ / hertz) * random.uniform(-1.0, 1.0)
-    phase = 2 * np.pi * (hertz * np.arange(clip.frames) / clip.fps + random.random())
-    hips = random.random()
-    for joint, share in (("pelvis", hips), *((name, (1.0 - hips) * share) for name, share in SPINE_SHARES)):
-        turn = rotation_matrices(share * np.deg2rad(degrees) * np.sin(phase)[:, None] * VERTICAL)
-        poses[:, JOINT[joint]] = axis_angles(turn @ rotation_matrices(poses[:, JOINT[joint]]))
-    stop = int(random.integers(clip.frames // 4, clip.frames))
-    frames = np.minimum(np.arange(stop + 1 + random.integers(HELD_FRAMES + 1)), stop)
-    return replace(clip, poses=poses[frames], translations=clip.translations[frames])
-
-
-def _draw_between(limits: tuple[float, float], random: np.random.Generator) -> float:
-    """Draw a number within limits, uniform in its logarithm."""
-    return float(np.exp(random.uniform(*np.log(limits))))
-
 
 BODY_PARTS: tuple[tuple[str, ...], ...] = (
     ("pelvis",),
@@ -146,6 +50,8 @@ TURN_SHARES = {
     "head": 1.0,
 }  # fmt: skip
 TURN_HERTZ = (0.2, 1.0)  # Hz, of the slow turns and lifts
+TURN = 0.1  # rad, standard deviation of the added turns
+LIFTED = 0.25  # share of the thighs that are lifted
 CLIP_FRAMES = 60  # of a mixed clip
 MAX_AUGMENTED_FRAMES = 20_000  # frames: each keeps its body and its anchors
 SHARED_SEED = 0  # of clips that are simulated: once, whatever the seed of the training
@@ -165,32 +71,18 @@ def augment(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: i
         MAX_AUGMENTED_FRAMES,
         int(MAX_ANCHOR_BYTES / (ANCHOR_BYTES * vertices)),
     )
-    return make_mixed_clips(motions, frames, turn=recipe.mixed_turn, lifted=recipe.mixed_lift, seed=seed)
+    return make_mixed_clips(motions, frames, turn=TURN, lifted=LIFTED, seed=seed)
 
 
-def make_shared_clips(
-    motions: Sequence[Motion], share: int, *, vertices: int, swinging: bool = False
-) -> list[Motion]:
+def make_shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:
     """Return clips to simulate for the trainings of all seeds, mixed as the default recipe does.
 
     Args:
         motions: the original training motions.
         share: augmented frames for each original one. The clips of a smaller share are the first of a larger.
         vertices: number of the garment's vertices.
-        swinging: join the clips of each share, and pieces of the original motions, to one motion
-            (snug.training.augmentation).
     """
-    clips = augment(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
-    if not swinging:
-        return clips
-    original = sum(motion.frames for motion in motions)
-    ends = [round(part * original / CLIP_FRAMES) for part in range(share + 1)]
-    parts = [clips[first:end] for first, end in pairwise(ends)]
-    return [
-        make_swinging_motion(part, f"swinging_{number}", seed=number, originals=motions)
-        for number, part in enumerate(parts)
-        if part
-    ]
+    return augment(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
 
 
 def draw_clip_shapes(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:

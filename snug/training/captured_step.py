@@ -33,11 +33,7 @@ class CapturedTrainer(Trainer):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.capturable = bool(
-            self.loss
-            and not self.kernels
-            and self.past is None
-            and not self.network.lead
-            and self.data.shapes is None
+            self.loss and not self.kernels and not self.network.lead and self.data.shapes is None
         )
         self.captured_steps = self._asked = 0
         self._descent = CudaGraph(self._differentiated, self.device)

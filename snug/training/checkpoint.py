@@ -96,14 +96,13 @@ def describe_run(trainer: Trainer, validator: Validator | None, **facts: Any) ->
     """Return the facts that must be equal for two runs to be the same run."""
     digest = hashlib.sha256()
     targets = _bytes(trainer.targets.vertices if trainer.targets else trainer.data.ahead)
-    past = [_bytes(trainer.past.frames)] if trainer.past else []
     data, weights = trainer.data, trainer.dressed.weights(trainer.recipe.smoothing)
     sets = [data, validator.data] if validator else [data]
     seen = [_bytes(part) for of in sets for part in (of.features, of.transforms, of.ahead)]
     body = trainer.dressed.body
     shape = (body.template, body.faces, body.shape_directions, body.joint_directions)
     arrays = [array.tobytes() for array in shape]
-    for part in (*seen, _bytes(data.rest), targets, _bytes(weights), *past, *arrays):
+    for part in (*seen, _bytes(data.rest), targets, _bytes(weights), *arrays):
         digest.update(part)
     digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
     return {

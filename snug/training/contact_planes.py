@@ -130,6 +130,8 @@ class BodyPatches:
             yield self.template + moved, slice(int(start), int(stop))
 
 
+# Frames searched after a step, as a share of the batch's, at most one of each window.
+REFRESH = 0.01
 # Frames before and after a searched one that may take over its anchors; at the start.
 REACH, FIRST_REACH = 3, 7
 # m: how far a mark of the body may have moved from a frame to one that takes over its anchors. At the start a
@@ -144,7 +146,6 @@ class TrainingContact:
     Args:
         data: the training set.
         contact: the contact term, with its samples.
-        refresh: see Recipe.contact_refresh.
         kept: whether each frame has one body for good; the kernels then pose them all once.
         kernels: in numpy and numba, else in torch on the set's device.
     """
@@ -154,12 +155,11 @@ class TrainingContact:
         data: TrainingSet,
         contact: ContactPenalty,
         *,
-        refresh: float,
         kept: bool,
         kernels: bool = True,
     ) -> None:
         body, device = data.dressed.body, data.device
-        self.data, self.contact, self.refresh = data, contact, refresh
+        self.data, self.contact = data, contact
         self.kernels, self.age = kernels, np.zeros(data.frames, np.int64)
         self.patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
         frames = data.frames
@@ -262,7 +262,7 @@ class TrainingContact:
             posed: bodies of its windows.
             x: (N, T, V, 3), predicted vertices.
         """
-        self._credit += self.refresh * frames.size
+        self._credit += REFRESH * frames.size
         count = int(self._credit)
         self._credit -= count
         window = frames.shape[1]

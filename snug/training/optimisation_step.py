@@ -6,9 +6,8 @@ snug.training.train_network repeats it.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
@@ -20,7 +19,6 @@ from snug.kinds import find_kind
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.garment_network import GarmentNetwork, make_network
-from snug.networks.regressor import MotionPerceptron
 from snug.networks.tensor_file import select_tensors
 from snug.recipe import Recipe
 from snug.training.augmentation import make_training_set, varies_shape
@@ -28,10 +26,12 @@ from snug.training.contact_planes import Posed, TrainingContact
 from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.physics_loss import PhysicsLoss
-from snug.training.simulated_data import TARGETS, SimulatedPast, Trajectories, VertexTargets
+from snug.training.simulated_data import TARGETS, Trajectories, VertexTargets
 from snug.training.training_set import HiddenStateCache, TrainingError, TrainingSet
 
 DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
+DROP_AFTER = 10  # epochs
+GRADIENT_LIMIT = 1.0  # norm to which the gradient of a step with a high window is clipped
 MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
 
 
@@ -101,14 +101,12 @@ class Trainer:
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
         self.targets: VertexTargets | None = None
-        self.past: SimulatedPast | None = None
-        self.pretraining_seconds = 0.0  # s
         self._set_up_supervision(motions, trajectories)
         self.hidden_states = self._hidden_state_cache()
         self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
 
     def _set_up_supervision(self, motions: Sequence[Motion], trajectories: Trajectories | None) -> None:
-        """Prepare the loss: simulated vertices, or the energies, perhaps about a simulated past."""
+        """Prepare the loss: simulated vertices, or the energies."""
         how, recipe, data = self.how, self.recipe, self.data
         if not how.physics:
             self.targets = TARGETS[how.targets](data, motions, trajectories, self.weights)
@@ -119,17 +117,6 @@ class Trainer:
         self.contact = self.contact_of(data)
         if self.contact:
             self.contact.search_first(self.weights)
-        if how.past and "inertia" in recipe.terms:
-            self.past = SimulatedPast(data, motions, trajectories)
-            if recipe.pretraining:
-                begun = time.perf_counter()
-                self.past.pretrain(
-                    cast(MotionPerceptron, self.network),
-                    self.weights,
-                    steps=recipe.pretraining,
-                    seed=self.seed,
-                )
-                self.pretraining_seconds = time.perf_counter() - begun
 
     def _hidden_state_cache(self) -> HiddenStateCache | None:
         start = self.network.random_state(1, 0.0, torch.Generator())
@@ -145,7 +132,6 @@ class Trainer:
         return TrainingContact(
             data,
             self.loss.contact,
-            refresh=self.recipe.contact_refresh,
             kept=not self.shaped,
             kernels=self.kernels,
         )
@@ -203,8 +189,6 @@ class Trainer:
         if self.contact and posed and self._searched_for_high(number, batch.frames, posed, x, terms):
             planes = self.contact.planes(batch, posed)
             terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
-        if self.past:
-            terms |= self.past.terms(x, batch)
         means, trusted = self._update(number, windows, terms)
         if trusted and self.hidden_states and after is not None:
             self.hidden_states.keep(batch.frames[:, -1], after)
@@ -249,7 +233,7 @@ class Trainer:
     def _set_rate(self, number: int) -> None:
         """Set the learning rate of step `number`, see Recipe.schedule."""
         factor = 1.0
-        if self.recipe.schedule == "epochs" and self.epoch > self.recipe.drop_after_epochs:
+        if self.recipe.schedule == "epochs" and self.epoch > DROP_AFTER:
             factor = DROP
         if self.recipe.schedule == "cosine":
             factor = COSINE_END + (1 - COSINE_END) * 0.5 * (1 + math.cos(math.pi * number / self.steps))
@@ -282,7 +266,7 @@ class Trainer:
         if not self.guard.accepts(number, verdict, float(norm), joules, name):
             return means, False
         if verdict != "update":
-            nn.utils.clip_grads_with_norm_(parameters, self.recipe.gradient_limit, norm)
+            nn.utils.clip_grads_with_norm_(parameters, GRADIENT_LIMIT, norm)
         self.optimiser.step()
         return means, verdict != "distrust"
 

@@ -46,7 +46,7 @@ class TrainingLoop:
         every: steps between two rows of the history.
         checkpoint: file and times of checkpoints; None writes none.
         validation: held-out motions; None validates with none.
-        setup_seconds: time [s] that making the trainer took; its pretraining counts as training.
+        setup_seconds: time [s] that making the trainer took.
     """
 
     def __init__(
@@ -65,8 +65,7 @@ class TrainingLoop:
         self.patience = validation.patience if validation else 0
         self.validator = Validator(trainer, validation) if validation else None
         self.validated_every = validation.every if validation else 0
-        self.setup_seconds = setup_seconds - trainer.pretraining_seconds
-        self.done, self.seconds = 0, trainer.pretraining_seconds
+        self.setup_seconds, self.done, self.seconds = setup_seconds, 0, 0.0
         self.history: list[dict[str, float]] = []
         self.recent: list[dict[str, float]] = []
         self.best: dict[str, Tensor] = {}

@@ -27,13 +27,13 @@ ROLES = {
     "simulation": "reference", "skinning": "baseline", "nearest-poses": "baseline",
     "pose-regression": "baseline", **dict.fromkeys(
         ("snug", "supervised", "pbns", "ncs", "handles-20", "handles-40", "handles-80", "snug+cleanup",
-         "snug-springs", "snug-dynamic", "tailornet"), "network"),
+         "snug-springs", "tailornet"), "network"),
 }  # fmt: skip
 LABELS = {
     "skinning": "Skinning alone", "nearest-poses": "Nearest poses",
     "pose-regression": "Ridge on principal components", "ncs": "Neural Cloth Simulation, static branch",
     "snug+cleanup": "SNUG, post-processed", "snug-springs": "SNUG, springs in place of the membrane",
-    "snug-dynamic": "SNUG, dynamic", "tailornet": "TailorNet, a network for each frequency",
+    "tailornet": "TailorNet, a network for each frequency",
 }  # fmt: skip
 SCENES = ("tshirt/01_01_a", "tshirt/push_recovery", "tshirt/sit_and_stand", "tshirt/cartwheel_lean")
 FRAMES = 40

@@ -11,7 +11,7 @@ from snug.motion.motion import Motion
 from snug.named_recipes import PAPER, RECIPES, find_recipe
 from snug.networks.garment_network import make_network
 from snug.networks.pbns import PoseSpaceDeformation
-from snug.networks.regressor import MotionPerceptron, Regressor
+from snug.networks.regressor import Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
 from snug.recipe import DEFAULT, Recipe, RecipeError
 from tests.snug.training.dressing import leaning, swaying, tube_dress
@@ -129,8 +129,7 @@ def test_recipes_survive_a_file(recipe):
         ({"learning_rate": 0.0}, "learning_rate"),
         ({"even": 0}, "even"),
         ({"weight_decay": -0.1}, "weight_decay"),
-        ({"mixed_lift": 1.5}, "mixed_lift"),
-        ({"mixed_lift": -0.1}, "mixed_lift"),
+        ({"shape_share": 1.5}, "shape_share"),
     ],
 )
 def test_recipe_refuses_nonsense(options, message):
@@ -153,7 +152,7 @@ def test_recipe_refuses_unknown_names():
         (lambda: Regressor(12, 40, hidden=32, layers=3), 5, False),
         (lambda: Regressor(12, 40, hidden=27, layers=2), 3, True),  # fills no vector register
         (lambda: FitAndWrinkles(12, 40), 4, True),
-        (lambda: MotionPerceptron(12, 40), 3, False),
+        (lambda: PoseSpaceDeformation(12, 40), 3, False),
     ],
 )
 def test_closed_forms_train_as_the_modules_do(make, frames, state):

@@ -9,6 +9,7 @@ import torch
 
 from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
+from snug.training import contact_planes
 from snug.training.captured_step import UNCAPTURED, CapturedTrainer
 from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING
@@ -75,7 +76,8 @@ def equal_states(plain, captured):
 )
 def test_a_captured_step_is_the_step(kind, recipe, monkeypatch):
     """The replayed step gives the numbers of the step in single operations, and leaves the same behind."""
-    recipe = replace(recipe, contact_refresh=0.1, window_stride=1)  # frames that come twice in a step of snug
+    monkeypatch.setattr(contact_planes, "REFRESH", 0.1)
+    recipe = replace(recipe, window_stride=1)  # frames that come twice in a step of snug
     plain, captured = capturing(monkeypatch, recipe, kind=kind)
     places = captured.contact.cache.barycentric.clone()
     for number in range(UNCAPTURED + 2):

@@ -15,6 +15,7 @@ from snug.body.skinning import skin
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
+from snug.training import contact_planes
 from snug.training.contact_cache import PARTS, ContactCache, Patch
 from snug.training.contact_cache_torch import TensorContactCache
 from snug.training.device import CPU, DeviceError
@@ -40,10 +41,11 @@ def made(recipe, *, kernels, kind="snug"):
     ],
     ids=["default", "paper", "pbns-springs", "springs"],
 )
-def test_definitions_train_as_the_kernels_do(kind, recipe):
+def test_definitions_train_as_the_kernels_do(kind, recipe, monkeypatch):
     """Several steps: terms, and the gradient that the last of them left behind."""
     # No frame twice in a step: there its anchors would walk once by torch, and twice by the kernels.
-    recipe = replace(recipe, contact_refresh=0.0, window_stride=3 if kind == "snug" else 1)
+    monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
+    recipe = replace(recipe, window_stride=3 if kind == "snug" else 1)
     fast, slow = (made(recipe, kernels=k, kind=kind) for k in (True, False))
     if fast.contact and slow.contact:  # the torch search finds the closest face where the walk may be rough
         tensors, facts = fast.contact.state()
@@ -179,8 +181,9 @@ class Unplaced(TorchFunctionMode):
 
 
 @pytest.mark.parametrize("recipe", [PLAIN, PAPER], ids=["default", "paper"])
-def test_a_step_makes_nothing_but_where_it_is_told_to(recipe):
-    trainer = made(replace(recipe, contact_refresh=0.1), kernels=False)
+def test_a_step_makes_nothing_but_where_it_is_told_to(recipe, monkeypatch):
+    monkeypatch.setattr(contact_planes, "REFRESH", 0.1)
+    trainer = made(recipe, kernels=False)
     trainer.dressed.rest_directions()  # kept by the dress, which tests share: made on the CPU
     with Unplaced() as unplaced:
         row = trainer.step(0)

@@ -8,13 +8,14 @@ import torch
 
 from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
+from snug.training import contact_planes, optimisation_step
 from snug.training.divergence_guard import PATIENCE, SETTLING, SNAPSHOT_EVERY
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import TrainingLoop
 from snug.training.training_set import TrainingError
 from tests.snug.training.dressing import swaying, tube_dress
 
-PLAIN = replace(DEFAULT, mixed=0.0, schedule="constant")
+PLAIN = replace(DEFAULT, mixed=0.0, schedule="epochs")
 
 
 def test_guard_names_a_window_and_keeps_the_weights():
@@ -30,8 +31,9 @@ def test_guard_names_a_window_and_keeps_the_weights():
     assert torch.isfinite(after).all() and not torch.equal(before, after)
 
 
-def test_guard_counts_high_windows_and_clips():
-    recipe = replace(PLAIN, spike=1e-6, gradient_limit=1e-3)
+def test_guard_counts_high_windows_and_clips(monkeypatch):
+    monkeypatch.setattr(optimisation_step, "GRADIENT_LIMIT", 1e-3)
+    recipe = replace(PLAIN, spike=1e-6)
     trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=99, seed=0, recipe=recipe)
     trainer.step(0)
     assert trainer.guard.summary["high_windows"] == 0  # the first steps are not judged
@@ -143,7 +145,7 @@ def test_the_papers_recipe_is_left_alone_by_the_guard():
         trainer.step(SETTLING + 1 + number)
     assert trainer.guard.summary["restored"] == 0 and trainer.guard.rate == 1.0
     norms = [p.grad.norm() for p in trainer.network.parameters()]
-    assert torch.stack(norms).norm() > 2 * PLAIN.gradient_limit
+    assert torch.stack(norms).norm() > 2 * optimisation_step.GRADIENT_LIMIT
 
 
 def test_data_that_is_not_finite_does_not_wear_down_the_rate():
@@ -159,7 +161,8 @@ def test_data_that_is_not_finite_does_not_wear_down_the_rate():
 
 def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch):
     """Anchors from the wrong side of the body claim a contact that is none."""
-    recipe = replace(PLAIN, contact_refresh=0.0, batch=8)
+    monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
+    recipe = replace(PLAIN, batch=8)
     trainer = made(recipe)
     row = trainer.step(SETTLING)
     usual = row["collision"]

@@ -12,6 +12,7 @@ from snug.body.skeleton import JOINT
 from snug.body.skinning import skin
 from snug.kernels.contact import triangle_adjacency
 from snug.recipe import DEFAULT
+from snug.training import contact_planes
 from snug.training.augmentation import augment
 from snug.training.contact_cache import ContactCache, Patch
 from snug.training.contact_planes import FIRST_NEAR, FIRST_REACH, MARKED, NEAR, REACH
@@ -146,7 +147,8 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
 
 def propagated(motions, frame, monkeypatch):
     """The frames that have the anchors of `frame`, of 41, once it alone has been searched in a step."""
-    trainer = made(motions, contact_refresh=1 / 48)  # one frame a step
+    monkeypatch.setattr(contact_planes, "REFRESH", 1 / 48)  # one frame a step
+    trainer = made(motions)
     contact = trainer.contact
     assert contact is not None
     searched = []
@@ -172,7 +174,8 @@ def test_what_is_searched_is_propagated_around_it_but_to_no_other_motion(monkeyp
 
 
 def test_what_has_just_been_searched_borrows_nothing(monkeypatch):
-    trainer = made([swaying(41, degrees=1.0)], contact_refresh=2 / 48)
+    monkeypatch.setattr(contact_planes, "REFRESH", 2 / 48)
+    trainer = made([swaying(41, degrees=1.0)])
     contact = trainer.contact
     assert contact is not None
     requery = contact.cache.requery
@@ -198,8 +201,9 @@ def test_nothing_is_propagated_to_a_frame_in_which_the_body_is_elsewhere(monkeyp
     assert propagated([motion], 20, monkeypatch) == [20, 21]
 
 
-def test_anchors_walk_while_training_and_are_in_its_state():
-    trainer, other = made(contact_refresh=0.0), made(contact_refresh=0.0)
+def test_anchors_walk_while_training_and_are_in_its_state(monkeypatch):
+    monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
+    trainer, other = made(), made()
     contact, twin = trainer.contact, other.contact
     assert contact is not None and twin is not None
     with torch.no_grad():  # into the skin
