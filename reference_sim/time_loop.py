@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +41,6 @@ def simulate(
     quasi_static: bool = False,
     substeps: int = 1,
     refreeze: int = 0,
-    path: str | Path | None = None,
     progress: str | None = None,
     **options: Any,
 ) -> Trajectory:
@@ -68,7 +66,6 @@ def simulate(
             counts, the worst gradient norm, and the energies of the last sub-step.
         refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
             ended, and the step solved again from there.
-        path: write the VTKHDF file there at the end, with status "unfinished" if an exception is the end.
         progress: label of a progress bar with time left; None for silence.
         options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
             that makes one of a potential and the other options), tolerance, max_iterations, timeout [s] of
@@ -87,7 +84,6 @@ def simulate(
         ValueError: unknown guess, wrong shapes (of a guess too), fewer than 1 frame or sub-step, a step of no
             size, a tolerance that is no number above 0, a function as method beside a term that joins a step
             late (self-contact alone), which Newton's method ends.
-        OSError: no room for the file, or no such folder.
 
     Example: a triangle that one corner holds falls by g dt^2 in the first step.
 
@@ -114,7 +110,7 @@ def simulate(
         **options,
     )
     return simulate_with(
-        stepper, frames=frames, start=start, velocity=velocity, pin_positions=pin_positions, path=path,
+        stepper, frames=frames, start=start, velocity=velocity, pin_positions=pin_positions,
         progress=progress,
     )  # fmt: skip
 
@@ -126,7 +122,6 @@ def simulate_with(
     start: np.ndarray | None = None,
     velocity: np.ndarray | None = None,
     pin_positions: Callable[[int], np.ndarray] | None = None,
-    path: str | Path | None = None,
     progress: str | None = None,
 ) -> Trajectory:
     """Simulate with a stepper that is set up, which `simulate` makes anew for each run.
@@ -142,21 +137,15 @@ def simulate_with(
     stepper.check_start(x, v)
     state = State(x, v)
     record.add(x, 0.0, 0.0, _fields_of_start(stepper.potential.energies))
-    unfinished: tuple[str, ...] = ("unfinished", "the run that wrote this did not end")
-    try:
-        for frame in _with_bar(range(1, frames), progress):
-            clock = time.perf_counter()
-            after, results = stepper.advance(frame, state, pin_positions and pin_positions(frame))
-            seconds = time.perf_counter() - clock
-            record.note(frame, results)
-            if after is None:
-                break
-            state = after
-            record.add(state.x, frame * stepper.frame_dt, seconds, _fields(results))
-        unfinished = ()
-    finally:
-        if path:
-            record.trajectory(*unfinished).save(path)
+    for frame in _with_bar(range(1, frames), progress):
+        clock = time.perf_counter()
+        after, results = stepper.advance(frame, state, pin_positions and pin_positions(frame))
+        seconds = time.perf_counter() - clock
+        record.note(frame, results)
+        if after is None:
+            break
+        state = after
+        record.add(state.x, frame * stepper.frame_dt, seconds, _fields(results))
     return record.trajectory()
 
 
@@ -192,15 +181,15 @@ class _Record:
         self.seconds.append(seconds)
         self.fields.append(fields)
 
-    def trajectory(self, status: str = "", reason: str = "") -> Trajectory:
-        """Return all frames so far, by default with their own status."""
+    def trajectory(self) -> Trajectory:
+        """Return all frames so far."""
         return Trajectory(
             positions=np.array(self.positions),
             faces=self.cloth.faces,
             times=np.array(self.times),
             frame_seconds=np.array(self.seconds),
-            status=status or self.status,
-            reason=reason or self.reason,
+            status=self.status,
+            reason=self.reason,
             provenance=self.provenance,
             frame_fields={k: np.array([f[k] for f in self.fields]) for k in self.fields[0]},
         )

@@ -8,8 +8,6 @@ from __future__ import annotations
 import errno
 import os
 import resource
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,12 +21,10 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.isolated_process import start_loading
 from reference_sim.files.atomic_files import disk_full, new_folder, replacing
-from reference_sim.trajectory import write_obj
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.training import checkpoint as checkpoints
 from snug.training.checkpoint import Checkpoint
 from tests.benchmarks.runner.tasks_by_hand import InProcess
-from tests.reference_sim.meshes import grid
 from tests.reference_sim.test_trajectory import wave
 from tests.snug.training.test_checkpoint import same_model, short
 
@@ -78,20 +74,6 @@ def test_a_file_that_finds_no_room_leaves_the_one_before_it(tmp_path, write):
     line = disk_full(full.value)
     assert line.startswith(f"{path}: File too large (") and "MB are free" in line
     assert disk_full(PermissionError(errno.EACCES, "no")) == disk_full(ValueError()) == ""
-
-
-def test_a_simulation_stops_in_one_line(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write_obj(Path("sheet.obj"), *grid(6, 6, width=0.4, depth=0.4))
-    arguments = ["sheet.obj", "--pins", "0,6", "--frames", "3", "-o", "a.vtkhdf"]
-    stopped = subprocess.run(
-        [sys.executable, "-m", "reference_sim.simulate", *arguments],
-        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)),
-    )  # fmt: skip
-    assert stopped.returncode == 1 and "Traceback" not in stopped.stderr
-    assert "\nsimulate: a.vtkhdf: File too large" in stopped.stderr
-    assert os.listdir() == ["sheet.obj"]
 
 
 def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):

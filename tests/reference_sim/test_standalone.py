@@ -32,7 +32,8 @@ cloth = Cloth(sheet, faces)
 contact = ContactPenalty(cloth)
 terms = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), contact, ContactFriction(contact)]
 obstacle = Obstacle(body, np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]]))
-result = simulate(cloth, terms, frames=4, obstacle=obstacle, path=sys.argv[1], tolerance=1e-10)
+result = simulate(cloth, terms, frames=4, obstacle=obstacle, tolerance=1e-10)
+result.save(sys.argv[1])
 assert result.status == "converged", result.reason
 assert result.frame_fields["energy/collision"][-1] > 0
 assert Trajectory.load(sys.argv[1]).frames == 4

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from reference_sim import GRAVITY, Cloth, Obstacle, Trajectory, minimise, simulate
+from reference_sim import GRAVITY, Cloth, Obstacle, minimise, simulate
 from reference_sim.energies import (
     BendHinge,
     ContactFriction,
@@ -22,7 +22,6 @@ from reference_sim.energies import (
     Gravity,
     StretchStVK,
 )
-from reference_sim.simulate_command import summarise
 from tests.reference_sim.meshes import box, grid, random_rotation, sphere
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
@@ -153,37 +152,14 @@ class Poison(Energy):
         return torch.where(u[..., 0, 1] < -0.05, torch.nan, 0.0) + 0 * u[..., 0, 1]
 
 
-def test_divergence_is_recorded_and_not_raised(tmp_path):
+def test_divergence_is_recorded_and_not_raised():
     cloth = Cloth(SHEET, FACES)
-    path = tmp_path / "run.vtkhdf"
-    result = simulate(cloth, [*terms_of(cloth), Poison(cloth)], frames=20, path=path)
+    result = simulate(cloth, [*terms_of(cloth), Poison(cloth)], frames=20)
     assert result.status == "diverged" and "not finite" in result.reason
     # 5 cm are fallen through in frame 3 of 1/30 s: g dt^2 n (n + 1) / 2 > 0.05. Frames 0 to 2 are whole; the
     # guess of frame 3, which keeps the velocity of frame 2, is still above: frame 4 has no finite start.
     assert result.reason.startswith(f"frame {result.frames}: ")
     assert 3 <= result.frames <= 4 and np.isfinite(result.positions).all()
-    loaded = Trajectory.load(path)
-    assert loaded.status == "diverged" and loaded.frames == result.frames and loaded.reason == result.reason
-
-
-class Cut(Exception):
-    """Ends a run in the middle."""
-
-
-def test_a_run_that_is_cut_off_leaves_its_frames(tmp_path):
-    cloth, path = Cloth(SHEET, FACES, pins=[0, 6]), tmp_path / "run.vtkhdf"
-    whole = simulate(cloth, terms_of(cloth), frames=4)
-
-    def pin_positions(frame):
-        if frame == 3:
-            raise Cut
-        return SHEET[[0, 6]]
-
-    with pytest.raises(Cut):
-        simulate(cloth, terms_of(cloth), frames=4, pin_positions=pin_positions, path=path)
-    held = Trajectory.load(path)
-    assert held.status == "unfinished" and [p.name for p in tmp_path.iterdir()] == ["run.vtkhdf"]
-    np.testing.assert_array_equal(held.positions, whole.positions[:3])
 
 
 def test_the_status_of_a_run_is_its_worst_and_the_reason_the_first_with_it():
@@ -194,7 +170,6 @@ def test_the_status_of_a_run_is_its_worst_and_the_reason_the_first_with_it():
 
     result = simulate(cloth, terms_of(cloth), frames=5, method=stopping)
     assert result.status == "timeout" and result.reason.startswith("frame 3: ")
-    assert "\nstatus     timeout: frame 3: " in summarise(result, frames=5)
 
 
 def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
@@ -206,17 +181,15 @@ def test_a_frame_that_does_not_converge_is_marked_and_the_run_goes_on():
     assert (result.frame_fields["gradient_norm"][1:] > 1e-6).all()
 
 
-def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
+def test_a_step_that_round_off_excuses_says_so_in_its_frame():
     """A million metres away positions have 1e-10 m of round-off, and forces more than 1e-6 weights."""
     cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    path, far = tmp_path / "far.vtkhdf", SHEET + np.array([1e6, 0.0, 0.0])
-    result = simulate(cloth, terms_of(cloth), start=far, frames=4, path=path)
+    far = SHEET + np.array([1e6, 0.0, 0.0])
+    result = simulate(cloth, terms_of(cloth), start=far, frames=4)
     residual, relaxed = (result.frame_fields[name] for name in ("gradient_norm", "relaxed"))
     assert result.status == "converged" and result.frame_fields["converged"].all()
     assert relaxed[1:].all() and (residual[1:] > 1e-6).all()
-    first = 1
-    reason = f"frame {first}: round-off: residual {residual[first]:.1e} above tolerance 1.0e-06"
-    assert result.reason.startswith(reason) and Trajectory.load(path).reason == result.reason
+    assert result.reason.startswith(f"frame 1: round-off: residual {residual[1]:.1e} above tolerance 1.0e-06")
     near = simulate(cloth, terms_of(cloth), frames=4)
     assert near.reason == "" and not near.frame_fields["relaxed"].any()
 
@@ -235,16 +208,12 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame(tmp_path):
         ),
         ({"velocity": SHEET[:, :2]}, "velocity has shape (49, 2): expected (49, 3)"),
         ({"dt": 0.0}, "dt = 0.0: must be a finite number of seconds above 0"),
-        ({"dt": np.nan}, "dt = nan"),
         ({"dt": 1e300}, "dt / substeps = 1e+300 s: give 1e-07 to 10000 s"),
-        ({"substeps": 10**9}, "dt / substeps = 3.33e-11 s: give 1e-07 to 10000 s"),
         ({"tolerance": np.nan}, "tolerance = nan: give a finite number above 0"),
-        ({"tolerance": np.inf}, "tolerance = inf: give"),
         ({"tolerance": -1e-6, "method": "newton"}, "tolerance = -1e-06: give"),
     ],
 )
-def test_what_cannot_be_simulated_is_refused_before_any_file_is_written(options, message, tmp_path):
+def test_what_cannot_be_simulated_is_refused(options, message):
     cloth = Cloth(SHEET, FACES)
     with pytest.raises(ValueError, match=re.escape(message)):
-        simulate(cloth, terms_of(cloth), **({"frames": 2, "path": tmp_path / "run"} | options))
-    assert list(tmp_path.iterdir()) == []
+        simulate(cloth, terms_of(cloth), **({"frames": 2} | options))
