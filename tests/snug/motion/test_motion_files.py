@@ -67,13 +67,6 @@ def test_hands_are_damped_and_fingers_are_no_hands(tmp_path, joints, hand):
     np.testing.assert_allclose(read(path).poses[:, [20, 21, 22, 23], 2], [[0.05, 0.05, hand, hand]] * 3)
 
 
-def matrices(change):
-    """Return rotation matrices of the kick with one of them changed."""
-    wrong = Rotation.from_rotvec(KICK.poses.reshape(-1, 3)).as_matrix().reshape(-1, 24, 3, 3)
-    wrong[7, 5] = change(wrong[7, 5])
-    return wrong
-
-
 @pytest.mark.parametrize(
     ("changes", "pattern"),
     [
@@ -84,15 +77,12 @@ def matrices(change):
         ({"poses": np.zeros((200_000, 66)), "trans": np.zeros((200_000, 3))}, "200000 frames"),
         ({"poses": np.zeros((20_000, 66)), "trans": np.zeros((20_000, 3)), "fps": 10}, "last 2000 s"),
         ({"poses": np.degrees(KICK.poses)}, "radians, not degrees"),
-        ({"poses": np.zeros((40, 70))}, r"'poses' has shape \(40, 70\)"),
-        ({"poses": matrices(lambda one: 1.1 * one)}, "frame 7, joint 5 is no rotation matrix"),
-        ({"poses": matrices(lambda one: np.diag([1.0, 1.0, -1.0]))}, "frame 7, joint 5 is no rotation"),
         ({"trans": KICK.translations + 1e5}, "metres"),
         ({"trans": KICK.translations.astype(complex)}, "holds no numbers"),
         ({"trans": KICK.translations[1:]}, r"'trans' has shape \(39, 3\); give \(40, 3\)"),
         ({"trans": np.full((40, 3), np.nan)}, "not finite in any frame"),
         ({"fps": 0}, "rates are 5 to 1000"),
-        ({"fps": np.array([30.0, 30.0])}, "one number"),
+        ({"fps": np.array([30.0, 30.0])}, "are 2 numbers"),
         (None, "no array .poses. .found none"),
     ],
 )
@@ -118,21 +108,6 @@ def test_files_of_a_subjects_shape_are_left_out_of_a_folder(tmp_path):
 
 
 class TestUpAxis:
-    def test_z_up_is_found_and_placed(self, tmp_path):
-        # Upright in a z-up world is a quarter turn about x; this person then faces +x there.
-        upright = Rotation.from_euler("z", 90, degrees=True) * Rotation.from_euler("x", 90, degrees=True)
-        poses, rise = np.zeros((121, 24, 3)), np.linspace(0.0, 0.3, 121)
-        poses[:, 0] = upright.as_rotvec()
-        path = np.stack((2.0 * rise, np.full(121, 9.0), rise), axis=1)
-        np.savez(tmp_path / "clip.npz", poses=poses, trans=path, mocap_framerate=120.0, gender="neutral")
-        motion = resample(place(read(tmp_path / "clip.npz")))
-        assert (motion.name, motion.frames, motion.fps, motion.kind) == ("clip", 31, 30.0, "recorded")
-        assert "z up, as the body stands in 100 % of the frames" in motion.source
-        np.testing.assert_allclose(motion.poses[:, 0], 0.0, atol=1e-9)
-        # Forward along its own heading is +z, up is +y.
-        travelled = motion.translations[-1] - motion.translations[0]
-        np.testing.assert_allclose(travelled, [0, 0.3, 0.6], atol=1e-9)
-
     @pytest.mark.parametrize(
         ("turn", "up", "says"),
         [
@@ -184,16 +159,14 @@ class TestRecordingErrors:
         assert "repaired: right_elbow in frames 18-22" in motion.source
         assert 0 < angles(motion.poses, whole.poses).max() < 0.2  # the shortest arc over six frames
 
-    @pytest.mark.parametrize("form", ["poses", "rotations"])
-    def test_numbers_that_are_not_finite_are_named_or_mended(self, tmp_path, form):
-        array = KICK.poses.copy() if form == "poses" else matrices(lambda one: one)
+    def test_numbers_that_are_not_finite_are_named_or_mended(self, tmp_path):
+        array, trans = KICK.poses.copy(), KICK.translations.copy()
         array[5:7, JOINT["left_knee"], 0] = np.nan
-        trans = KICK.translations.copy()
         trans[-1, 1] = np.inf
-        np.savez(tmp_path / "clip.npz", trans=trans, fps=30.0, **{form: array})
+        path = write(tmp_path / "clip.npz", KICK, poses=array, trans=trans)
         named = "left_knee in frames 5-6, the root's path in frames 39-39"
-        assert refused(tmp_path / "clip.npz", f"{named}; add ,repair")
-        motion = read(tmp_path / "clip.npz", repair=True)
+        assert refused(path, f"{named}; add ,repair")
+        motion = read(path, repair=True)
         np.testing.assert_array_equal(motion.translations[-1], KICK.translations[-2])
         middle = Rotation.from_rotvec(motion.poses[4:8, JOINT["left_knee"]])
         steps = (middle[:-1].inv() * middle[1:]).as_rotvec()

@@ -1,14 +1,12 @@
 """Recorded clips of the library: composition, roles, frozen content, and that no recording error is left."""
 
 import hashlib
-import re
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.presets import find_preset
 from snug.body.skeleton import rotation_matrices, sole_points
 from snug.motion.library import (
     CLIPS,
@@ -66,14 +64,6 @@ def test_the_library_has_the_composition_that_the_protocol_states():
     assert {"01_01", "07_02"} <= {clip_of(name) for name in recorded}
     assert len(MEASURED) - len(recorded) == 6
     assert all(90 <= frames[name] <= 150 for name in MEASURED if name != "07_02")
-    eight = TEST[: find_preset("quick").test_motions]
-    assert len(eight) == 8 and "01_01_a" in eight and 3 <= len(set(eight) & set(recorded)) <= 5
-
-
-def test_test_motions_have_kinds_that_no_training_motion_has(clips):
-    known = {clips[name].kind.split(",")[0] for name in TRAIN}
-    new = {make_motion(name).kind.split(",")[0] for name in TEST} - known
-    assert {"sword play", "basketball: shot after a dribble", "cartwheel lean"} <= new
 
 
 def test_the_clips_are_frozen(clips):
@@ -119,9 +109,3 @@ def test_the_notice_is_shipped_and_the_file_is_small():
     assert NOTICE in project["project"]["license-files"]
     assert NOTICE in (ROOT / "README.md").read_text(encoding="utf-8")
     assert CLIPS_FILE.stat().st_size < 2.5e6
-
-
-def test_the_notice_lists_every_repair():
-    notice = (ROOT / NOTICE).read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\d\d_\d\d) \| (\d+) \| (\w+) \| ([\d, -]+) \|$", notice, re.M)
-    assert len(rows) == 14 and {row[0] for row in rows} <= set(CLIPS)
