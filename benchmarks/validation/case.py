@@ -30,12 +30,13 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """Row of a case that says by itself how it ended: value, status, reason and terms."""
+    """Row of a case that says by itself how it ended: value, status, reason, terms, and what it expected."""
 
-    value: float | None
-    status: str
-    reason: str
+    value: float | None = None
+    status: str = "failed"
+    reason: str = ""
     terms: str = ""
+    expected: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,46 +83,33 @@ class Case:
                 measured = getattr(load(self.module), self.function)(**self.options)
             if isinstance(measured, Mapping):
                 measured = measured[self.name]
-            if isinstance(measured, Measurement):
-                return self.row(measured.value, measured.status, measured.reason, terms=measured.terms)
-            value, expected = measured if isinstance(measured, tuple) else (measured, self.expected)
-            return self.judged(float(value), None if expected is None else float(expected))
+            if not isinstance(measured, Measurement):
+                pair = measured if isinstance(measured, tuple) else (measured, self.expected)
+                measured = self.judged(*(None if number is None else float(number) for number in pair))
         except Exception as error:
-            return self.row(reason=f"{type(error).__name__}: {error}")
+            measured = Measurement(reason=f"{type(error).__name__}: {error}")
+        return Row(
+            self.suite, self.scene or self.name, self.method, 0, self.metric, self.unit,
+            value=measured.value, status=measured.status, reason=measured.reason, terms=measured.terms,
+            expected=self.expected if measured.expected is None else measured.expected,
+            tolerance=self.tolerance,
+        )  # fmt: skip
 
     def warm_up(self) -> None:
         """Compile what the first case of a process would otherwise compile within its deadline."""
         with slow_paths_allowed():
             getattr(load(self.module), "warm_up", lambda: None)()
 
-    def judged(self, value: float, expected: float | None) -> Row:
-        """Return the row of a number: ok where it is finite and within the tolerance of the expected one."""
+    def judged(self, value: float, expected: float | None) -> Measurement:
+        """Judge a number: it is ok where it is finite and within the tolerance of the expected one."""
         if not math.isfinite(value):
-            return self.row(reason=f"the measured number is {value}", expected=expected)
-        if self.tolerance is None:
-            return self.row(value, "ok", expected=expected)
-        if expected is None:
-            return self.row(value, reason="a tolerance, but nothing to compare with")
-        if abs(value - expected) <= self.tolerance:
-            return self.row(value, "ok", expected=expected)
-        far = f"{value:.6g} is further than {self.tolerance:g} from {expected:g} ({self.reason})"
-        return self.row(value, reason=far, expected=expected)
-
-    def row(
-        self,
-        value: float | None = None,
-        status: str = "failed",
-        reason: str = "",
-        *,
-        expected: float | None = None,
-        terms: str = "",
-    ) -> Row:
-        """Return the row with these values; it expects what the case declares unless another is given."""
-        expected = self.expected if expected is None else expected
-        return Row(
-            self.suite, self.scene or self.name, self.method, 0, self.metric, self.unit, value=value,
-            status=status, reason=reason, expected=expected, tolerance=self.tolerance, terms=terms,
-        )  # fmt: skip
+            return Measurement(reason=f"the measured number is {value}", expected=expected)
+        reason = ""
+        if self.tolerance is not None and expected is None:
+            reason = "a tolerance, but nothing to compare with"
+        elif self.tolerance is not None and abs(value - expected) > self.tolerance:
+            reason = f"{value:.6g} is further than {self.tolerance:g} from {expected:g} ({self.reason})"
+        return Measurement(value=value, status="failed" if reason else "ok", reason=reason, expected=expected)
 
 
 _declared: dict[str, list[Case]] = defaultdict(list)  # by module

@@ -21,7 +21,8 @@ from functools import cache
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import ROW, lying, rectangle
+from benchmarks.meshes import ROW, rectangle
+from benchmarks.validation.equilibrium import flat_cloth
 from reference_sim import energies
 
 ROWS = 2  # cells across a strip: narrow, so that the cross-section never has to stay flat
@@ -57,14 +58,13 @@ def integrated_elastica(
         force = weight * (1 - s) + load
         return np.stack([y[1], -force * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
 
-    solution = solve_bvp(slope, _clamp_and_free_end, s, y, tol=1e-8, max_nodes=20000)
+    def ends(clamp: np.ndarray, tip: np.ndarray) -> np.ndarray:
+        return np.array([clamp[0], tip[1], clamp[2], clamp[3]])
+
+    solution = solve_bvp(slope, ends, s, y, tol=1e-8, max_nodes=20000)
     if not solution.success:
         raise RuntimeError(f"the elastica could not be integrated: {solution.message}")
     return solution.x, solution.y
-
-
-def _clamp_and_free_end(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    return np.array([start[0], end[1], start[2], start[3]])
 
 
 @dataclass(frozen=True)
@@ -110,25 +110,20 @@ def clamped_strip(family: str, columns: int, length: float, material: sim.Materi
         length: from x = 0 to the free end [m].
         material: of the cloth.
     """
+    import scipy.sparse.linalg as spla
+
     cell = length / (columns - 0.5)
     width = ROWS * cell * (ROW if family == "equilateral" else 1.0)
     points, faces = rectangle(family, columns, ROWS, columns * cell, width)
     points[:, 0] -= cell / 2
-    x = lying(points)
-    cloth = sim.Cloth(x, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.51 * cell))
-    w = _small_deflection(energies.BendHinge(cloth))
-    ends = [w[np.abs(points[:, 0] - at) < 1e-6 * cell].mean() for at in (length, length - 2 * cell)]
-    acting = 4 * ends[0] / (3 * (ends[0] - ends[1]) / (2 * cell))
-    return Strip(cloth, cell, width, float(acting**4 / (8 * ends[0])), float(length - acting))
-
-
-def _small_deflection(bend: energies.BendHinge) -> np.ndarray:
-    """Return w (V,) [m] under a unit load per area [Pa], linearly."""
-    import scipy.sparse.linalg as spla
-
-    cloth = bend.cloth
-    stiffness = sim.Potential([bend]).hessian(cloth.rest_positions).tocsr()[1::3][:, 1::3]
+    cloth = flat_cloth(points, faces, material, held=points[:, 0] < 0.51 * cell, lies=True)
+    # The small deflection w (V,) [m] under a unit load per area [Pa], linearly.
+    stiffness = (
+        sim.Potential([energies.BendHinge(cloth)]).hessian(cloth.rest_positions).tocsr()[1::3][:, 1::3]
+    )
     free = np.flatnonzero(cloth.free)
     w = np.zeros(cloth.vertex_count)
     w[free] = spla.spsolve(stiffness[free][:, free].tocsc(), cloth.vertex_areas[free])
-    return w
+    ends = [w[np.abs(points[:, 0] - at) < 1e-6 * cell].mean() for at in (length, length - 2 * cell)]
+    acting = 4 * ends[0] / (3 * (ends[0] - ends[1]) / (2 * cell))
+    return Strip(cloth, cell, width, float(acting**4 / (8 * ends[0])), float(length - acting))

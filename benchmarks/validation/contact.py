@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import in_space, jittered_patch, lying, right_grid
+from benchmarks.meshes import jittered_patch, right_grid
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import minimum, motion, order
+from benchmarks.validation.equilibrium import ends, flat_cloth, minimum, motion, order
 from reference_sim import energies
 
 if TYPE_CHECKING:
@@ -38,8 +38,7 @@ def penalty_depth() -> float:
 @known_answer(expected=3.0, tolerance=1e-12, reason="vertices, edges and faces carry it once each; round-off")
 def contact_sampled_area() -> float:
     """Return the area of all contact samples of a sheet over its own: each kind carries it once."""
-    points, faces = jittered_patch(8)
-    contact = energies.ContactPenalty(sim.Cloth(in_space(points), faces, sim.Material()))
+    contact = energies.ContactPenalty(flat_cloth(*jittered_patch(8)))
     return float(contact.sample_areas.sum())  # the sheet has unit area
 
 
@@ -53,16 +52,12 @@ def contact_force_is_weight() -> float:
 
 def _sheet_at_rest(samples: str) -> tuple[energies.ContactPenalty, np.ndarray, float]:
     points, faces = jittered_patch(8)
-    material = sim.Material()
-    rest = lying(points) - [0.5, 0.0, 0.5]
-    cloth = sim.Cloth(rest, faces[:, ::-1], material)
-    floor = sim.Obstacle(*box())
+    cloth = flat_cloth(points - 0.5, faces, lies=True)
     contact = energies.ContactPenalty(cloth, samples=samples)
-    start = rest + np.array([0.0, 0.002, 0.0])
-    still = np.zeros_like(start)
-    contact.prepare(energies.Step(previous=start, velocity=still, guess=start, dt=1 / 30, obstacle=floor))
-    x = minimum([energies.StretchStVK(cloth), energies.Gravity(cloth), contact], start)
-    return contact, x, material.areal_density
+    start = cloth.rest_positions + np.array([0.0, 0.002, 0.0])
+    contact.prepare(energies.Step(start, np.zeros_like(start), start, 1 / 30, sim.Obstacle(*box())))
+    terms = [energies.StretchStVK(cloth), energies.Gravity(cloth), contact]
+    return contact, minimum(terms, start), cloth.material.areal_density
 
 
 def box() -> tuple[np.ndarray, np.ndarray]:
@@ -189,7 +184,21 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
     for _ in range(6):  # the planes follow the strip until both agree
         contact.prepare(energies.Step(x, np.zeros_like(x), x, 1 / 30, body))
         x = minimum([energies.StretchStVK(cloth), energies.Gravity(cloth), contact], x, tolerance=1e-9)
-    return _profiles(cloth, contact, x, points, cloth.material.areal_density * sim.GRAVITY)
+    weight = cloth.material.areal_density * sim.GRAVITY
+    columns = len(np.unique(points[:, 0])) - 1
+    grid = x.reshape(3, columns + 1, 3).mean(axis=0)  # the middle line
+    width, cell = np.ptp(points[:, 1]), np.ptp(points[:, 0]) / columns
+    # Force through each cell from the forces on all vertices to its left: equilibrium by free-body cut.
+    strain = energies.StretchStVK(cloth).value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    tension = np.linalg.norm(np.cumsum(strain, axis=0)[:-1], axis=1) / width
+    middle = 0.5 * (grid[1:] + grid[:-1])
+    expected = tension[0] + weight * (middle[:, 1] - middle[0, 1])
+    push = -contact.value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    upper = grid[:, 1] > 0.15 * DRUM
+    pressure = np.linalg.norm(push, axis=1)[upper] / (width * cell)
+    radius = np.linalg.norm(grid[upper, :2], axis=1)
+    inner = 0.5 * (tension[1:] + tension[:-1])[upper[1:-1]]
+    return tension, expected, pressure, inner / radius + weight * grid[upper, 1] / radius
 
 
 def strip_over_drum(columns: int, stiffness: float) -> tuple[sim.Cloth, np.ndarray, np.ndarray]:
@@ -205,30 +214,11 @@ def strip_over_drum(columns: int, stiffness: float) -> tuple[sim.Cloth, np.ndarr
     radius = DRUM + DEFAULT_MARGIN - np.sqrt(PULL / DRUM / (3 * stiffness))
     length = np.pi * radius + 2 * SLACK
     points, faces = right_grid(2, columns, 2 * length / columns, length)
-    rest = lying(points)
-    ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > length - 1e-9))
+    cloth = flat_cloth(points, faces, material, held=ends(points), lies=True)
+    rest = cloth.rest_positions
     s = (rest[:, 0] - length / 2) * (1 + PULL / material.membrane_modulus)
     angle = np.clip(s / radius, -np.pi / 2, np.pi / 2)
     below = np.abs(s) - np.pi / 2 * radius
     x = np.stack([radius * np.sin(angle), radius * np.cos(angle), rest[:, 2]], axis=1)
     x[:, 1] -= np.maximum(below, 0.0)
-    return sim.Cloth(rest, faces[:, ::-1], material, pins=ends), points, x
-
-
-def _profiles(
-    cloth: sim.Cloth, contact: energies.ContactPenalty, x: np.ndarray, points: np.ndarray, weight: float
-) -> tuple[np.ndarray, ...]:
-    columns = len(np.unique(points[:, 0])) - 1
-    grid = x.reshape(3, columns + 1, 3).mean(axis=0)  # the middle line
-    width, cell = np.ptp(points[:, 1]), np.ptp(points[:, 0]) / columns
-    # Force through each cell from the forces on all vertices to its left: equilibrium by free-body cut.
-    strain = energies.StretchStVK(cloth).value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
-    tension = np.linalg.norm(np.cumsum(strain, axis=0)[:-1], axis=1) / width
-    middle = 0.5 * (grid[1:] + grid[:-1])
-    expected = tension[0] + weight * (middle[:, 1] - middle[0, 1])
-    push = -contact.value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
-    upper = grid[:, 1] > 0.15 * DRUM
-    pressure = np.linalg.norm(push, axis=1)[upper] / (width * cell)
-    radius = np.linalg.norm(grid[upper, :2], axis=1)
-    inner = 0.5 * (tension[1:] + tension[:-1])[upper[1:-1]]
-    return tension, expected, pressure, inner / radius + weight * grid[upper, 1] / radius
+    return cloth, points, x

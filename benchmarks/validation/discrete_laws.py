@@ -10,7 +10,15 @@ import reference_sim as sim
 from benchmarks.meshes import in_space, jittered_patch, right_grid
 from benchmarks.scene import Scene
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import farthest, minimum, motion
+from benchmarks.validation.equilibrium import (
+    COTTON,
+    border,
+    farthest,
+    flat_cloth,
+    minimum,
+    motion,
+    sheet_terms,
+)
 from reference_sim import energies
 
 DT = 1.0 / 30.0
@@ -78,15 +86,14 @@ def stretched_membrane(amplitude: float) -> tuple[sim.Cloth, np.ndarray, np.ndar
     Returns:
         sim.Cloth, start (V,3) [m] with the mode of that amplitude [m], the mode (V,), and omega^2 [1/s^2].
     """
-    cells, s, material = 8, 1.2, sim.Material()
+    cells, s = 8, 1.2
     points, faces = right_grid(cells, cells, 1.0, 1.0)
-    on_border = (np.abs(points - 0.5) > 0.5 - 1e-9).any(axis=1)
-    cloth = sim.Cloth(in_space(points), faces, material, pins=np.flatnonzero(on_border))
+    cloth = flat_cloth(points, faces, held=border(points))
     mode = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])
     start = s * in_space(points)
     start[:, 2] = amplitude * mode
-    S = (material.lame_lambda + material.lame_mu) * (s**2 - 1)
-    omega2 = S / material.areal_density * 4 * cells**2 * 2 * np.sin(np.pi / (2 * cells)) ** 2
+    S = (COTTON.lame_lambda + COTTON.lame_mu) * (s**2 - 1)
+    omega2 = S / COTTON.areal_density * 4 * cells**2 * 2 * np.sin(np.pi / (2 * cells)) ** 2
     return cloth, start, mode, float(omega2)
 
 
@@ -142,9 +149,8 @@ def _thrown_sheet() -> tuple[np.ndarray, sim.Cloth]:
     cloth = sim.Cloth(0.3 * in_space(points), faces, sim.Material())
     random = np.random.default_rng(2)
     start = cloth.rest_positions + random.normal(0, 0.004, cloth.rest_positions.shape)
-    terms = [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)]
     velocity = random.normal(0, 0.5, start.shape)
-    return motion(cloth, terms, dt=DT, frames=12, start=start, velocity=velocity), cloth
+    return motion(cloth, sheet_terms(cloth), dt=DT, frames=12, start=start, velocity=velocity), cloth
 
 
 @known_answer(unit="m", expected=0.0, tolerance=1e-12, reason="one minimiser; Newton ends at round-off")
@@ -155,15 +161,13 @@ def unique_step() -> float:
     h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
     At 1/30 s, far above that bound, two valid solvers may differ.
     """
-    material = sim.Material()
-    bound = SPACING * np.sqrt(material.areal_density / 8 / (material.lame_lambda + material.lame_mu))
+    bound = SPACING * np.sqrt(COTTON.areal_density / 8 / (COTTON.lame_lambda + COTTON.lame_mu))
     cells = 12
-    points, faces = right_grid(cells, cells, cells * SPACING, cells * SPACING)
-    cloth = sim.Cloth(in_space(points), faces, material)
+    size = SPACING * cells
+    cloth = flat_cloth(*right_grid(cells, cells, cells * SPACING, cells * SPACING))
     inertia = energies.Inertia(cloth, 0.9 * bound)
     random = np.random.default_rng(5)
     inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
-    size = SPACING * cells
     starts = (random.uniform(-size, size, cloth.rest_positions.shape) for _ in range(2))
     return farthest(*(minimum([energies.StretchStVK(cloth), inertia], x, tolerance=1e-12) for x in starts))
 

@@ -1,4 +1,4 @@
-"""Solves that have to converge, the order of an error, and the dead load: what known answers share."""
+"""What known answers share: flat cloths, solves that have to converge, orders of errors, the dead load."""
 
 from __future__ import annotations
 
@@ -8,12 +8,46 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 import reference_sim as sim
+from benchmarks.meshes import in_space, lying
 from reference_sim import energies
 
 if TYPE_CHECKING:
     from torch import Tensor
 
 Solved = TypeVar("Solved", "sim.Result", "sim.Trajectory")
+COTTON = sim.Material()
+
+
+def border(points: np.ndarray) -> np.ndarray:
+    """Return which points (V, 2) [m] lie on the border of their rectangle, (V,)."""
+    return ((points < points.min(axis=0) + 1e-9) | (points > points.max(axis=0) - 1e-9)).any(axis=1)
+
+
+def ends(points: np.ndarray) -> np.ndarray:
+    """Return which points (V, 2) [m] lie at one of the ends of their rectangle along x, (V,)."""
+    return border(points[:, :1])
+
+
+def flat_cloth(
+    points: np.ndarray,
+    faces: np.ndarray,
+    material: sim.Material = COTTON,
+    *,
+    held: np.ndarray | Sequence[bool] = (),
+    lies: bool = False,
+    size: float = 1.0,
+) -> sim.Cloth:
+    """Make a cloth of `size` times points (V, 2) [m] in the plane z = 0, or y = 0, facing up, if it `lies`.
+
+    held: which vertices are pinned, (V,).
+    """
+    x, faces = (lying(points), faces[:, ::-1]) if lies else (in_space(points), faces)
+    return sim.Cloth(size * x, faces, material, pins=np.flatnonzero(held))
+
+
+def sheet_terms(cloth: sim.Cloth) -> list[energies.Energy]:
+    """Return membrane, hinges and weight."""
+    return [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)]
 
 
 class DeadLoad(energies.Energy):
@@ -22,9 +56,8 @@ class DeadLoad(energies.Energy):
     name = "load"
 
     def __init__(self, cloth: sim.Cloth, forces: np.ndarray) -> None:
-        self.cloth = cloth
+        self.cloth, self.forces = cloth, forces
         self.stencils = np.arange(cloth.vertex_count)[:, None]
-        self.forces = forces
 
     def element_energy(self, u: Tensor) -> Tensor:
         """Return -f . u of each vertex, in torch."""

@@ -31,20 +31,17 @@ which over a turn of phi is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import lying, right_grid
+from benchmarks.meshes import right_grid
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.contact import DRUM, RoundBody, box, strip_over_drum
-from benchmarks.validation.equilibrium import motion, order
+from benchmarks.validation.equilibrium import flat_cloth, motion, order
 from benchmarks.validation.large_bending import HANGING_MATERIAL, WEIGHT, string_stretch
 from reference_sim import energies
-
-if TYPE_CHECKING:
-    pass
 
 MU = 0.5
 SPEED = 0.02  # [m/s] of the smoothing
@@ -53,8 +50,6 @@ SOLVED = 1e-11  # mean vertex weights that may be left of a step's gradient
 BELT = 0.5  # [m/s]
 THROWN, FALLING = 4.0, 1.0  # [m/s]
 LEVEL, STILL = np.eye(3), np.zeros((1, 1, 3))
-
-
 SUMMED_TWICE = "the residual gradient that the solver may leave, summed twice"
 
 
@@ -139,15 +134,12 @@ def _slope(ratio: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _patch(**options: Any) -> np.ndarray:
     """Return the path (T, 3) [m] of the middle of a patch; options: of `slid`."""
-    points, faces = right_grid(2, 2, 0.1, 0.1)
-    flat = lying(points)
-    cloth = sim.Cloth(flat, faces[:, ::-1], sim.Material())
-    return slid(cloth, flat, dt=DT, speed=SPEED, **options).mean(axis=1)
+    cloth = flat_cloth(*right_grid(2, 2, 0.1, 0.1), lies=True)
+    return slid(cloth, dt=DT, speed=SPEED, **options).mean(axis=1)
 
 
 def slid(
     cloth: sim.Cloth,
-    flat: np.ndarray,
     *,
     frames: int,
     dt: float,
@@ -159,7 +151,7 @@ def slid(
     quasi_static: bool = False,
     substeps: int = 1,
 ) -> np.ndarray:
-    """Simulate a cloth laid flat (V, 3) [m] on the plane y = 0, both turned by `turn`: (frames, V, 3) [m].
+    """Simulate a cloth flat on the plane y = 0, both turned by `turn`, and return (frames, V, 3) [m].
 
     It starts as deep in the margin as its weight presses it. The plane moves by carried (T, 1, 3) [m], pins
     by pull (3,) [m] a frame; velocity (3,) [m/s] is that of the start. `speed` [m/s] is that of the
@@ -169,13 +161,13 @@ def slid(
 
     contact = energies.ContactPenalty(cloth, samples="vertices")
     depth = np.sqrt(cloth.material.areal_density * sim.GRAVITY * turn[1, 1] / (3 * DEFAULT_STIFFNESS))
-    start = (flat + np.array([0.0, contact.margin - depth, 0.0])) @ turn.T
+    start = (cloth.rest_positions + np.array([0.0, contact.margin - depth, 0.0])) @ turn.T
     friction = energies.ContactFriction(contact, coefficient=MU, speed=speed)
     corners, sides = box()
     return motion(
         cloth, [energies.StretchStVK(cloth), energies.Gravity(cloth), contact, friction], dt=dt,
         frames=frames, obstacle=sim.Obstacle((corners + carried) @ turn.T, sides), start=start,
-        velocity=np.tile(velocity, (len(flat), 1)),
+        velocity=np.tile(velocity, (cloth.vertex_count, 1)),
         pin_positions=lambda frame: start[cloth.pins] + frame * pull,
         quasi_static=quasi_static, substeps=substeps, tolerance=SOLVED,
     )  # fmt: skip
@@ -209,9 +201,7 @@ def _pulled_point() -> tuple[np.ndarray, np.ndarray, float]:
     corners = np.array([[0.0, 0.0, 0.0], [REACH, 0.0, WIDTH / 2], [REACH, 0.0, -WIDTH / 2]])
     cloth = sim.Cloth(corners, np.array([[0, 1, 2]]), SOFT, pins=[1, 2])
     speed, frames = 1e-3, 301
-    x = slid(
-        cloth, corners, frames=frames, dt=PULL_DT, speed=speed, pull=np.array([HANDLE * PULL_DT, 0.0, 0.0])
-    )
+    x = slid(cloth, frames=frames, dt=PULL_DT, speed=speed, pull=np.array([HANDLE * PULL_DT, 0.0, 0.0]))
     mass, area = cloth.masses[0], cloth.areas[0]
     stiffness = area * (SOFT.lame_lambda + 2 * SOFT.lame_mu) / REACH
 
@@ -219,18 +209,15 @@ def _pulled_point() -> tuple[np.ndarray, np.ndarray, float]:
         s = apart / REACH
         return stiffness * s * (s * s - 1) / 2
 
+    def excess(at: float, held: float, before: float, v: float) -> float:
+        slip = (at - before) / (speed * PULL_DT)
+        grip = np.sign(slip) * (1.0 if abs(slip) > 1 else 2 * abs(slip) - slip**2)
+        return mass * ((at - before - PULL_DT * v) / PULL_DT**2 + MU * sim.GRAVITY * grip) - pull(held - at)
+
     exact, v = [0.0], 0.0
     for n in range(1, frames):
         held, before = REACH + n * HANDLE * PULL_DT, exact[-1]
-
-        def excess(at: float, held: float = held, before: float = before, v: float = v) -> float:
-            slip = (at - before) / (speed * PULL_DT)
-            grip = np.sign(slip) * (1.0 if abs(slip) > 1 else 2 * abs(slip) - slip**2)
-            return mass * ((at - before - PULL_DT * v) / PULL_DT**2 + MU * sim.GRAVITY * grip) - pull(
-                held - at
-            )
-
-        at = brentq(excess, before - 0.1, before + 0.1, xtol=1e-16, rtol=1e-15)
+        at = brentq(excess, before - 0.1, before + 0.1, (held, before, v), xtol=1e-16, rtol=1e-15)
         v = (at - before) / PULL_DT
         exact.append(at)
     last = pull(x[-1, 1, 0] - x[-1, 0, 0]) / (MU * mass * sim.GRAVITY)
@@ -269,13 +256,10 @@ def _pulled_strip() -> tuple[np.ndarray, np.ndarray]:
     """Return the place of the pulled end [m], and the pull over mu times the weight, step by step."""
     width = LENGTH / COLUMNS
     points, faces = right_grid(1, COLUMNS, width, LENGTH)
-    rest = lying(points)
-    cloth = sim.Cloth(
-        rest, faces[:, ::-1], HANGING_MATERIAL, pins=np.flatnonzero(points[:, 0] > LENGTH - 1e-9)
-    )
+    cloth = flat_cloth(points, faces, HANGING_MATERIAL, held=points[:, 0] > LENGTH - 1e-9, lies=True)
     step = np.array([_end(1.0) / 20, 0.0, 0.0])
     dt = 100.0  # s: inertia is nothing
-    x = slid(cloth, rest, frames=31, dt=dt, speed=1e-4 * step[0] / dt, pull=step, quasi_static=True)
+    x = slid(cloth, frames=31, dt=dt, speed=1e-4 * step[0] / dt, pull=step, quasi_static=True)
     strain, pins = energies.StretchStVK(cloth), cloth.pins
     # A pinned vertex slides too: the friction of its half of a cell is pulled as well.
     pin_friction = MU * cloth.masses[pins].sum() * sim.GRAVITY
@@ -305,7 +289,7 @@ def friction_capstan_order() -> float:
 def _excess(mu: float, columns: int) -> float:
     """Return the logarithm of the ratio of the pulls, less mu times the angle from first to last cell."""
     cloth, points, start = strip_over_drum(columns, HARD)
-    ends = points[:, 0] < 1e-9, points[:, 0] > points[:, 0].max() - 1e-9
+    sides = points[:, 0] < 1e-9, points[:, 0] > points[:, 0].max() - 1e-9
     contact = energies.ContactPenalty(cloth, samples="vertices", stiffness=HARD)
     friction = energies.ContactFriction(contact, coefficient=mu, speed=1e-3 * DRUM * TURN)
     body: Any = RoundBody(DRUM, axis=2, turn=TURN)
@@ -314,7 +298,7 @@ def _excess(mu: float, columns: int) -> float:
         start=start, guess="previous", quasi_static=True, tolerance=1e-9,
     )[-1]  # fmt: skip
     strain = energies.StretchStVK(cloth).value_and_gradient(x)[1]
-    pulls = [float(np.linalg.norm(strain[end].sum(axis=0))) for end in ends]
+    pulls = [float(np.linalg.norm(strain[side].sum(axis=0))) for side in sides]
     line = x.reshape(3, columns + 1, 3).mean(axis=0)
     first, last = line[1] - line[0], line[-1] - line[-2]
     wrap = np.arccos(first @ last / np.linalg.norm(first) / np.linalg.norm(last))

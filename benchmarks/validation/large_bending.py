@@ -27,10 +27,10 @@ from functools import cache
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import ROW, in_space, lying, rectangle, right_grid
+from benchmarks.meshes import ROW, rectangle, right_grid
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.clamped_strip import clamped_strip, exact_elastica
-from benchmarks.validation.equilibrium import DeadLoad, minimum, order
+from benchmarks.validation.equilibrium import DeadLoad, ends, flat_cloth, minimum, order
 from benchmarks.validation.plates import NU, GaussianCurvature
 from reference_sim import energies
 
@@ -134,7 +134,7 @@ def hanging_strip_order() -> float:
 def _hanging(rows: int) -> float:
     points, faces = right_grid(rows, 4, 1.0, 4.0 / rows)
     points[:, 1] -= 1.0  # the top edge at y = 0
-    cloth = sim.Cloth(in_space(points), faces, HANGING_MATERIAL, pins=np.flatnonzero(points[:, 1] > -1e-9))
+    cloth = flat_cloth(points, faces, HANGING_MATERIAL, held=points[:, 1] > -1e-9)
     start = cloth.rest_positions * [1.0, 1.02, 1.0]
     x = minimum([energies.StretchStVK(cloth), energies.Gravity(cloth)], start, tolerance=1e-9)
     return float(-x[points[:, 1] < -1 + 1e-9, 1].mean())
@@ -178,16 +178,13 @@ def catenary_order() -> float:
 def _catenary(columns: int) -> dict[str, float]:
     width = 2.0 / columns
     points, faces = right_grid(2, columns, width, 1.0)
-    rest = lying(points)
-    ends = np.flatnonzero((points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9))
-    cloth = sim.Cloth(rest, faces[:, ::-1], HANGING_MATERIAL, pins=ends)
-    start = rest * [SPAN, 1.0, 1.0] - [0.5 * SPAN, 0.0, 0.0]
+    cloth = flat_cloth(points, faces, HANGING_MATERIAL, held=ends(points), lies=True)
+    start = cloth.rest_positions * [SPAN, 1.0, 1.0] - [0.5 * SPAN, 0.0, 0.0]
     start[:, 1] = -0.28 * (1 - (2 * start[:, 0] / SPAN) ** 2)  # near the answer, not it
     terms = [energies.StretchStVK(cloth), energies.Gravity(cloth)]
     x = minimum(terms, start, tolerance=1e-9)
-    left = points[:, 0] < 1e-9
+    force = -sim.Potential(terms).gradient(x)[points[:, 0] < 1e-9, 0].sum() / width
     middle = np.abs(points[:, 0] - 0.5) < 1e-9
-    force = -sim.Potential(terms).gradient(x)[left, 0].sum() / width
     return {"force": float(force), "sag": float(-x[middle, 1].mean())}
 
 
@@ -220,11 +217,9 @@ def _ratio(rows: int, where: str, slender: float) -> float:
     width = rows * h * ROW
     points, faces = rectangle("equilateral", columns, rows, columns * h, width)
     points -= [h / 2, width / 2]
-    cloth = sim.Cloth(
-        in_space(points), faces, BUCKLING_MATERIAL, pins=np.flatnonzero(points[:, 0] < 0.51 * h)
-    )
-    D, nu = BUCKLING_STIFFNESS / 4, NU
-    exact = CRITICAL[where] * width * D * np.sqrt((1 - nu**2) * 2 * (1 - nu))
+    cloth = flat_cloth(points, faces, BUCKLING_MATERIAL, held=points[:, 0] < 0.51 * h)
+    D = BUCKLING_STIFFNESS / 4
+    exact = CRITICAL[where] * width * D * np.sqrt((1 - NU**2) * 2 * (1 - NU))
     forces = np.zeros((len(points), 3))
     if where == "weight":
         forces[:, 1] = -exact * cloth.vertex_areas / width

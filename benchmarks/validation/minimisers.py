@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import in_space, jittered_patch, lying, right_grid
+from benchmarks.meshes import jittered_patch, right_grid
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import demand_converged, farthest, fitted_order, minimum
+from benchmarks.validation.equilibrium import (
+    demand_converged,
+    ends,
+    farthest,
+    fitted_order,
+    flat_cloth,
+    minimum,
+)
 from reference_sim import energies
 
 LBFGS_STEPS = 60
@@ -20,9 +27,8 @@ def newton_quadratic() -> float:
     cloth = _patch(5)
     inertia = energies.Inertia(cloth, 1 / 30)
     inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.1, cloth.rest_positions.shape)
-    result = demand_converged(
-        sim.minimise(sim.Potential([inertia, energies.Gravity(cloth)]), cloth.rest_positions), "the minimiser"
-    )
+    potential = sim.Potential([inertia, energies.Gravity(cloth)])
+    result = demand_converged(sim.minimise(potential, cloth.rest_positions), "the minimiser")
     return float(result.factorisations)
 
 
@@ -84,9 +90,9 @@ def newton_wants_small_steps() -> float:
     strip sags by a fifth of an edge.
     """
     points, faces = right_grid(2, 20, 0.1, 1.0)
-    flat = lying(points)
     material = sim.Material(bending_stiffness=1e-5)
-    cloth = sim.Cloth(flat, faces[:, ::-1], material, pins=np.flatnonzero(points[:, 0] < 0.06))
+    cloth = flat_cloth(points, faces, material, held=points[:, 0] < 0.06, lies=True)
+    flat = cloth.rest_positions
     potential = _potential(cloth, energies.Gravity(cloth, acceleration=3e-6))
     loose, tight = (minimum(potential.energies, flat, tolerance=small) for small in (1e-6, 1e-10))
     if np.abs(tight - flat).max() < 0.005:
@@ -101,10 +107,9 @@ def newton_leaves_saddles() -> float:
     It starts perfectly flat: without a force out of its plane, but not at a minimum.
     """
     points, faces = jittered_patch(6)
-    border = (points[:, 0] < 1e-9) | (points[:, 0] > 1 - 1e-9)
-    cloth = sim.Cloth(0.3 * in_space(points), faces, sim.Material(), pins=np.flatnonzero(border))
+    cloth = flat_cloth(points, faces, held=ends(points), size=0.3)
     potential, flat = _potential(cloth), cloth.rest_positions * [0.9, 1.0, 1.0]
-    free = np.repeat(~border, 3)
+    free = np.repeat(cloth.free, 3)
     hessian = potential.hessian(minimum(potential.energies, flat)).toarray()
     values = np.linalg.eigvalsh(hessian[np.ix_(free, free)])
     return float((values < -1e-9 * values[-1]).sum())
@@ -121,9 +126,8 @@ def lbfgs_distance() -> float:
     return farthest(result.positions, newton)
 
 
-def _patch(cells: int, pins: np.ndarray | tuple[int, ...] = ()) -> sim.Cloth:
-    points, faces = jittered_patch(cells)
-    return sim.Cloth(0.3 * in_space(points), faces, sim.Material(), pins=pins)
+def _patch(cells: int) -> sim.Cloth:
+    return flat_cloth(*jittered_patch(cells), size=0.3)
 
 
 def _potential(cloth: sim.Cloth, *further: energies.Energy) -> sim.Potential:
@@ -133,14 +137,13 @@ def _potential(cloth: sim.Cloth, *further: energies.Energy) -> sim.Potential:
 def _stretched() -> tuple[sim.Potential, np.ndarray]:
     """Return one step of a sheet pulled to 1.2 of its width: tension everywhere, and one minimiser."""
     points, faces = right_grid(8, 8, 0.3, 0.3)
-    border = (points[:, 0] < 1e-9) | (points[:, 0] > 0.3 - 1e-9)
-    cloth = sim.Cloth(in_space(points), faces, sim.Material(poisson_ratio=0.0), pins=np.flatnonzero(border))
+    cloth = flat_cloth(points, faces, sim.Material(poisson_ratio=0.0), held=ends(points))
     inertia = energies.Inertia(cloth, 1 / 30)
     start = cloth.rest_positions * [1.2, 1.0, 1.0]
     inertia.x_hat = start
     noise = np.random.default_rng(3).normal(0, 0.003, start.shape)
     potential = _potential(cloth, energies.Gravity(cloth), inertia)
-    return potential, np.where(border[:, None], start, start + noise)
+    return potential, np.where(cloth.free[:, None], start + noise, start)
 
 
 def _crumpled() -> tuple[sim.Potential, np.ndarray]:

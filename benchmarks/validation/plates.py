@@ -22,13 +22,14 @@ border alone (Gauss and Bonnet):
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import ROW, in_space, random_rotation, rectangle, right_grid
+from benchmarks.meshes import ROW, random_rotation, rectangle, right_grid
 from benchmarks.validation.case import known_answer
+from benchmarks.validation.equilibrium import border, flat_cloth
 from reference_sim import energies
 from reference_sim.geometry.topology import boundary_loops, corner_angles
 
@@ -94,7 +95,7 @@ def _folded(fold: float) -> tuple[sim.Cloth, np.ndarray]:
     profile = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
     column = np.rint(points[:, 0] / CELL).astype(int)
     x = np.stack([profile[column, 0], points[:, 1], profile[column, 1]], axis=1)
-    return sim.Cloth(in_space(points), faces, sim.Material()), x @ random_rotation(4).T
+    return flat_cloth(points, faces), x @ random_rotation(4).T
 
 
 def _signs(cloth: sim.Cloth) -> np.ndarray:
@@ -196,8 +197,7 @@ def supported_plate(scaling: str) -> float:
     width = rows * ROW / columns
     points, faces = rectangle("equilateral", columns, rows, 1.0, width)
     cloth, K = _stiffness(points, faces, hinges(scaling))
-    border = (points < 1e-9).any(axis=1) | (points > np.array([1.0, width]) - 1e-9).any(axis=1)
-    inside = np.flatnonzero(~border)
+    inside = np.flatnonzero(~border(points))
     areas = cloth.vertex_areas
     w = np.zeros(len(points))
     w[inside] = spla.spsolve(K[inside][:, inside], areas[inside])
@@ -236,7 +236,7 @@ def _morley(width: float, cells: int) -> float:
 
 def _stiffness(points: np.ndarray, faces: np.ndarray, terms: Terms) -> tuple[sim.Cloth, sp.csr_matrix]:
     """Return the cloth of a flat mesh (V,2) and the Hessian (V,V) of its terms out of the plane."""
-    cloth = sim.Cloth(in_space(points), faces, sim.Material(bending_stiffness=STIFFNESS))
+    cloth = flat_cloth(points, faces, sim.Material(bending_stiffness=STIFFNESS))
     hessian = sim.Potential(list(terms(cloth))).hessian(cloth.rest_positions).tocsr()
     return cloth, hessian[2::3][:, 2::3]
 
@@ -266,10 +266,6 @@ class GaussianCurvature(energies.Energy):
         The two energies differ by D (nu_0 - nu) det(S) per area, nu_0 = 0 and nu that of the hinges.
         """
         return cls(cloth, -NU * D)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return the stiffness [J]."""
-        return {"stiffness_J": self.stiffness}
 
     def element_energy(self, u: Tensor) -> Tensor:
         """Return E [J] of each corner: u (..., N, 3, 3) [m] -> (..., N)."""

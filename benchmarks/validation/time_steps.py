@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +21,16 @@ from benchmarks.meshes import random_rotation, sheet, square_sheet
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.contact import RoundBody
 from benchmarks.validation.discrete_laws import HANGING, stretched_membrane
-from benchmarks.validation.equilibrium import farthest, fitted_order, minimum, motion, order
+from benchmarks.validation.equilibrium import (
+    border,
+    farthest,
+    fitted_order,
+    minimum,
+    motion,
+    order,
+    sheet_terms,
+)
 from reference_sim import energies
-
-if TYPE_CHECKING:
-    pass
 
 SOFT = sim.Material(young_modulus=7e3)
 HEIGHT, BASE = 0.5, 0.4  # [m] of the triangle
@@ -167,7 +172,7 @@ def swing_time_step_order() -> float:
     flat, faces = sheet((8, 6), (0.4, 0.3))
     upright = np.stack([flat[:, 2], -flat[:, 0], flat[:, 1]], axis=1)
     cloth = sim.Cloth(upright, faces, sim.Material(), pins=np.arange(7))
-    terms = [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)]
+    terms = sheet_terms(cloth)
     hanging = minimum(terms, upright)
     cosine, sine = np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))
     turn = np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]])
@@ -179,23 +184,14 @@ def swing_time_step_order() -> float:
 @known_answer(expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/1200 s")
 def pressed_time_step_order() -> float:
     """Return the order in dt of a taut sheet that a ball, already in touch, is pressed into smoothly."""
-    return halving_order(_pressed(), (30, 60, 120, 240))
-
-
-def _pressed() -> Callable[[int], np.ndarray]:
-    """Return a function: number of steps -> positions after 0.2 s, while the ball rises smoothly."""
     end = 0.2
     flat, faces = square_sheet(8, 0.4)
-    border = np.flatnonzero((np.abs(flat[:, [0, 2]]) > 0.2 - 1e-9).any(axis=1))
-    cloth = sim.Cloth(flat, faces, sim.Material(), pins=border)
-    terms = [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)]
-    terms.append(energies.ContactPenalty(cloth))
-
-    def height(t: np.ndarray) -> np.ndarray:
-        return 0.02 * np.sin(2 * np.pi * t) ** 6 - 0.8 * BALL  # from rest, without a jolt
+    cloth = sim.Cloth(flat, faces, sim.Material(), pins=np.flatnonzero(border(flat[:, [0, 2]])))
+    terms = [*sheet_terms(cloth), energies.ContactPenalty(cloth)]
 
     def ball(n: int) -> Any:
-        return RoundBody(BALL, heights=height(np.linspace(0, end, n + 1)))
+        t = np.linspace(0, end, n + 1)
+        return RoundBody(BALL, heights=0.02 * np.sin(2 * np.pi * t) ** 6 - 0.8 * BALL)  # without a jolt
 
     tent = 1.1 * flat
     tent[:, 1] = 0.12 * np.maximum(0.2 - np.hypot(flat[:, 0], flat[:, 2]), 0.0)
@@ -204,7 +200,10 @@ def _pressed() -> Callable[[int], np.ndarray]:
     start = sim.simulate(
         cloth, terms, dt=1.0, frames=9, quasi_static=True, start=tent, obstacle=still, guess="previous"
     ).positions[-1]
-    return lambda n: _end(cloth, terms, start, end, n, obstacle=ball(n), guess="extrapolated")
+    return halving_order(
+        lambda n: _end(cloth, terms, start, end, n, obstacle=ball(n), guess="extrapolated"),
+        (30, 60, 120, 240),
+    )  # fmt: skip
 
 
 class Viscosity(energies.Energy):
@@ -231,14 +230,9 @@ class Viscosity(energies.Energy):
         return 0.5 * self.factor * float((change**2).sum()), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the Hessian of each edge, (E, 6, 6) [N/m]."""
-        _, blocks = self.scalar_stiffness(x)
-        return np.kron(blocks, np.eye(3))
-
-    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the edges and their blocks (E, 2, 2) [N/m], the same for all coordinates."""
-        block = self.factor * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
+        """Return the Hessian of each edge, (E, 6, 6) [N/m], the same for all coordinates."""
+        block = self.factor * np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3))
+        return np.tile(block, (len(self.stencils), 1, 1))
 
 
 @known_answer(
@@ -261,11 +255,8 @@ def hanging_sheet_order(viscous: bool) -> float:
 def halving_order(end: Callable[[int], np.ndarray], steps: Sequence[int]) -> float:
     """Return the order of `end` (V,3) [m] over numbers of steps, each twice the one before."""
     ends = [end(n) for n in steps]
-    return fitted_order([_distance(a, b) for a, b in pairwise(ends)], [1 / n for n in steps[:-1]])
-
-
-def _distance(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.sqrt(((a - b) ** 2).sum(axis=1).mean()))
+    distances = [np.sqrt(((a - b) ** 2).sum(axis=1).mean()) for a, b in pairwise(ends)]
+    return fitted_order(distances, [1 / n for n in steps[:-1]])
 
 
 def _end(
