@@ -118,9 +118,8 @@ def clamped_strip(family: str, columns: int, length: float, material: sim.Materi
     points[:, 0] -= cell / 2
     cloth = flat_cloth(points, faces, material, held=points[:, 0] < 0.51 * cell, lies=True)
     # The small deflection w (V,) [m] under a unit load per area [Pa], linearly.
-    stiffness = (
-        sim.Potential([energies.BendHinge(cloth)]).hessian(cloth.rest_positions).tocsr()[1::3][:, 1::3]
-    )
+    hessian = sim.Potential([energies.BendHinge(cloth)]).hessian(cloth.rest_positions)
+    stiffness = hessian.tocsr()[1::3][:, 1::3]
     free = np.flatnonzero(cloth.free)
     w = np.zeros(cloth.vertex_count)
     w[free] = spla.spsolve(stiffness[free][:, free].tocsc(), cloth.vertex_areas[free])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -50,40 +51,35 @@ def check_result(step: StressStep, result: sim.Result) -> Measurement:
 
     The value of the row is the relative residual, computed independently.
     """
-    terms = "+".join(energy.name for energy in step.potential.energies)
-    status = STATUS.get(result.status, result.status)
-
-    def checked(value: float | None, status: str, reason: str) -> Measurement:
-        return Measurement(value=value, status=status, reason=reason, terms=terms)
-
-    x = result.positions
+    measured = partial(Measurement, terms="+".join(energy.name for energy in step.potential.energies))
+    status, x = STATUS.get(result.status, result.status), result.positions
     if not np.isfinite(x).all():
-        return checked(None, "failed", f"positions that are not finite are called {result.status}")
+        return measured(reason=f"positions that are not finite are called {result.status}")
     if not np.array_equal(x[step.pins], step.guess[step.pins]):
-        return checked(None, "failed", "pinned vertices moved")
+        return measured(reason="pinned vertices moved")
     if status == "diverged" and not np.isfinite(energy_of(step.potential, step.guess)[0]):
-        return checked(None, status, result.reason)
+        return measured(status=status, reason=result.reason)
     optimum = optimality_of(step, x)
     if not np.isfinite(optimum.residual):
-        return checked(None, "failed", f"a gradient that is not finite is called {result.status}")
+        return measured(reason=f"a gradient that is not finite is called {result.status}")
+    measured = partial(measured, value=optimum.residual)
     (before, size), (after, _) = energy_of(step.potential, step.guess), energy_of(step.potential, x)
     if not after <= before + EVALUATION_ROUND_OFF * size:
-        return checked(optimum.residual, "failed", f"the energy rose from {before:.17g} to {after:.17g} J")
+        return measured(reason=f"the energy rose from {before:.17g} to {after:.17g} J")
     if status != "ok":
-        lost = int(
-            (corner_areas(x[step.potential.cloth.faces]) < COLLAPSED * step.potential.cloth.areas).sum()
-        )
+        areas = corner_areas(x[step.potential.cloth.faces])
+        lost = int((areas < COLLAPSED * step.potential.cloth.areas).sum())
         collapse = f"; {lost} triangles collapsed, where a hinge's energy jumps: no minimum need exist"
         reason = f"{result.reason} ({result.iterations} iterations){collapse if lost else ''}"
-        return checked(optimum.residual, status, reason)
+        return measured(status=status, reason=reason)
     if optimum.residual > max(RELATIVE_RESIDUAL, optimum.round_off):
-        claim = f"claims convergence at a relative residual of {optimum.residual:.3g}"
-        return checked(optimum.residual, "failed", claim)
+        return measured(reason=f"claims convergence at a relative residual of {optimum.residual:.3g}")
     if optimum.lowest_curvature < -optimum.zero_curvature:
-        claim = f"claims convergence on a saddle: curvature {optimum.lowest_curvature:.3g} N/m"
-        return checked(optimum.residual, "failed", claim)
+        return measured(
+            reason=f"claims convergence on a saddle: curvature {optimum.lowest_curvature:.3g} N/m"
+        )
     excused = "; tolerance at round-off" if optimum.residual > RELATIVE_RESIDUAL else ""
-    return checked(optimum.residual, "ok", f"{result.iterations} iterations{excused}")
+    return measured(status="ok", reason=f"{result.iterations} iterations{excused}")
 
 
 def energy_of(potential: sim.Potential, x: np.ndarray) -> tuple[float, float]:

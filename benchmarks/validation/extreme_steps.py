@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,7 @@ import numpy as np
 import reference_sim as sim
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.validation.case import Measurement, known_answer
-from benchmarks.validation.convergence_check import (
-    RELATIVE_RESIDUAL,
-    StressStep,
-    solve_and_check,
-)
+from benchmarks.validation.convergence_check import RELATIVE_RESIDUAL, StressStep, solve_and_check
 from reference_sim import energies
 
 CELLS, SIZE, DT = 8, 0.4, 1.0 / 30.0
@@ -103,12 +99,13 @@ REST_SHAPES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 
 
-def _ball(radius: float, centre: tuple[float, float, float]) -> sim.Obstacle:
+def ball(radius: float, *centre: float) -> sim.Obstacle:
+    """Return a sphere of that radius and centre [m]."""
     points, faces = sphere(radius, 10)
     return sim.Obstacle(points + np.array(centre), faces)
 
 
-def _blade() -> sim.Obstacle:
+def blade() -> sim.Obstacle:
     """Return a box of 2 mm with an edge across the sheet."""
     points, faces = sphere(1.0, 6)
     points = points / np.abs(points).max(axis=1, keepdims=True)
@@ -116,10 +113,10 @@ def _blade() -> sim.Obstacle:
 
 
 BODIES: dict[str, Callable[[], sim.Obstacle]] = {
-    "ball": lambda: _ball(0.08, (0.003, -0.02, 0.002)),  # vertices start up to 6 cm deep
-    "big ball": lambda: _ball(1.0, (0.05, 0.05, 0.02)),  # the whole sheet is deep inside
-    "blade": _blade,
-    "ball far below": lambda: _ball(0.08, (0.003, -3.0, 0.002)),  # reached within one fast step
+    "ball": partial(ball, 0.08, 0.003, -0.02, 0.002),  # vertices start up to 6 cm deep
+    "big ball": partial(ball, 1.0, 0.05, 0.05, 0.02),  # the whole sheet is deep inside
+    "blade": blade,
+    "ball far below": partial(ball, 0.08, 0.003, -3.0, 0.002),  # reached within one fast step
 }
 
 STIFF_HINGE = {"start": "folded by 180", "speed": "closing at 30 rad/s", "bending": 1e4}

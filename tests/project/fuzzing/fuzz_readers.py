@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import faulthandler
 import json
-import os
+import pickle
 import random
 import re
+import shutil
 import sys
 import time
 import traceback
@@ -20,6 +21,10 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import meshio
+import numpy as np
+import pyvista
 
 from benchmarks.external.roll_out_files import RollOutFileError, read_roll_out
 from benchmarks.results.row import ResultsError
@@ -29,20 +34,24 @@ from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.array_file import ArrayFileError, read_arrays
 from reference_sim.files.mesh_files import read_mesh
-from reference_sim.trajectory import read_point_cache
+from reference_sim.trajectory import read_point_cache, write_obj, write_point_cache
 from snug.body.parametric_body import Body
 from snug.body.skeleton import BodyError
 from snug.body.smpl_files import read_body
 from snug.file_options import GarmentFile, MotionFileOptions
 from snug.garments.garment import GarmentError
 from snug.garments.reading import read_garment
+from snug.garments.templates import find_template
 from snug.motion.files import load_motions
 from snug.motion.motion import MotionError
+from snug.networks.garment_network import make_network
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
-from tests.project.fuzzing import samples
-from tests.reports.report_folder import all_rows
+from snug.recipe import DEFAULT
+from tests.reports.report_folder import all_rows, declaration
 from tests.snug.body.other_bodies import smpl_arrays
+from tests.snug.motion.cmu_clips import amc_frame, cmu_like
+from tests.snug.motion.motion_forms import bvh
 
 NUMBERS = (b"-1", b"0", b"1e300", b"nan", b"inf", b"99999999999999999999", b"9" * 5000, b"1000000000", b"")
 VALUES = (None, True, -1, 0, 1e300, 10**30, "x", "\0" * 300, [], {}, [[]], {"a": {}}, float("nan"))
@@ -92,15 +101,63 @@ def values_of(data: bytes, draw: random.Random) -> bytes:
     return json.dumps(value).encode()
 
 
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+POSITIONS = np.stack([CORNERS, CORNERS + 0.1])
+MESH = meshio.Mesh(CORNERS, [("triangle", FACES)])
+SURFACE = pyvista.PolyData.from_regular_faces(CORNERS, FACES)
+ROLLED_OUT = Trajectory(
+    POSITIONS, FACES, np.array([0.0, 0.1]), np.zeros(2), "ok", frame_fields={"iterations": np.arange(2.0)}
+)
+POSES = np.random.default_rng(0).normal(0.0, 0.1, (6, 72))
+POSES[:, :3] = [np.pi / 2, 0.0, 0.0]
+PATH = np.tile([0.0, 0.0, 0.9], (6, 1))
+AMASS = {"poses": POSES, "trans": PATH, "mocap_framerate": np.array(60.0)}
+Y_UP = np.where(np.arange(72) < 3, 0.0, POSES).reshape(-1, 24, 3)
+ROLL_OUT = {"positions": POSITIONS, "faces": FACES, "fps": np.array(30.0)}
+HOOD = {"pred": POSITIONS, "cloth_faces": FACES, "obstacle": POSITIONS, "obstacle_faces": FACES}
+CLIP = ":FULLY-SPECIFIED\n:DEGREES\n" + amc_frame(1) + amc_frame(2)
+
+
+@cache
+def body() -> dict[str, np.ndarray]:
+    return smpl_arrays(Body.load())
+
+
+@cache
+def model() -> TrainedModel:
+    network = make_network("pbns", 7, 4, DEFAULT, seed=0)
+    return TrainedModel("pbns", network, DEFAULT, history=[{"step": 1.0}])
+
+
+def write_shirt(path: Path) -> None:
+    made = find_template("tshirt").tailor(Body.load(), vertices=200)
+    write_obj(path, made.rest_positions, made.faces)
+
+
+def write_header(path: Path) -> None:
+    model().save(path.with_name("model.safetensors"))
+    path.write_text(json.dumps(read_tensors(path.with_name("model.safetensors"))[1]))
+
+
+def write_run(path: Path) -> None:
+    """Write a run beside the path, and its run.json or results.csv at the path."""
+    settings = {"preset": "smoke", "stages": [{"name": "cells", "seconds": 1.0}], "earlier": []}
+    folder = RunFolder(path.with_name("valid run"))
+    folder.write_rows(all_rows())
+    folder.write_config(declaration(all_rows(), **settings, started="2030-01-02T03:04:05+00:00"))
+    path.write_bytes((folder.path / RUN_FILES[path.suffix]).read_bytes())
+
+
 class Reader(NamedTuple):
-    """A valid file, what reads it, and what may be raised. mutate: of bytes, or of the values in JSON."""
+    """What writes a valid file, what reads it, and what may be raised. mutate: bytes, or values of JSON."""
 
     name: str
     suffix: str
-    make: Callable[[], bytes]
+    write: Callable[[Path], object]
     read: Callable[[Path], object]
     error: type[Exception]
-    mutate: Callable[[bytes, random.Random], bytes]
+    mutate: Callable[[bytes, random.Random], bytes] = bytes_of
 
 
 def read_cloth(path: Path) -> None:
@@ -109,82 +166,78 @@ def read_cloth(path: Path) -> None:
 
 
 def read_material(path: Path) -> None:
-    mesh = path.with_suffix(".obj")
-    mesh.write_bytes(SHIRT())
-    read_garment(GarmentFile(path=mesh, material=path), Body.load())
+    write_shirt(path.with_suffix(".obj"))
+    read_garment(GarmentFile(path=path.with_suffix(".obj"), material=path), Body.load())
 
 
 def read_joints(path: Path) -> None:
-    path.with_suffix(".bvh").write_bytes(samples.bvh_text())
+    path.with_suffix(".bvh").write_text(bvh(Y_UP, PATH, 60.0))
     load_motions(path.with_suffix(".bvh"), options=MotionFileOptions(joint_map=path))
 
 
 def read_amc(path: Path) -> None:
-    path.with_suffix(".asf").write_bytes(samples.skeleton_text())
+    path.with_suffix(".asf").write_text(cmu_like())
     load_motions(path)
 
 
 def read_asf(path: Path) -> None:
-    path.with_suffix(".amc").write_bytes(samples.clip_text())
+    path.with_suffix(".amc").write_text(CLIP)
     load_motions(path.with_suffix(".amc"))
 
 
 def read_header(path: Path) -> None:
     """A model whose header says something else, and whose digest is right."""
-    tensors, _ = read_tensors(Path("model.safetensors"))
+    tensors, _ = read_tensors(path.with_name("model.safetensors"))
     write_tensors(path.with_suffix(".safetensors"), tensors, json.loads(path.read_bytes()))
     TrainedModel.load(path.with_suffix(".safetensors"))
 
 
-def read_rows(path: Path, name: str = "results.csv") -> None:
-    """Read a run whose file `name` is the one at `path`, the others intact, up to the report's tables."""
+RUN_FILES = {".csv": "results.csv", ".json": "run.json"}
+
+
+def read_run(path: Path) -> None:
+    """Read a run whose file is the one at `path`, the other intact, up to the report's tables."""
+    from reports import finished_run
     from reports.blocks import Report
-    from reports.finished_run import read_run
     from reports.pdf import content
     from reports.tables import make_tables
 
-    folder = RunFolder(path.parent / "run")
-    folder.write_rows(all_rows())
-    folder.config_path.write_bytes(Path("run.json").read_bytes())
-    (folder.path / name).write_bytes(path.read_bytes())
-    run = read_run(folder)
+    valid, folder = path.with_name("valid run"), RunFolder(path.with_name("run"))
+    shutil.copytree(valid, folder.path, dirs_exist_ok=True)
+    (folder.path / RUN_FILES[path.suffix]).write_bytes(path.read_bytes())
+    run = finished_run.read_run(folder)
     json.dumps(content(Report(run, make_tables(run), {})), allow_nan=False)
 
 
-def read_config(path: Path) -> None:
-    read_rows(path, "run.json")
-
-
-SHIRT, body = cache(samples.shirt), cache(lambda: smpl_arrays(Body.load()))
 READERS: tuple[Reader, ...] = (
-    Reader("arrays", ".npz", samples.arrays(a=samples.CORNERS, b=samples.FACES),
-           read_arrays, ArrayFileError, bytes_of),
-    Reader("body", ".npz", lambda: samples.arrays(**body())(), read_body, BodyError, bytes_of),
-    Reader("AMASS", ".npz", samples.arrays(**samples.amass_arrays()), load_motions, MotionError, bytes_of),
-    Reader("body pickle", ".pkl", lambda: samples.pickled(body())(), read_body, BodyError, bytes_of),
-    Reader("garment", ".obj", SHIRT, lambda path: read_garment(path, Body.load()), GarmentError, bytes_of),
-    Reader("material", ".toml", lambda: samples.MATERIAL, read_material, GarmentError, bytes_of),
-    Reader("joints", ".toml", lambda: samples.JOINTS, read_joints, MotionError, bytes_of),
-    Reader("BVH", ".bvh", samples.bvh_text, load_motions, MotionError, bytes_of),
-    Reader("roll-out", ".npz", samples.arrays(**samples.roll_out()),
-           read_roll_out, RollOutFileError, bytes_of),
-    Reader("roll-out pickle", ".pkl", samples.pickled(samples.hood_arrays()),
-           read_roll_out, RollOutFileError, bytes_of),
-    Reader("PC2", ".pc2", samples.point_cache, read_point_cache, TrajectoryError, bytes_of),
-    Reader("amc", ".amc", samples.clip_text, read_amc, MotionError, bytes_of),
-    Reader("asf", ".asf", samples.skeleton_text, read_asf, MotionError, bytes_of),
-    Reader("OBJ", ".obj", samples.mesh(".obj"), read_cloth, MeshError, bytes_of),
-    Reader("binary PLY", ".ply", samples.mesh(".ply"), read_cloth, MeshError, bytes_of),
-    Reader("OFF", ".off", samples.mesh(".off"), read_cloth, MeshError, bytes_of),
-    Reader("VTK", ".vtk", samples.mesh(".vtk", binary=False), read_cloth, MeshError, bytes_of),
-    Reader("VTP", ".vtp", samples.polydata(".vtp"), read_cloth, MeshError, bytes_of),
-    Reader("VTU", ".vtu", samples.mesh(".vtu"), read_cloth, MeshError, bytes_of),
-    Reader("trajectory", ".vtkhdf", samples.trajectory, Trajectory.load, TrajectoryError, bytes_of),
-    Reader("model", ".safetensors", samples.model_file, TrainedModel.load, ModelFileError, bytes_of),
-    Reader("model's header", ".json", samples.model_header, read_header, ModelFileError, values_of),
-    Reader("results.csv", ".csv", samples.results_csv, read_rows, ResultsError, bytes_of),
-    Reader("run.json", ".json", samples.run_json, read_config, ResultsError, bytes_of),
-    Reader("values of run.json", ".json", samples.run_json, read_config, ResultsError, values_of),
+    Reader("arrays", ".npz", lambda path: np.savez(path, a=CORNERS, b=FACES), read_arrays, ArrayFileError),
+    Reader("body", ".npz", lambda path: np.savez_compressed(path, **body()), read_body, BodyError),
+    Reader("AMASS", ".npz", lambda path: np.savez_compressed(path, **AMASS), load_motions, MotionError),
+    Reader("body pickle", ".pkl", lambda path: path.write_bytes(pickle.dumps(body())), read_body, BodyError),
+    Reader("garment", ".obj", write_shirt, lambda path: read_garment(path, Body.load()), GarmentError),
+    Reader("material", ".toml", lambda path: path.write_text(
+        "young_modulus = 1e5\npoisson_ratio = 0.3\nthickness = 5e-4\n"), read_material, GarmentError),
+    Reader("joints", ".toml", lambda path: path.write_text('pelvis = "pelvis"\nspine1 = "spine1"\n'),
+           read_joints, MotionError),
+    Reader("BVH", ".bvh", lambda path: path.write_text(bvh(Y_UP, PATH, 60.0)), load_motions, MotionError),
+    Reader("roll-out", ".npz", lambda path: np.savez_compressed(path, **ROLL_OUT),
+           read_roll_out, RollOutFileError),
+    Reader("roll-out pickle", ".pkl", lambda path: path.write_bytes(pickle.dumps(HOOD)),
+           read_roll_out, RollOutFileError),
+    Reader("PC2", ".pc2", lambda path: write_point_cache(path, ROLLED_OUT),
+           read_point_cache, TrajectoryError),
+    Reader("amc", ".amc", lambda path: path.write_text(CLIP), read_amc, MotionError),
+    Reader("asf", ".asf", lambda path: path.write_text(cmu_like()), read_asf, MotionError),
+    *(Reader(suffix, suffix, lambda path: MESH.write(path), read_cloth, MeshError)
+      for suffix in (".obj", ".ply", ".off", ".vtu")),
+    Reader("VTK", ".vtk", lambda path: MESH.write(path, binary=False), read_cloth, MeshError),
+    Reader("VTP", ".vtp", lambda path: SURFACE.save(path, binary=False), read_cloth, MeshError),
+    Reader("trajectory", ".vtkhdf", ROLLED_OUT.save, Trajectory.load, TrajectoryError),
+    Reader("model", ".safetensors", lambda path: model().save(path), TrainedModel.load, ModelFileError),
+    Reader("model's header", ".json", write_header, read_header, ModelFileError, values_of),
+    Reader("results.csv", ".csv", write_run, read_run, ResultsError),
+    Reader("run.json", ".json", write_run, read_run, ResultsError),
+    Reader("values of run.json", ".json", write_run, read_run, ResultsError, values_of),
 )  # fmt: skip
 
 
@@ -202,19 +255,18 @@ def problem_of(reader: Reader, path: Path) -> tuple[str, bool]:
 
 def main(count: int, folder: Path) -> dict[str, Any]:
     """Read `count` mutated files over all readers in turn, always the same ones."""
-    os.chdir(folder)
-    problems, refused, slowest = [], 0, 0.0
-    valid = [reader.make() for reader in READERS]
-    samples.run_json()
-    for reader, data in zip(READERS, valid):
-        Path(f"whole{reader.suffix}").write_bytes(data)
+    problems, refused, slowest, valid = [], 0, 0.0, []
+    for reader in READERS:
+        path = folder / f"whole{reader.suffix}"
+        reader.write(path)
         print(reader.name, file=sys.stderr, flush=True)
-        reader.read(Path(f"whole{reader.suffix}"))  # what nobody has touched is read
+        reader.read(path)  # what nobody has touched is read
+        valid.append(path.read_bytes())
     for number in range(count):
         reader, data = READERS[number % len(READERS)], valid[number % len(READERS)]
         path = folder / f"mutated{reader.suffix}"
         path.write_bytes(reader.mutate(data, random.Random(number)))
-        Path("last").write_text(f"{reader.name} {number}")  # to be found after a crash
+        (folder / "last").write_text(f"{reader.name} {number}")  # to be found after a crash
         faulthandler.dump_traceback_later(120, exit=True)
         clock = time.process_time()  # a busy machine makes no problem
         problem, was_refused = problem_of(reader, path)

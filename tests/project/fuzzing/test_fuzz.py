@@ -19,10 +19,11 @@ HERE = Path(__file__).resolve().parent
 
 
 @pytest.mark.parametrize("name", ["arrays", "AMASS", "body pickle", "joints", "BVH", "amc", "asf"])
-def test_some_mutated_files_are_refused_in_one_line(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_some_mutated_files_are_refused_in_one_line(name, tmp_path):
     (reader,) = (reader for reader in READERS if reader.name == name)
-    data, path, refused = reader.make(), tmp_path / f"mutated{reader.suffix}", 0
+    path, refused = tmp_path / f"mutated{reader.suffix}", 0
+    reader.write(path)
+    data = path.read_bytes()
     for number in range(8):
         path.write_bytes(reader.mutate(data, random.Random(number)))
         problem, was_refused = problem_of(reader, path)
@@ -46,7 +47,7 @@ def test_mutated_files_are_refused_in_one_line(tmp_path):
     assert summary["refused"] > 0.7 * count and summary["peak"] < 2000.0 and summary["slowest"] < 10.0
 
 
-@pytest.mark.parametrize("name", [b"a" * 246, b"walk\xff", b"two\nlines", b"=1+1", b"@walk"])
+@pytest.mark.parametrize("name", [b"a" * 246, b"walk\xff", b"two\nlines", b"=1+1"])
 def test_a_motion_that_no_file_can_be_named_after_is_refused(name, tmp_path):
     path = tmp_path / os.fsdecode(name + b".npz")
     path.write_bytes(b"")
