@@ -12,7 +12,7 @@ from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, G
 from snug.recipe import DEFAULT
 from snug.training.checkpoint import Checkpoint
 from snug.training.train_network import train_network
-from tests.project.own_memory import needs_proc, own_memory, slope
+from tests.project.own_memory import needs_proc, own_memory
 from tests.reference_sim.meshes import grid, sphere
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -21,13 +21,13 @@ FRAMES, STEPS = 5000, 20_000
 LOOP = 120  # frames in which the ball goes round
 
 
-def growth(samples: list[tuple[int, int]], unit: str) -> tuple[float, float]:
-    """Slope and its error [bytes] of what is left once everything is loaded and compiled."""
-    late = [(number, 1024 * kilobytes) for number, kilobytes in samples[len(samples) // 10 :]]
-    rate, error = slope(late)
-    first, last = late[0][1] / 1e6, late[-1][1] / 1e6
-    print(f"{first:.1f} to {last:.1f} MB, {rate:.0f} ± {error:.0f} bytes a {unit}")
-    return rate, error
+def growth(samples: list[tuple[int, int]]) -> tuple[float, float]:
+    """Slope and its standard error [bytes] of what is left once everything is loaded and compiled."""
+    number, kilobytes = np.array(samples[len(samples) // 10 :], float).T
+    (rate, _), covariance = np.polyfit(number, 1024 * kilobytes, 1, cov=True)
+    error = float(np.sqrt(covariance[0, 0]))  # samples taken as independent
+    print(f"{kilobytes[0] / 1e3:.1f} to {kilobytes[-1] / 1e3:.1f} MB, {rate:.0f} ± {error:.0f} bytes")
+    return float(rate), error
 
 
 def test_a_simulation_of_many_frames_keeps_the_frames_alone(tmp_path):
@@ -54,20 +54,18 @@ def test_a_simulation_of_many_frames_keeps_the_frames_alone(tmp_path):
     assert made.frames == FRAMES and made.frame_fields["converged"].mean() > 0.99
     moved = np.abs(made.positions[-1] - made.positions[-1 - LOOP // 2]).max()
     assert moved > 0.01  # it was not at rest
-    rate, error = growth(samples, "frame")
+    rate, error = growth(samples)
     kept = 24 * cloth.vertex_count + 3000  # positions; times, counts and energies by name
     assert rate < kept + 3 * error
 
 
 def test_a_training_of_many_steps_keeps_its_history_alone(tmp_path):
     samples: list[tuple[int, int]] = []
-
-    def look(row: dict[str, float]) -> None:
-        samples.append((int(row["step"]), own_memory()))
-
-    recipe = replace(DEFAULT, mixed=0.0, batch=4)
-    checkpoint = Checkpoint(path=tmp_path / "checkpoint.safetensors", minutes=0.1)
-    train_network("snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, recipe=recipe,
-          progress=False, every=400, checkpoint=checkpoint, log=look)  # fmt: skip
-    rate, _ = growth(samples, "step")
+    train_network(
+        "snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, progress=False, every=400,
+        recipe=replace(DEFAULT, mixed=0.0, batch=4),
+        checkpoint=Checkpoint(path=tmp_path / "checkpoint.safetensors", minutes=0.1),
+        log=lambda row: samples.append((int(row["step"]), own_memory())),
+    )  # fmt: skip
+    rate, _ = growth(samples)
     assert rate < 1000  # positions of one frame, kept in each, would be 1800
