@@ -13,7 +13,6 @@ from snug.kinds import KINDS
 from snug.networks.fitted import COMPONENTS, NEIGHBOURS, NearestPoses, PoseRegression
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.training.simulated_data import TargetError
 from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -54,14 +53,6 @@ def test_a_training_pose_has_its_own_offsets_and_a_pose_between_two_is_shared():
     expected = sum(w * offsets[i] for w, i in zip(others, (7, 8, 6, 9))) / sum(others)
     assert NEIGHBOURS == 4 and torch.allclose(network(between[None, None])[0][0, 0], expected, atol=1e-6)
     assert others[0] / others[1] == pytest.approx(9.0, rel=0.05)
-
-
-def test_all_components_without_a_penalty_give_the_training_frames():
-    """Fewer frames than inputs, so that a linear map can hold them all."""
-    poses, offsets = frames(30, inputs=40, vertices=5)
-    network = PoseRegression(40, 5, output_scale=0.5)
-    network.learn(poses, offsets, ridge=0.0)
-    assert torch.allclose(network(poses[:, None])[0][:, 0], offsets, atol=2e-5)
 
 
 def test_the_regression_is_ridge_by_another_road():
@@ -113,27 +104,3 @@ def test_a_fitted_model_follows_its_training_motion_and_loads_as_it_was(kind, tm
     assert np.array_equal(again, positions)
     still = roll_out(loaded, tube_dress(), swaying(40), quasi_static=True).positions
     assert np.abs(still - positions).max() < 2e-5  # it has no dynamics
-
-
-@pytest.mark.parametrize("kind", FITTED)
-def test_a_fit_has_no_seed_and_needs_simulations(kind):
-    motion = swaying(40)
-    first, second = (
-        train_network(kind, tube_dress(), [motion], steps=1, seed=seed, recipe=KINDS[kind].recipe,
-                      trajectories={motion.name: swelling(motion)})
-        for seed in (0, 3)
-    )  # fmt: skip
-    for one, other in zip(first.network.parameters(), second.network.parameters()):
-        assert torch.equal(one, other)
-    with pytest.raises(TargetError, match="simulation of each training motion"):
-        train_network(kind, tube_dress(), [motion], steps=1, seed=0, recipe=KINDS[kind].recipe)
-
-
-def test_the_compiled_frame_finds_the_nearest_of_many():
-    model, _ = fitted("nearest-poses", 43)
-    other = swaying(9, degrees=31.0)
-    features = tube_dress().features(other, model.recipe, feature_set="pose")
-    with torch.no_grad():
-        offsets = model.network(features[:, None])[0][:, 0]
-    posed = tube_dress().skinned(other, smoothing=20, offsets=offsets)
-    assert np.abs(roll_out(model, tube_dress(), other).positions - posed).max() < 3e-6

@@ -11,9 +11,8 @@ import torch
 from snug.body.skeleton import rotation_matrices
 from snug.named_recipes import HANDLES
 from snug.networks.garment_network import make_network, perceptron
-from snug.networks.handles import WIDTHS, HandleError, farthest_points, shape_functions, span
-from snug.networks.roll_out import roll_out
-from snug.training.train_network import train_network, untrained_model
+from snug.networks.handles import WIDTHS, HandleError, shape_functions, span
+from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
 
 COUNT = 20
@@ -56,33 +55,10 @@ def test_handles_move_the_garment_rigidly_and_affinely_without_error(count):
     assert count > 2 or np.abs(columns @ numbers - bent).max() > 1e-3
 
 
-def test_centres_are_farthest_points_and_more_of_them_keep_the_first():
-    rest = np.asarray(tube_dress().garment.rest_positions)
-    few, many = farthest_points(rest, 8), farthest_points(rest, 30)
-    assert (many[:8] == few).all() and len(set(many)) == 30
-
-    def radius(centres):
-        return np.linalg.norm(rest[:, None] - rest[centres], axis=2).min(1).max()
-
-    assert radius(many) < radius(few)
-    chosen = np.linalg.norm(rest[few][:, None] - rest[few], axis=2)[~np.eye(8, dtype=bool)]
-    assert chosen.min() >= radius(few)
-
-
 @pytest.mark.parametrize("count", [0, 150])
 def test_a_number_that_the_garment_cannot_have_is_refused(count):
     with pytest.raises(HandleError, match=f"{count} handles.*150 vertices has 1 to 149"):
         shape_functions(tube_dress().garment, count)
-
-
-def test_a_network_starts_as_skinning():
-    motion, recipe = swaying(6), HANDLES
-    model = untrained_model("handles-20", tube_dress(), [motion], seed=0, recipe=recipe)
-    skinned = tube_dress().skinned(motion, smoothing=recipe.smoothing)
-    assert np.abs(roll_out(model, tube_dress(), motion).positions - skinned).max() > 1e-3
-    for parameter in model.network.last_layers()[0].parameters():
-        torch.nn.init.zeros_(parameter)
-    assert np.abs(roll_out(model, tube_dress(), motion).positions - skinned).max() < 1e-6
 
 
 def test_training_moves_the_numbers_and_leaves_the_shape_functions(trained):
@@ -119,12 +95,3 @@ def test_dynamic_handles_see_the_past_and_stay_in_the_space_of_static_ones():
     last = offsets[0, -1].flatten().detach().numpy()
     numbers = np.linalg.lstsq(columns.numpy(), last)[0]
     assert np.abs(columns.numpy() @ numbers - last).max() < 1e-5 * np.abs(last).max()
-
-
-def test_offsets_lie_in_the_space_that_the_network_names(trained):
-    columns, centre = trained.network.offset_space()
-    features = torch.randn(1, 4, len(trained.network.input_mean))
-    offsets = trained.network(features)[0].flatten(-2)[0]
-    network = trained.network
-    numbers = network.output_scale * network.numbers(network.activations(network.normalise(features)))[0]
-    assert torch.allclose(offsets, numbers @ columns.T + centre, atol=1e-6) and offsets.abs().max() > 1e-5

@@ -10,11 +10,7 @@ from snug.motion.motion import Motion
 from snug.named_recipes import NCS
 from snug.networks.garment_network import make_network
 from snug.networks.ncs import DESCRIBED, LEAD, POSE_NUMBERS, RATES, joint_motion
-from snug.networks.roll_out import roll_out
-from snug.networks.trained_model import TrainedModel
 from snug.training.optimisation_step import Trainer
-from snug.training.train_network import train_network
-from tests.snug.networks.test_regressor import turned
 from tests.snug.training.dressing import leaning, swaying, tube_dress
 
 INPUTS = POSE_NUMBERS + len(DESCRIBED) * RATES
@@ -33,11 +29,6 @@ def network():
     return network
 
 
-@pytest.fixture(scope="module")
-def trained() -> TrainedModel:
-    return train_network("ncs", tube_dress(), [swaying(24)], steps=4, seed=0, recipe=NCS, progress=False)
-
-
 def test_a_fall_without_turning_is_gravity_in_the_axes_of_each_joint():
     motion = leaning(held(swaying(), 5, 12))
     motion.translations[:, 1] -= 0.5 * 9.81 * (np.arange(12) / motion.fps) ** 2
@@ -46,13 +37,6 @@ def test_a_fall_without_turning_is_gravity_in_the_axes_of_each_joint():
     down = pose[:, -3 * len(DESCRIBED) :].reshape(12, -1, 3)
     assert np.abs(np.linalg.norm(down, axis=2) - 1.0).max() < 1e-12
     assert np.abs(rates[2:, :, 9:] - 9.81 * down[2:]).max() < 1e-9 and not rates[:, :, :9].any()
-
-
-def test_inputs_know_no_heading_and_no_place():
-    body, motion = tube_dress().body, leaning(swaying())
-    other = turned(motion, 2.0, np.array([3.0, 0.5, -1.0]))
-    for first, second in zip(joint_motion(body, motion), joint_motion(body, other)):
-        assert np.abs(first - second).max() < 1e-9
 
 
 def test_the_dynamic_branch_adds_nothing_where_nothing_moves(network):
@@ -64,17 +48,6 @@ def test_the_dynamic_branch_adds_nothing_where_nothing_moves(network):
     assert not code.any() and not state.any()
     network.eval()
     assert torch.equal(network(features)[0], network.decode(network.static_code(features)))
-
-
-def test_the_static_code_knows_no_past_and_the_dynamic_one_no_pose(network):
-    network.eval()
-    features, other = torch.randn(1, 9, INPUTS), torch.randn(1, 9, INPUTS)
-    later = torch.cat([other[:, :5], features[:, 5:]], 1)
-    assert torch.equal(network.static_code(later)[:, 5:], network.static_code(features)[:, 5:])
-    assert (network(later)[0] - network(features)[0])[:, 5:].abs().max() > 1e-5
-    posed = features.clone()
-    posed[..., :POSE_NUMBERS] = other[..., :POSE_NUMBERS]
-    assert torch.equal(network.dynamic_code(posed, None)[0], network.dynamic_code(features, None)[0])
 
 
 def test_strange_codes_teach_the_decoder_alone_and_not_by_inertia(network):
@@ -105,11 +78,3 @@ def test_a_window_begins_with_the_state_that_its_lead_leaves():
         features = trainer.data.features[None, max(first - LEAD, 0) : first]
         expected = trainer.network.state_after(features)[:, 0]
         assert torch.allclose(state[:, row], expected, atol=1e-6) and expected.any()
-
-
-def test_poses_held_have_the_static_answer(trained):
-    motion = swaying(8)
-    still = roll_out(trained, tube_dress(), motion, quasi_static=True).positions
-    one = roll_out(trained, tube_dress(), held(motion, 5, 20)).positions
-    assert np.abs(one - one[0]).max() < 1e-6 and np.abs(one[0] - still[5]).max() < 2e-6
-    assert np.abs(roll_out(trained, tube_dress(), motion).positions - still).max() > 1e-6

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 import torch
-from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import axis_angles, rotation_matrices
-from snug.garments.garment import smooth_weights
 from snug.motion.motion import Motion
 from snug.named_recipes import PAPER, RECIPES, find_recipe
 from snug.networks.garment_network import make_network
@@ -44,16 +42,6 @@ def test_inputs_are_normalised_inside(kind):
     assert torch.allclose(network(features)[0], expected, atol=1e-6)
 
 
-def test_pbns_is_one_matrix_per_activation():
-    network = PoseSpaceDeformation(72, 6)
-    features = torch.randn(1, 1, 72)
-    offsets, state = network(features)
-    activations = network.activations(features)[0, 0]
-    matrix = network.offsets.weight.T.reshape(32, 6, 3)  # (32, V, 3)
-    expected = torch.einsum("i,ivc->vc", activations, matrix)
-    assert state is None and torch.allclose(offsets[0, 0], expected, atol=1e-6)
-
-
 def test_default_inputs_know_no_heading_and_no_place():
     dressed, motion = tube_dress(), leaning(swaying())
     moved = turned(motion, 1.1, np.array([3.0, 0.5, -2.0]))
@@ -61,16 +49,6 @@ def test_default_inputs_know_no_heading_and_no_place():
     assert torch.allclose(plain, other, atol=1e-6)
     literal = dressed.features(moved, PAPER) - dressed.features(motion, PAPER)
     assert literal.abs().max() > 0.5
-
-
-def test_default_inputs_begin_with_up_and_the_first_two_columns_of_each_rotation():
-    dressed, motion = tube_dress(), leaning(swaying(4))
-    features = dressed.features(motion, DEFAULT).numpy()
-    turns = Rotation.from_rotvec(motion.poses.reshape(-1, 3)).as_matrix().reshape(4, 24, 3, 3)
-    assert np.allclose(features[:, :3], turns[:, 0].transpose(0, 2, 1) @ [0.0, 1.0, 0.0], atol=1e-6)
-    for joint in range(1, 24):
-        six = features[:, 6 * joint - 3 : 6 * joint + 3]
-        assert np.allclose(six, np.concatenate([turns[:, joint, :, 0], turns[:, joint, :, 1]], 1), atol=1e-6)
 
 
 def test_default_inputs_know_lean_speed_and_shape():
@@ -96,13 +74,6 @@ def test_dresser_agrees_with_the_body_in_the_world():
     rest = torch.as_tensor(body.shaped(betas)[::97]).float()
     posed = skin(rest, weights, dressed.transforms(motion.poses, betas)).double().numpy()
     assert np.abs(posed + dressed.pelvis(motion, betas)[:, None] - expected).max() < 1e-5
-
-
-def test_smoothing_reaches_as_far_on_every_mesh():
-    dressed = tube_dress()  # 150 vertices: 20 sweeps at 1000 are 3 here
-    expected = smooth_weights(dressed.garment.skinning_weights, dressed.garment.faces, 3)
-    assert np.abs(dressed.weights(20).numpy() - expected).max() < 1e-6
-    assert np.abs(dressed.weights(0).numpy() - dressed.garment.skinning_weights).max() < 1e-6
 
 
 def test_rest_follows_the_body_shape():
@@ -184,15 +155,3 @@ def test_closed_forms_hide_no_window_that_is_no_number():
     features[2, 1, 5] = torch.nan
     offsets, _ = network(features)
     assert offsets[2, 1:].isnan().all() and offsets[[0, 1, 3]].isfinite().all()
-
-
-def test_without_gradients_a_network_gives_what_it_trains_with():
-    torch.manual_seed(0)
-    network = Regressor(12, 40, hidden=32, layers=3)
-    features, start = torch.randn(4, 3, 12), 0.3 * torch.randn(3, 4, 32)
-    expected, state = network(features, start)
-    with torch.no_grad():
-        offsets, last = network(features, start)
-        assert network.double()(features.double(), start.double())[0].dtype == torch.float64
-    assert expected.abs().max() > 0.1 and torch.allclose(offsets, expected, atol=1e-6)
-    assert torch.allclose(last, state, atol=1e-6)

@@ -12,7 +12,6 @@ from snug.named_recipes import PAPER
 from snug.networks.garment_network import make_network
 from snug.networks.roll_out import (
     RollOutError,
-    collect_frames,
     prepare_frame_inputs,
     prepare_frames,
     roll_out,
@@ -67,20 +66,6 @@ def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
         prepare_frame_inputs(model, dressed, rest, earlier=before),
     )
     assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
-
-
-def test_a_frame_that_takes_longer_is_known_and_frames_that_are_not_held_are_computed_too():
-    computed = []
-
-    def frames():
-        for frame in range(6):
-            time.sleep(0.03 if frame == 4 else 0.0)
-            computed.append(frame)
-            yield np.full((2, 3), float(frame))
-
-    positions, seconds = collect_frames(frames(), np.array([1, 4]))
-    assert computed == list(range(6)) and positions[:, 0, 0].tolist() == [1.0, 4.0]
-    assert seconds[1] > 0.03 > 3 * seconds[0]
 
 
 @pytest.mark.parametrize("kind", ["snug", "pbns", "santesteban2019", "ncs"])

@@ -40,13 +40,6 @@ def test_an_unknown_name_lists_the_names(packaged):
         TrainedModel.load("snug-tube")
 
 
-def test_a_path_is_no_name(packaged, tmp_path):
-    with pytest.raises(ModelFileError, match="no such model file"):
-        TrainedModel.load(Path("pbns-tube"))
-    with pytest.raises(ModelFileError, match=r"pbns-tube\.safetensors: no such model file"):
-        TrainedModel.load("pbns-tube.safetensors")
-
-
 def test_the_package_has_the_networks_of_the_default_run_and_stays_small():
     assert {"snug-tshirt", "pbns-tshirt", "supervised-tshirt"} <= set(NETWORKS)
     layers = ("reference_sim", "snug", "benchmarks", "reports")

@@ -12,7 +12,7 @@ import torch
 
 from reference_sim import energies
 from snug.recipe import TERMS, Recipe, RecipeError, find_energy
-from snug.training.physics_loss import PhysicsLoss, has_closed_form
+from snug.training.physics_loss import PhysicsLoss
 from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -96,12 +96,6 @@ def test_training_with_it_goes_another_way_and_knows_its_recipe(tethered, kernel
     assert not torch.equal(one, two)
     again = type(with_it).load(with_it.save(tmp_path / "tethered.safetensors"))
     assert again.recipe == tethered and again.recipe != without.recipe
-
-
-def test_a_term_with_a_kernel_uses_it_and_one_without_its_definition(tethered):
-    terms = PhysicsLoss(tube_dress().cloth, tethered, dt=1 / 30).static
-    assert [name for name, term in terms.items() if has_closed_form(term)] == ["strain", "bending", "gravity"]
-    assert list(terms) == ["strain", "bending", "gravity", "tether"]
 
 
 def test_an_energy_of_the_simulator_that_no_recipe_here_has_can_be_trained():

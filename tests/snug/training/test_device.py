@@ -16,11 +16,11 @@ from snug.kernels.skinning import from_lanes, to_lanes
 from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
 from snug.training import contact_planes
-from snug.training.contact_cache import PARTS, ContactCache, Patch
+from snug.training.contact_cache import ContactCache, Patch
 from snug.training.contact_cache_torch import TensorContactCache
-from snug.training.device import CPU, DeviceError
+from snug.training.device import CPU
 from snug.training.optimisation_step import Trainer
-from snug.training.physics_loss import STATIC, on_device
+from snug.training.physics_loss import STATIC
 from snug.training.training_set import TrainingSet
 from tests.snug.training.dressing import planes_of, swaying, tube_dress
 
@@ -72,31 +72,6 @@ def test_definitions_train_as_the_kernels_do(kind, recipe, monkeypatch):
         assert (parameter.grad - theirs).norm() < 2e-3 * parameter.grad.norm() + 1e-9, name
 
 
-def test_torch_search_is_no_worse_than_the_walk():
-    dressed, motion = tube_dress(), swaying()
-    contact = ContactPenalty(dressed.cloth)
-    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
-    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
-    transforms = dressed.transforms(motion.poses[[3, 8]])
-    positions = skin(torch.as_tensor(patch.rest), weights, transforms)
-    garment = skin(dressed.rest(), dressed.weights(5), transforms)[1].numpy()
-    samples = (contact.sample_matrix @ garment + [0.0, 0.05, 0.0]).astype(np.float32)
-    walk, brute = ContactCache(patch, 2), TensorContactCache(patch, 2, CPU)
-    walk.requery(1, samples, positions[1].numpy())
-    brute.requery(1, torch.as_tensor(samples), positions[1])
-    distances = []
-    for anchors in (walk, brute):
-        faces = patch.faces[np.asarray(anchors.faces[1])]
-        last = np.asarray(anchors.barycentric[1]) / PARTS
-        corner = positions[1].numpy()[faces]
-        point = corner[:, 0] + np.einsum("sc,sci->si", last, corner[:, 1:] - corner[:, :1])
-        distances.append(np.linalg.norm(point - samples, axis=1))
-        assert last.min() > -1e-5 and last.sum(1).max() < 1 + 1e-5
-    # Away from the skin the walk keeps an old anchor unless there is one half as far.
-    assert (distances[1] < distances[0] + 1e-5).all() and (distances[0] < 2 * distances[1] + 1e-5).all()
-    assert (brute.faces[0].numpy() == walk.faces[0]).all()
-
-
 @pytest.mark.parametrize("region", [0.2, 0.06])
 def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     """From the anchors of another pose: on one smooth sheet a walk ends where a search ends, unless the rule
@@ -141,23 +116,6 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     for anchors in (fast, slow):
         home = np.linalg.norm(patch.sample_rest - patch.centroids[anchors.faces], axis=-1)
         assert (home[anchors.faces != still.faces] < region).all()
-
-
-def test_torch_planes_are_those_of_numpy():
-    dressed, motion = tube_dress(), swaying()
-    contact = ContactPenalty(dressed.cloth)
-    patch = Patch.around(contact.rest_samples, dressed.body.shaped(), dressed.body.faces)
-    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
-    positions = skin(torch.as_tensor(patch.rest), weights, dressed.transforms(motion.poses[:3]))
-    numbers, torches = ContactCache(patch, 3), TensorContactCache(patch, 3, CPU)
-    frames = np.array([2, 0])
-    points, normals = planes_of(numbers, frames, frames, positions.numpy(), patch.normals(positions.numpy()))
-    chosen = torch.as_tensor(frames)
-    theirs = torches.planes_at(*torches.held(chosen), chosen, positions, torches.normals(positions))
-    assert np.abs(points - theirs[0].numpy()).max() < 1e-6
-    # A normal on the border of two of its 127 steps may fall on either side.
-    off = np.abs(normals - theirs[1].numpy()).max(-1)
-    assert np.mean(off > 1e-6) < 0.01 and off.max() < 0.01
 
 
 MAKERS = (
@@ -225,28 +183,3 @@ def test_lanes_agree_with_the_definition(E, count):
     x[-1, 3] = np.nan
     values, _ = lane_by_lane(fast_kernel(energy, "training_batch"), x)
     assert np.isnan(values[-1]) and np.isfinite(values[:-1]).all()
-
-
-def test_held_energies_have_all_their_arrays_on_the_device():
-    meta = torch.device("meta")
-    twin = on_device(StretchStVK(tube_dress().cloth), meta)
-    tensors = [value for value in vars(twin).values() if isinstance(value, torch.Tensor)]
-    assert len(tensors) == 3 and {tensor.device for tensor in tensors} == {meta}
-    assert {tensor.dtype for tensor in tensors} == {torch.float32, torch.int64}
-    assert not [value for value in vars(twin).values() if isinstance(value, np.ndarray)]
-
-
-@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
-def test_the_harness_hands_the_device_on(tmp_path):
-    """An absent device is refused where the plan is made, and would be refused where training starts."""
-    from benchmarks.plan.make_plan import check_machines
-    from benchmarks.plan.study import read_study
-    from benchmarks.runner.networks import train
-    from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
-
-    dressed, motion = tube_dress(), swaying(12)
-    job = training("snug", motion.name, steps=2, device="cuda")
-    with pytest.raises(DeviceError, match="--device cuda"):
-        check_machines(replace(read_study("smoke"), device="cuda"), tmp_path, "")
-    with pytest.raises(DeviceError, match="--device cuda"):
-        train(job, context(tmp_path, assets_of(dressed, motion)), {})

@@ -1,16 +1,11 @@
 """Training lowers the physics, repeats bit for bit, survives files, and names what goes wrong."""
 
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
-from reference_sim.energies import StretchStVK
-from snug.body.skinning import skin
 from snug.kinds import KINDS
 from snug.named_recipes import PAPER, SUPERVISED
 from snug.networks import trained_model
@@ -46,25 +41,6 @@ def test_training_lowers_the_potential(trained):
     assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 100
 
 
-@pytest.mark.slow
-def test_an_earlier_training_holds_no_memory_while_the_next_runs():
-    code = (
-        "import gc, weakref\n"
-        "from snug.training.optimisation_step import Trainer\n"
-        "from tests.snug.training.test_train_network import short\n"
-        "gc.disable()\n"
-        "short(steps=1)\n"
-        "(earlier,) = [weakref.ref(each) for each in gc.get_objects() if type(each) is Trainer]\n"
-        "alive = []\n"
-        "short(steps=2, every=1, log=lambda row: alive.append(earlier() is not None))\n"
-        "print(alive)\n"
-    )
-    root = Path(__file__).resolve().parents[3]
-    command = [sys.executable, "-c", code]  # other tests leave trainings behind
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    assert done.stdout == "[False, False]\n"
-
-
 @pytest.mark.parametrize(
     ("schedule", "wanted"),
     [("cosine", (1.0, 0.505, 0.01)), ("epochs", (1.0, 1.0, 0.1))],
@@ -77,21 +53,6 @@ def test_rate_follows_its_schedule(schedule, wanted):
         trainer._set_rate(number)
         rate = trainer.optimiser.param_groups[0]["lr"]
         assert rate == pytest.approx(share * PLAIN.learning_rate, rel=1e-9)
-
-
-@pytest.mark.parametrize("decay", [0.0, 0.5])
-def test_weight_decay_takes_its_share_off_weights_that_nothing_else_moves(decay):
-    recipe = replace(PLAIN, weight_decay=decay, schedule="epochs")
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=8, seed=0, recipe=recipe)
-    unread = np.isinf(trainer.data.input_statistics()[1])
-    weights = next(p for p in trainer.network.parameters() if p.shape[-1] == len(unread))
-    before = weights.detach().clone()
-    for number in range(8):
-        trainer.step(number)
-    left = (1 - recipe.learning_rate * decay) ** 8
-    assert unread.any() and not unread.all()
-    assert torch.allclose(weights[:, unread], left * before[:, unread], rtol=1e-5)
-    assert not torch.allclose(weights[:, ~unread], left * before[:, ~unread], rtol=1e-5)
 
 
 def test_model_survives_its_file(trained, tmp_path):
@@ -201,24 +162,6 @@ def test_each_mixed_clip_has_a_body_of_its_own_and_given_motions_the_mean_one():
         assert torch.allclose(batch.rest[row, 0], dressed.rest(betas), atol=1e-6)
         assert torch.allclose(batch.transforms[row], dressed.transforms(motion.poses, betas)[now])
         assert torch.equal(batch.features[row], dressed.features(motion, SHAPED, betas)[now])
-
-
-def test_a_shape_on_another_body_is_strained_as_the_simulator_has_it():
-    """The rest state is the garment's own, whatever body it is on."""
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=1, seed=0, recipe=SHAPED)
-    dressed = trainer.dressed
-    betas = trainer.data.shapes[2]
-    batch = trainer.data.at(trainer.data.first[2] + np.arange(3)[None])
-    x = skin(batch.rest, trainer.weights, batch.transforms)
-    strain = trainer.loss(x, batch.ahead, None)["strain"][0]
-    expected = [
-        StretchStVK(dressed.garment.cloth()).value_and_gradient(points.double().numpy())[0] for points in x[0]
-    ]
-    assert strain.numpy() == pytest.approx(expected, rel=1e-3)
-    unposed = dressed.garment.rest_for(dressed.body, betas)
-    assert (
-        StretchStVK(dressed.garment.cloth()).value_and_gradient(unposed)[0] > 0.01
-    )  # [J]: not at rest there
 
 
 def test_other_skeletons_pose_as_the_body_does():

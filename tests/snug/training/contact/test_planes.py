@@ -14,10 +14,8 @@ from snug.kernels.contact import triangle_adjacency
 from snug.recipe import DEFAULT
 from snug.training import contact_planes
 from snug.training.augmentation import augment
-from snug.training.contact_cache import ContactCache, Patch
-from snug.training.contact_planes import FIRST_NEAR, FIRST_REACH, MARKED, NEAR, REACH
+from snug.training.contact_planes import MARKED, NEAR, REACH
 from snug.training.optimisation_step import Trainer
-from tests.reference_sim.meshes import sphere
 from tests.snug.training.dressing import swaying, tube_dress
 
 MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
@@ -31,54 +29,6 @@ def made(motions=MOTIONS, **options):
 def test_across_a_side_lies_the_face_that_shares_it():
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
     assert triangle_adjacency(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
-
-
-def test_a_sample_far_from_the_body_at_rest_may_meet_all_of_it():
-    body, faces = sphere(2, 0.1)
-    near = body[:5] * 1.2
-    assert len(Patch.around(near, body, faces, region=0.05).faces) < len(faces)
-    far = np.concatenate([near, [[1.0, 0.0, 0.0]]])
-    patch = Patch.around(far, body, faces, region=0.05)
-    assert len(patch.faces) == len(faces)  # as the simulator's rule of regions has it
-    where, _ = patch.search(np.tile([[-0.11, 0.0, 0.0]], (6, 1)), patch.rest)
-    assert body[faces[where[5]]].mean(axis=0)[0] < -0.09
-
-
-def test_first_anchors_are_those_of_a_search_nearby(monkeypatch):
-    monkeypatch.setattr(
-        "snug.training.contact_cache.EXACT", 1.0
-    )  # the dress hangs 2 cm off the skin: a search would change nothing
-    searched = []
-    requery = ContactCache.requery
-    monkeypatch.setattr(
-        ContactCache,
-        "requery",
-        lambda self, frame, *rest: (searched.append(frame), requery(self, frame, *rest)),
-    )
-    trainer = made()
-    monkeypatch.setattr(ContactCache, "requery", requery)
-    assert trainer.contact is not None and trainer.contact.bodies.kept is not None
-    anchors, patch = trainer.contact.cache, trainer.contact.patch
-    at_rest = ContactCache(patch, 1).faces[0]
-    body = trainer.contact.bodies.kept[0]
-    for frame in range(41):  # marks are not all vertices: some move a little more than twice FIRST_NEAR
-        near = [
-            other
-            for other in searched
-            if (other < 30) == (frame < 30) and abs(other - frame) <= FIRST_REACH
-            and np.linalg.norm(body[other] - body[frame], axis=1).max() < 2.6 * FIRST_NEAR
-        ]  # fmt: skip
-        assert any((anchors.faces[frame] == anchors.faces[other]).all() for other in near), frame
-        assert (anchors.faces[frame] != at_rest).any()
-    assert len(set(searched)) == len(searched) and (trainer.contact.age == 0).all()
-    assert 6 <= sum(frame < 30 for frame in searched) <= 20 and sum(frame >= 30 for frame in searched) <= 2
-    hint = at_rest
-    for frame in searched:
-        template = skin(trainer.data.rest, trainer.weights, trainer.data.transforms[frame])
-        samples = (trainer.contact.contact.sample_matrix @ template.numpy()).astype(np.float32)
-        faces, _ = patch.search(samples, body[frame], hint)
-        assert (anchors.faces[frame] == faces).all()
-        hint = anchors.faces[frame]
 
 
 @pytest.mark.parametrize("kernels", [True, False])
@@ -171,25 +121,6 @@ def test_what_is_searched_is_propagated_around_it_but_to_no_other_motion(monkeyp
     assert REACH == 3
     assert propagated(slow, 28, monkeypatch) == [25, 26, 27, 28, 29]
     assert propagated(slow, 20, monkeypatch) == [17, 18, 19, 20, 21, 22, 23]
-
-
-def test_what_has_just_been_searched_borrows_nothing(monkeypatch):
-    monkeypatch.setattr(contact_planes, "REFRESH", 2 / 48)
-    trainer = made([swaying(41, degrees=1.0)])
-    contact = trainer.contact
-    assert contact is not None
-    requery = contact.cache.requery
-
-    def marked(number, *rest, **how):
-        requery(number, *rest, **how)
-        contact.cache.faces[number] = number
-
-    monkeypatch.setattr(contact.cache, "requery", marked)
-    trainer.order = np.array([19, 21, *[0] * 14])  # middle frames 20 and 22
-    contact.age[[20, 22]] = 5
-    trainer.step(0)
-    assert (contact.cache.faces[[20, 22]] == [[20], [22]]).all()
-    assert (contact.cache.faces[[18, 24]] == [[20], [22]]).all()
 
 
 def test_nothing_is_propagated_to_a_frame_in_which_the_body_is_elsewhere(monkeypatch):
