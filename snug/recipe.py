@@ -9,7 +9,7 @@ line says so. Imports nothing heavy, so that a command can list recipes without 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -129,7 +129,11 @@ class Recipe:
         ):
             if getattr(self, option) not in allowed:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
-        self._demand_known(term for term in self.terms if term not in TERMS)
+        for term in (name for name in self.terms if name not in TERMS):
+            try:
+                find_energy(term)
+            except ValueError as error:
+                raise RecipeError(f"recipe option terms: {error}; the recipes here have {TERMS}") from error
         if min(self.window, self.batch, self.window_stride, self.even) < 1:
             raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
@@ -149,16 +153,6 @@ class Recipe:
             if not getattr(self, option) > 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
 
-    @staticmethod
-    def _demand_known(terms: Iterable[str]) -> None:
-        """Raise RecipeError unless all terms are energies of the simulator that can be trained on."""
-        for term in terms:
-            try:
-                find_energy(term)
-            except ValueError as error:
-                here = ", ".join(TERMS)
-                raise RecipeError(f"recipe option terms: {error}; the recipes here have {here}") from error
-
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, for a model file or run.json."""
         return asdict(self)
@@ -166,11 +160,8 @@ class Recipe:
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Recipe:
         """Make a recipe from `as_dict`. Raises RecipeError for an unknown, missing or mistyped option."""
-        known = {field.name for field in fields(cls)}
-        if unknown := sorted(set(values) - known):
-            raise RecipeError(f"unknown recipe option {unknown[0]!r}")
-        if missing := sorted(known - set(values)):
-            raise RecipeError(f"recipe option {missing[0]!r} is missing")
+        if differing := sorted(values.keys() ^ {field.name for field in fields(cls)}):
+            raise RecipeError(f"recipe option {differing[0]!r} is unknown or missing")
         for field in fields(cls):
             value = values[field.name]
             if type(value) not in _READ_AS.get(type(field.default), (type(field.default),)):

@@ -28,12 +28,6 @@ if TYPE_CHECKING:
 
 MODELS = [name for name, kind in KINDS.items() if not kind.fitted]
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
-GONE = {
-    "--threads": "a training has one thread",
-    "--checkpoint-minutes": "a checkpoint is written every minute",
-    "--checkpoint-steps": "a checkpoint is written every minute",
-    "--validate-every": "validations are 200 steps apart; Validation(every=...) in Python",
-}
 EXAMPLES = """examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment shirt.obj,units=cm --body mine.npz    your own garment (see snug.check)
@@ -55,7 +49,6 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         prog="python -m snug.train",
         description="Train a garment network on a dressed body and write it to one file.",
         epilog="\n\n".join((EXAMPLES, GARMENT_WORDS, MOTION_WORDS)),
-        replaced=GONE,
     )
     add = parser.add_argument
     add("--model", choices=MODELS, default="snug", help="network and loss (default: %(default)s)")
@@ -174,8 +167,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         path=out.with_name(f"{out.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
         resume=options.resume,
     )  # fmt: skip
-    if checkpoint.path.is_file() and not options.resume:
-        print(f"note: {checkpoint.path} of a stopped run will be replaced; --resume would go on with it")
     if options.resume and out.is_file() and not checkpoint.path.is_file():
         print(f"{out}: is there, and no checkpoint beside it; nothing to resume")
         return 0
@@ -201,8 +192,6 @@ def print_summary(model: TrainedModel) -> None:
              if name not in ("step", "seconds")]  # fmt: skip
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
     print(f"last steps, {model.unit}, mean over frames: " + "  ".join(terms))
-    for window in model.summary["named_windows"][:5]:
-        print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     if validation := model.summary.get("validation"):
         best, step = validation["best"], validation["best_step"]
         print(f"validation {best:.4g} {model.unit} at step {step}, whose weights are kept")

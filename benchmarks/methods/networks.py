@@ -104,7 +104,7 @@ class CollisionPostProcessing:
         body_faces: np.ndarray,
         body_positions: np.ndarray,
     ) -> None:
-        self.patch = Patch.around(rest_positions, body_rest, body_faces)
+        self.patch = Patch(rest_positions, body_rest, body_faces)
         self.body = body_positions[:, self.patch.body_vertices].astype(np.float32)
         self._faces: np.ndarray | None = None  # found last, where the next search begins
 

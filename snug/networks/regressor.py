@@ -14,8 +14,6 @@ from snug.kernels.gru import run_gru, run_linear
 from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork
 
-HIDDEN, LAYERS = 256, 4
-
 
 class Regressor(GarmentNetwork):
     """SNUG's recurrent network; the state (layers, N, hidden) is that of its gated recurrent units."""
@@ -23,18 +21,12 @@ class Regressor(GarmentNetwork):
     feature_set = "motion"
     sequential = True
 
-    def __init__(
-        self,
-        inputs: int,
-        vertices: int,
-        *,
-        output_scale: float = 1.0,
-        hidden: int = HIDDEN,
-        layers: int = LAYERS,
-    ) -> None:
+    hidden, layers = 256, 4
+
+    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
         super().__init__(inputs, vertices, output_scale=output_scale)
-        self.gru = nn.GRU(inputs, hidden, layers, batch_first=True)
-        self.offsets = nn.Linear(hidden, 3 * vertices)
+        self.gru = nn.GRU(inputs, self.hidden, self.layers, batch_first=True)
+        self.offsets = nn.Linear(self.hidden, 3 * vertices)
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """Return offsets (N, T, V, 3) [m] and the state after the last frame."""

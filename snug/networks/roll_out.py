@@ -162,12 +162,7 @@ def _trajectory(
         frame_seconds=np.empty(0) if seconds is None else seconds,
         status="ok" if finite else "diverged",
         reason="" if finite else "the network gave a position that is not finite",
-        provenance={
-            "method": model.kind,
-            "recipe": model.recipe.name,
-            "seed": model.seed,
-            "motion": motion.name,
-        },
+        provenance=dict(method=model.kind, recipe=model.recipe.name, seed=model.seed, motion=motion.name),
     )
 
 
@@ -180,12 +175,7 @@ class CompiledFrame:
         network: gives the offsets; None skins alone.
     """
 
-    def __init__(
-        self,
-        rest: Tensor,
-        weights: Tensor,
-        network: GarmentNetwork | None = None,
-    ) -> None:
+    def __init__(self, rest: Tensor, weights: Tensor, network: GarmentNetwork | None = None) -> None:
         order, *joints = blocks_of_vertices(weights.numpy())
         unposed = np.zeros((3, VERTEX_BLOCK * (len(joints[0]) - 1)), np.float32)
         unposed[:, : len(order)] = rest.numpy()[order].T
@@ -247,7 +237,7 @@ def prepare_frames(
     Raises:
         RollOutError: if the model does not fit.
     """
-    features = _features(model, dressed, _joined(earlier, motion), betas).numpy()
+    features = _features(model, dressed, earlier.followed_by(motion) if earlier else motion, betas).numpy()
     frame = CompiledFrame(dressed.rest(betas), dressed.weights(model.recipe.smoothing), model.network)
     return _one_by_one(frame, features, dressed, motion, betas)
 
@@ -275,7 +265,7 @@ def prepare_frame_inputs(
     numbers that `prepare_frames` and `prepare_skinned_frames` make for all frames at once. Raises
     RollOutError.
     """
-    whole = _joined(earlier, motion)
+    whole = earlier.followed_by(motion) if earlier else motion
     first = whole.frames - motion.frames
     past = 0 if model is None else FEATURE_SETS[model.network.feature_set]
 
@@ -288,10 +278,6 @@ def prepare_frame_inputs(
         return _features(model, dressed, recent, betas)[-1], transforms, pelvis
 
     return inputs
-
-
-def _joined(earlier: Motion | None, motion: Motion) -> Motion:
-    return motion if earlier is None else earlier.followed_by(motion)
 
 
 def demand_fit(model: TrainedModel, dressed: DressedBody, motion: Motion) -> None:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from torch import Tensor
 
 from snug.networks.garment_network import GarmentNetwork, make_network
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
@@ -17,8 +15,9 @@ from snug.recipe import Recipe
 from snug.trained import trained_networks
 
 MODEL_FORMAT = "snug-model-10"
-_OPTIONAL = ("fps", "triangles", "origin")  # files of before have not all of them
-_COPIED = ("unit", "seed", "steps", "seconds", "setup_seconds", "history", "summary")
+_COPIED = (
+    "unit", "seed", "steps", "seconds", "setup_seconds", "history", "summary", "fps", "triangles", "origin",
+)  # fmt: skip
 
 
 class ModelFileError(TensorFileError):
@@ -87,7 +86,7 @@ class TrainedModel:
             "inputs": int(self.network.input_mean.shape[0]),
             "vertices": self.vertices,
             "pins": [int(pin) for pin in self.network.pins],
-            **{name: getattr(self, name) for name in (*_COPIED, *_OPTIONAL)},
+            **{name: getattr(self, name) for name in _COPIED},
         }
         return write_tensors(Path(path), self.network.state_dict(), metadata)
 
@@ -116,7 +115,6 @@ package: pbns-tshirt, snug-tshirt, supervised-tshirt
             if data["format"] != MODEL_FORMAT:
                 known = f"this version reads {MODEL_FORMAT!r}: train again"
                 raise ModelFileError(f"{path}: format {str(data['format'])[:40]!r}, {known}")
-            _check_sizes(tensors, data)
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
                 data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]
@@ -125,7 +123,6 @@ package: pbns-tshirt, snug-tshirt, supervised-tshirt
                 raise ModelFileError(f"{path}: not the weights of this version's {data['kind']}: train again")
             network.load_state_dict(tensors)
             copied = {name: data[name] for name in _COPIED}
-            copied |= {name: data[name] for name in _OPTIONAL if name in data}
         except ModelFileError:
             raise
         except (LookupError, ValueError, RuntimeError, TypeError, AttributeError) as error:
@@ -153,11 +150,3 @@ def _find_file(path: str | Path) -> Path:
         known = ", ".join(networks)
         raise ModelFileError(f"{path}: neither a model file nor a network of the package: {known}")
     return Path(path)
-
-
-def _check_sizes(tensors: Mapping[str, Tensor], data: Mapping[str, Any]) -> None:
-    """Raise ValueError for sizes that no tensor in the file has: such a network could fill the memory."""
-    sizes = {size for tensor in tensors.values() for size in tensor.shape}
-    for name, factors in (("inputs", (1,)), ("vertices", (1, 3))):
-        if not any(factor * data[name] in sizes for factor in factors):
-            raise ValueError(f"no tensor in it has the size of {name}, {data[name]}")

@@ -105,7 +105,7 @@ class CapturedTrainer(Trainer):
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
         planes = posed = anchors = None
         if self.contact:
-            posed = self.contact.posed(batch)
+            posed = self.contact.bodies.posed(batch)
             anchors = self.contact.walked(rows.flatten(), given["first"], posed, x)
             planes = self.contact.planes_at(anchors, rows.shape, posed)
         terms = self.loss(x, batch.ahead, planes, behind=batch.behind)

@@ -16,8 +16,6 @@ from snug.training.optimisation_step import Trainer
 from snug.training.validation import Validator
 
 CHECKPOINT_FORMAT = "snug-checkpoint-8"
-# Facts of a run that are short enough to be named in a message.
-NAMED_FACTS = ("kind", "seed", "steps", "threads", "vertices", "every")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,11 +42,6 @@ class Checkpoint:
         """Delete the file, if there is one."""
         self.path.unlink(missing_ok=True)
 
-    @property
-    def resumable(self) -> bool:
-        """True if there is a file to continue from, and that is wanted."""
-        return self.resume and self.path.is_file()
-
     def is_due(self, seconds: float) -> bool:
         """Return whether to write one `seconds` [s] after the last."""
         return 0 < 60 * self.minutes < seconds
@@ -61,11 +54,13 @@ class Checkpoint:
         write_tensors(self.path, tensors, header)
 
     def read(self, identity: Mapping[str, Any]) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
-        """Return tensors and state of the run of that identity; None for a file that is to be replaced.
+        """Return tensors and state of the run of that identity; None where there is nothing to go on from.
 
         Raises:
             TensorFileError: for a file of another run or format, or one that cannot be read.
         """
+        if not (self.resume and self.path.is_file()):
+            return None
         try:
             tensors, header = read_tensors(self.path)
         except TensorFileError:
@@ -79,32 +74,23 @@ class Checkpoint:
                 f"{self.path}: no checkpoint of this version, give another name or delete it"
             )
         stored = header.get("of")
-        if not isinstance(stored, dict):
-            raise TensorFileError(f"{self.path}: broken checkpoint; delete it to start anew")
         for name, value in identity.items():
-            if stored.get(name) != value:
-                differing = f"another {name}"
-                if name in NAMED_FACTS:
-                    differing = f"{name} {stored.get(name)} there, {value} here"
+            if not isinstance(stored, dict) or stored.get(name) != value:
                 raise TensorFileError(
-                    f"{self.path}: checkpoint of another run ({differing}); delete it to start anew"
+                    f"{self.path}: checkpoint of another run (another {name}); delete it to start anew"
                 )
         return tensors, header
 
 
 def describe_run(trainer: Trainer, validator: Validator | None, **facts: Any) -> dict[str, Any]:
     """Return the facts that must be equal for two runs to be the same run."""
-    digest = hashlib.sha256()
-    targets = _bytes(trainer.targets.vertices if trainer.targets else trainer.data.ahead)
-    data, weights = trainer.data, trainer.dressed.weights(trainer.recipe.smoothing)
-    sets = [data, validator.data] if validator else [data]
-    seen = [_bytes(part) for of in sets for part in (of.features, of.transforms, of.ahead)]
-    body = trainer.dressed.body
+    digest, data, dressed = hashlib.sha256(), trainer.data, trainer.dressed
+    sets, body = [data, validator.data] if validator else [data], dressed.body
+    tensors = [part for of in sets for part in (of.features, of.transforms, of.ahead)]
+    tensors += [data.rest, trainer.weights, *([trainer.targets.vertices] if trainer.targets else [])]
     shape = (body.template, body.faces, body.shape_directions, body.joint_directions)
-    arrays = [array.tobytes() for array in shape]
-    for part in (*seen, _bytes(data.rest), targets, _bytes(weights), *arrays):
-        digest.update(part)
-    digest.update(trainer.dressed.cloth.Dm_inverse.tobytes())
+    for array in (*(tensor.cpu().numpy() for tensor in tensors), *shape, dressed.cloth.Dm_inverse):
+        digest.update(array.tobytes())
     return {
         "kind": trainer.kind,
         "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},
@@ -117,7 +103,3 @@ def describe_run(trainer: Trainer, validator: Validator | None, **facts: Any) ->
         "material": asdict(trainer.dressed.cloth.material),
         **facts,
     }
-
-
-def _bytes(tensor: Tensor) -> bytes:
-    return tensor.cpu().numpy().tobytes()

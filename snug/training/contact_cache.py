@@ -12,78 +12,61 @@ coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from reference_sim.energies import ContactPenalty
-from reference_sim.geometry.closest_point import FaceSearch, Listed
+from reference_sim.geometry.closest_point import FaceSearch
 from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
-from snug.kernels.contact import PARTS, WALK_SLACK, byte_normals, contact_energy, triangle_adjacency
+from snug.kernels.contact import PARTS, WALK_SLACK, contact_energy, triangle_adjacency
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
 
-@dataclass(frozen=True)
 class Patch:
     """The part of a body that one garment may touch.
+
+    Args:
+        samples: contact samples of the garment (S, 3) [m].
+        body_positions: the body in its T-pose (B, 3) [m].
+        body_faces: (Fb, 3).
+        region: largest distance [m] in the T-pose from a sample to a face it may touch.
 
     Attributes:
         body_vertices: (P,) into the whole body.
         faces: (Q, 3) into the patch.
-        rest: (P, 3) [m] in the T-pose.
-        centroids: (Q, 3) [m] in the T-pose.
-        sample_rest: (S, 3) [m], contact samples of the garment.
-        region: largest distance [m] in the T-pose from a sample to a face it may touch.
+        rest, centroids: (P, 3) and (Q, 3) [m] in the T-pose.
         adjacency: (Q, 3), see snug.kernels.contact.triangle_adjacency.
-        tree: to search the faces with.
-        samples: lists of the faces that they may meet.
+        tree, samples: to search the faces with, and lists of the faces that samples may meet.
+
+    Raises:
+        ValueError: no face of the body lies within `region` of the garment.
     """
 
-    body_vertices: np.ndarray
-    faces: np.ndarray
-    rest: np.ndarray
-    centroids: np.ndarray
-    sample_rest: np.ndarray
-    region: float
-    adjacency: np.ndarray
-    tree: FaceSearch
-    samples: Listed
-
-    @classmethod
-    def around(
-        cls,
+    def __init__(
+        self,
         samples: np.ndarray,
         body_positions: np.ndarray,
         body_faces: np.ndarray,
         *,
         region: float = DEFAULT_REGION,
-    ) -> Patch:
-        """Cut the patch for samples (S, 3) [m] out of a body in its T-pose (B, 3) [m], (Fb, 3)."""
+    ) -> None:
         from scipy.spatial import cKDTree
 
         middles = body_positions[body_faces].mean(axis=1)
         if cKDTree(middles).query(samples)[0].min() >= region:
             raise ValueError(f"no body face lies within {region} m of the garment: they do not fit together")
         kept = body_faces[reachable_faces(samples, middles, region)]
-        body_vertices, flat = np.unique(kept, return_inverse=True)
-        faces = flat.reshape(-1, 3).astype(np.int32)
-        rest = body_positions[body_vertices].astype(np.float32)
-        centroids = rest[faces].mean(axis=1)
-        tree = FaceSearch(faces, centroids)
-        return cls(
-            body_vertices=body_vertices,
-            faces=faces,
-            rest=rest,
-            centroids=centroids,
-            sample_rest=samples.astype(np.float32),
-            region=region,
-            adjacency=triangle_adjacency(faces),
-            tree=tree,
-            samples=tree.listed(samples, region),
-        )
+        self.body_vertices, flat = np.unique(kept, return_inverse=True)
+        self.faces = flat.reshape(-1, 3).astype(np.int32)
+        self.rest = body_positions[self.body_vertices].astype(np.float32)
+        self.centroids = self.rest[self.faces].mean(axis=1)
+        self.sample_rest, self.region = samples.astype(np.float32), region
+        self.adjacency = triangle_adjacency(self.faces)
+        self.tree = FaceSearch(self.faces, self.centroids)
+        self.samples = self.tree.listed(samples, region)
 
     def search(
         self, points: np.ndarray, positions: np.ndarray, anchor_faces: np.ndarray | None = None, *,
@@ -104,20 +87,9 @@ class Patch:
         """
         self.tree.refit(positions)
         nearest = self.tree.nearest(
-            points,
-            hints=anchor_faces,
-            samples=self.samples,
-            exact=np.inf if exact else EXACT,
+            points, hints=anchor_faces, samples=self.samples, exact=np.inf if exact else EXACT
         )
         return nearest.faces, nearest.barycentric[:, 1:]
-
-    def normals(self, positions: np.ndarray) -> np.ndarray:
-        """Return area-weighted vertex normals of positions (N, P, 3) float32, int8, 127 times unit length.
-
-        A byte is enough (0.3 degrees): planes interpolate them and make the result unit length again. With
-        thousands of frames cached, memory counts.
-        """
-        return byte_normals(positions, self.faces)
 
 
 def quantise(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
@@ -135,10 +107,8 @@ class ContactCache:
     """One anchor per frame and sample."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
-        faces, barycentric = quantise(
-            *patch.search(patch.sample_rest, patch.rest, exact=True), len(patch.faces)
-        )
-        self.patch = patch
+        anchors = patch.search(patch.sample_rest, patch.rest, exact=True)
+        self.patch, (faces, barycentric) = patch, quantise(*anchors, len(patch.faces))
         self.faces = np.repeat(faces[None], frames, axis=0)
         self.barycentric = np.repeat(barycentric[None], frames, axis=0)
 
@@ -169,27 +139,13 @@ class ContactCache:
             normals: (R, P, 3).
             walk: whether anchors near the skin first walk to where their samples are, and stay there.
         """
-        values = np.zeros((len(x), TRAINING_LANES), np.float32)
+        values, patch = np.zeros((len(x), TRAINING_LANES), np.float32), self.patch
+        body = positions, normals, patch.faces.view(np.uint32), patch.adjacency, patch.centroids
+        limits = np.float32(patch.region**2), np.float32(WALK_SLACK), walk
         contact_energy(
-            x,
-            *_samples(contact),
-            contact.power,
-            frames,
-            rows,
-            positions,
-            normals,
-            self.patch.faces.view(np.uint32),
-            self.patch.adjacency,
-            self.patch.centroids,
-            self.patch.sample_rest,
-            np.float32(self.patch.region**2),
-            np.float32(WALK_SLACK),
-            walk,
-            self.faces,
-            self.barycentric,
-            values,
-            gradients,
-        )
+            x, *_samples(contact), contact.power, frames, rows, *body, patch.sample_rest, *limits,
+            self.faces, self.barycentric, values, gradients,
+        )  # fmt: skip
         return values
 
     def requery(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:

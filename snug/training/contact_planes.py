@@ -9,7 +9,7 @@ claims a contact that is none, or misses a thigh that stands in the hem.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from torch import Tensor
 
 from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
+from snug.kernels.contact import byte_normals
 from snug.kernels.skinning import FastSkin
 from snug.training.contact_cache import ContactCache, Patch
 from snug.training.contact_cache_torch import Anchors, TensorContactCache, first_places
@@ -161,10 +162,10 @@ class TrainingContact:
         body, device = data.dressed.body, data.device
         self.data, self.contact = data, contact
         self.kernels, self.age = kernels, np.zeros(data.frames, np.int64)
-        self.patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
+        self.patch = Patch(contact.rest_samples, body.shaped(), body.faces)
         frames = data.frames
         self.cache: ContactCache | TensorContactCache
-        normals: Callable[[Any], Any] = self.patch.normals
+        normals: Callable[[Any], Any] = partial(byte_normals, faces=self.patch.faces)
         if kernels:
             self.cache = ContactCache(self.patch, frames)
         else:
@@ -176,10 +177,6 @@ class TrainingContact:
         self._changed = np.zeros(frames, bool)
         self._before: tuple[np.ndarray | Tensor, ...] | None = None
         self._credit = 0.0
-
-    def posed(self, batch: Batch) -> Posed:
-        """Return the body in the poses of a batch."""
-        return self.bodies.posed(batch)
 
     def walked(self, frames: Tensor, first: Tensor, posed: Posed, x: Tensor) -> Anchors:
         """Return where the anchors of a batch walk; nothing is kept, nothing waited for.
@@ -246,7 +243,7 @@ class TrainingContact:
             last, frame = frame, self._near(done, FIRST_REACH, FIRST_NEAR).stop - 1
             batch = data.at(np.array([[frame]]))
             x = skin(batch.rest, weights, batch.transforms)
-            rows, positions, _ = self.posed(batch)
+            rows, positions, _ = self.bodies.posed(batch)
             self.cache.faces[frame] = self.cache.faces[last]  # a good place to begin
             self.cache.requery(frame, self._samples(x[0, 0]), positions[rows[0]])
             end = self._near(frame, FIRST_REACH, FIRST_NEAR).stop

@@ -28,6 +28,7 @@ GIVE_UP = 100  # updates left out in a row, after which training stops
 RUNAWAY = 10.0  # times the size of the usual energy of a batch
 MEMORY = 0.98  # of the usual energy, per step
 SNAPSHOT_EVERY = 100  # steps between two copies of good weights
+FACTS = ("rate", "summary", "usual", "good_step", "bad_in_a_row", "skipped_in_a_row")  # of a checkpoint
 
 
 class DivergenceGuard:
@@ -45,9 +46,9 @@ class DivergenceGuard:
         self.summary: dict[str, Any] = {
             "high_windows": 0, "skipped_updates": 0, "restored": 0, "named_windows": [],
         }  # fmt: skip
-        self._usual: float | None = None
-        self._bad_in_a_row = self._skipped_in_a_row = 0
-        self._good_step = -1
+        self.usual: float | None = None  # J, mean of a batch
+        self.bad_in_a_row = self.skipped_in_a_row = 0
+        self.good_step = -1
         self._good: dict[str, Tensor] = {}
 
     def judge(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> str:
@@ -72,12 +73,12 @@ class DivergenceGuard:
         spike = math.inf if self.spike is None or number < SETTLING else self.spike
         mean = float(joules.mean(dtype=np.float64))
         peaks = joules > spike
-        runaway = self._usual is not None and mean > max(spike, RUNAWAY * abs(self._usual))
+        runaway = self.usual is not None and mean > max(spike, RUNAWAY * abs(self.usual))
         if runaway:
             if self._count_bad(number, joules, name):
                 return "leave out"
         else:
-            self._usual = mean if self._usual is None else MEMORY * self._usual + (1 - MEMORY) * mean
+            self.usual = mean if self.usual is None else MEMORY * self.usual + (1 - MEMORY) * mean
         if peaks.any():
             self._remark(number, peaks, joules, name, "gradient clipped")
         return "distrust" if runaway else "clip" if peaks.any() else "update"
@@ -91,11 +92,11 @@ class DivergenceGuard:
         Raises TrainingError as `judge` does.
         """
         if np.isfinite(gradient_norm):
-            self._skipped_in_a_row = 0
+            self.skipped_in_a_row = 0
             if verdict != "distrust":
-                self._bad_in_a_row = 0
-                if number - self._good_step >= SNAPSHOT_EVERY or not self._good:
-                    self._good, self._good_step = self._copied(), number
+                self.bad_in_a_row = 0
+                if number - self.good_step >= SNAPSHOT_EVERY or not self._good:
+                    self._good, self.good_step = self._copied(), number
             return True
         first = np.arange(len(joules)) == np.argmax(joules)
         self._leave_out(number, first, joules, name, "gradient not finite, update left out")
@@ -106,25 +107,24 @@ class DivergenceGuard:
     ) -> None:
         self._remark(number, which, joules, name, action)
         self.summary["skipped_updates"] += 1
-        self._skipped_in_a_row += 1
-        if self._skipped_in_a_row >= GIVE_UP:
+        self.skipped_in_a_row += 1
+        if self.skipped_in_a_row >= GIVE_UP:
             last = name(int(np.argmax(which)))
             raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {last}")
         self._count_bad(number, joules, name)
 
     def _count_bad(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> bool:
         """Count one more bad batch; return whether that brought good weights back."""
-        self._bad_in_a_row += 1
-        if self._bad_in_a_row < PATIENCE or not self._good:
+        self.bad_in_a_row += 1
+        if self.bad_in_a_row < PATIENCE or not self._good:
             return False
-        worst = np.nan_to_num(joules, nan=np.inf) == np.nan_to_num(joules, nan=np.inf).max()
-        first = np.arange(len(joules)) == np.argmax(worst)
-        self._remark(number, first, joules, name, f"weights of step {self._good_step} restored, rate halved")
+        first = np.arange(len(joules)) == np.argmax(np.nan_to_num(joules, nan=np.inf))
+        self._remark(number, first, joules, name, f"weights of step {self.good_step} restored, rate halved")
         self._put(self._good)
-        if self._skipped_in_a_row <= PATIENCE:  # data that is not finite would halve it again and again
+        if self.skipped_in_a_row <= PATIENCE:  # data that is not finite would halve it again and again
             self.rate *= 0.5
         self.summary["restored"] += 1
-        self._bad_in_a_row = 0
+        self.bad_in_a_row = 0
         return True
 
     def _remark(
@@ -149,19 +149,14 @@ class DivergenceGuard:
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Return everything that a resumed run needs: tensors and plain facts."""
-        facts = {
-            "rate": self.rate, "summary": self.summary, "usual": self._usual, "good_step": self._good_step,
-            "bad_in_a_row": self._bad_in_a_row, "skipped_in_a_row": self._skipped_in_a_row,
-        }  # fmt: skip
-        return dict(self._good), facts
+        return dict(self._good), {name: getattr(self, name) for name in FACTS}
 
     def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
         """Continue from a `state`."""
         device = next(self.network.parameters()).device
         self._good = {name: tensor.to(device) for name, tensor in tensors.items()}
-        self.rate, self.summary, self._usual = facts["rate"], facts["summary"], facts["usual"]
-        self._good_step, self._bad_in_a_row = facts["good_step"], facts["bad_in_a_row"]
-        self._skipped_in_a_row = facts["skipped_in_a_row"]
+        for name in FACTS:
+            setattr(self, name, facts[name])
 
 
 def live_tensors(network: nn.Module, optimiser: optim.Optimizer) -> list[tuple[str, Tensor]]:

@@ -183,7 +183,7 @@ class Trainer:
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
         planes = posed = None
         if self.contact:
-            posed = self.contact.posed(batch)
+            posed = self.contact.bodies.posed(batch)
             planes = self.contact.planes(batch, posed, x)
         terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
         if self.contact and posed and self._searched_for_high(number, batch.frames, posed, x, terms):

@@ -252,18 +252,14 @@ def relative_vertices(
         raise TargetError("supervised training needs trajectories: a simulation of each training motion")
     relative = []
     for motion in motions:
+        trajectory = f"simulated trajectory of motion {motion.name!r}"
         if motion.name not in trajectories:
-            raise TargetError(
-                f"no simulated trajectory for motion {motion.name!r}: simulate it, or leave it out"
-            )
+            raise TargetError(f"no {trajectory}: simulate it, or leave it out")
         positions = np.asarray(trajectories[motion.name])
         expected = (motion.frames, dressed.vertices, 3)
         if positions.shape != expected:
-            raise TargetError(
-                f"trajectory of motion {motion.name!r} has shape {positions.shape}, expected {expected}"
-            )
+            raise TargetError(f"{trajectory} has shape {positions.shape}, expected {expected}")
         if not (finite := np.isfinite(positions).all(axis=(1, 2))).all():
-            frame = int(np.argmin(finite))
-            raise TargetError(f"trajectory of motion {motion.name!r} is not finite at frame {frame}")
+            raise TargetError(f"{trajectory} is not finite at frame {int(np.argmin(finite))}")
         relative.append(torch.as_tensor(positions - dressed.pelvis(motion)[:, None]).float())
     return torch.cat(relative)

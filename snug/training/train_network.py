@@ -148,9 +148,7 @@ class TrainingLoop:
         self._saved = time.perf_counter()
 
     def _resume(self) -> None:
-        if self.checkpoint is None or not self.checkpoint.resumable:
-            return
-        if (stored := self.checkpoint.read(self._identity())) is None:
+        if self.checkpoint is None or (stored := self.checkpoint.read(self._identity())) is None:
             return
         tensors, state = stored
         try:
@@ -307,7 +305,7 @@ def untrained_model(
     statistics are those of the training motions. Without a recipe it is the kind's.
     """
     kind = find_kind(model_kind)
-    recipe = replace(recipe or find_kind(model_kind).recipe, zero_last_layer=False)
+    recipe = replace(recipe or kind.recipe, zero_last_layer=False)
     data = TrainingSet(
         dressed, motions, recipe, features=kind.network.feature_set, sequences=kind.network.sequential
     )

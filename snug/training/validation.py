@@ -87,7 +87,7 @@ class Validator:
         x = skin(batch.rest + offsets, trainer.weights, batch.transforms)
         planes = None
         if self.contact:
-            posed = self.contact.posed(batch)
+            posed = self.contact.bodies.posed(batch)
             self.contact.search(np.arange(batch.frames.size), batch.frames, posed, x, exact=True)
             planes = self.contact.planes(batch, posed)
         return trainer.loss(x, batch.ahead, planes, behind=batch.behind)

@@ -103,7 +103,7 @@ STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
 @pytest.mark.parametrize(
     ("kind", "first", "then", "message"),
     [
-        ("snug", {}, {"seed": 1}, "seed 0 there, 1 here"),
+        ("snug", {}, {"seed": 1}, "another seed"),
         ("snug", {}, {"clips": [swaying(31)]}, "another data"),
         ("snug", {}, {"dressed": DressedBody(DRESSED.body, STIFF)}, "another material"),
         (
@@ -126,7 +126,7 @@ def test_a_checkpoint_of_other_threads_an_older_version_or_broken_is_refused(tmp
     stopped(short, checkpoint=checkpoint, after=1)
     with monkeypatch.context() as patch:
         patch.setattr(torch, "get_num_threads", lambda: 7)
-        with pytest.raises(TensorFileError, match=r"threads \d+ there, 7 here"):
+        with pytest.raises(TensorFileError, match="another threads"):
             short(checkpoint=checkpoint)
     monkeypatch.setattr(checkpoints, "CHECKPOINT_FORMAT", "snug-checkpoint-99")
     with pytest.raises(TensorFileError, match=r"run\.safetensors: no checkpoint of this version"):

@@ -21,7 +21,6 @@ def test_motions_that_validate_do_not_train():
         ("-o {0}/file/model.safetensors", "file"),
         ("-o {0}", "is a folder; name a file"),
         ("--seed -1", "seed=-1: give a number from 0"),
-        ("--threads 2", "a training has one thread"),
         ("--patience 3", "--patience 3: add --validation NAME"),
         ("--motions {0}/nowhere", "nowhere"),
         ("--validation dance_turn", DANCE),

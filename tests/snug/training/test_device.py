@@ -12,6 +12,7 @@ from torch.overrides import TorchFunctionMode
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.kernels.fast_kernels import fast_kernel
 from snug.body.skinning import skin
+from snug.kernels.contact import byte_normals
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
@@ -79,11 +80,11 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     """
     dressed, motion = tube_dress(), swaying()
     contact, body = ContactPenalty(dressed.cloth), dressed.body
-    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces, region=region)
+    patch = Patch(contact.rest_samples, body.shaped(), body.faces, region=region)
     weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
     transforms = dressed.transforms(motion.poses[[2, 9]])
     positions = skin(torch.as_tensor(patch.rest), weights, transforms)
-    normals = patch.normals(positions.numpy())
+    normals = byte_normals(positions.numpy(), patch.faces)
     x = skin(dressed.rest(), dressed.weights(5), transforms) + torch.tensor([0.0, 0.03, -0.05])
     samples = torch.stack([torch.as_tensor(contact.sample_matrix @ y).float() for y in x.numpy()])
     frames, rows = np.array([1, 0]), np.arange(2)

@@ -14,7 +14,7 @@ from snug.training.train_network import TrainingLoop
 from snug.training.training_set import TrainingError
 from tests.snug.training.dressing import swaying, tube_dress
 
-PLAIN = replace(DEFAULT, mixed=0.0, schedule="epochs")
+PLAIN = replace(DEFAULT, mixed=0.0)
 
 
 def test_guard_names_a_window_and_keeps_the_weights():
@@ -71,7 +71,7 @@ def test_lost_weights_come_back():
     assert summary["restored"] == 1 and summary["skipped_updates"] == PATIENCE
     assert summary["named_windows"][-1]["action"] == f"weights of step {SNAPSHOT_EVERY} restored, rate halved"
     assert "motion 'sway' frame" in summary["named_windows"][-1]["window"]
-    assert trainer.optimiser.param_groups[0]["lr"] == 0.5 * PLAIN.learning_rate
+    assert trainer.guard.rate == 0.5
     assert (weights_of(trainer) - before).abs().max() < 0.02  # a few steps of 1e-3, and as many back
 
 

@@ -43,7 +43,7 @@ def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
         return [torch.equal(torch.as_tensor(table), held) for table, held in zip(now, before)]
 
     batch = trainer.data.batch(np.arange(4), None)
-    posed = contact.posed(batch)
+    posed = contact.bodies.posed(batch)
     x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.08])
     for vertices, trusted, moved in ((torch.nan * x, True, False), (x, False, False), (x, True, True)):
         assert trainer.loss is not None
@@ -64,7 +64,7 @@ def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
     assert contact is not None
     betas = np.random.default_rng(2).uniform(-3, 3, (2, body.shape_count))
     batch = trainer.data.batch(np.array([4, 17]), betas)  # windows of the first motion begin at every frame
-    rows, positions, _ = contact.posed(batch)
+    rows, positions, _ = contact.bodies.posed(batch)
     assert sorted(rows.tolist()) == list(range(6))
     for place, (row, frame) in enumerate(zip(rows, [4, 5, 6, 17, 18, 19])):
         shape = betas[place // 3]
@@ -84,7 +84,7 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
     for place in (1, 2, 3):
         motion, shape, first = clips[place], data.shapes[place], data.first[place]
         batch = data.at(first + np.array([[3, 4, 5]]))
-        rows, positions, _ = contact.posed(batch)
+        rows, positions, _ = contact.bodies.posed(batch)
         whole = body.vertices(motion.poses[3:6], motion.translations[3:6], betas=shape)[
             :, contact.patch.body_vertices
         ]

@@ -11,6 +11,7 @@ import torch
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.energies.bend_hinge import dihedral_angles
 from snug.body.skinning import skin
+from snug.kernels.contact import byte_normals
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.named_recipes import PAPER, PBNS_SPRINGS, RECIPES
 from snug.recipe import DEFAULT, Recipe
@@ -117,7 +118,7 @@ def test_contact_search_finds_the_closest_allowed_point():
     contact = ContactPenalty(dressed.cloth)
     body = dressed.body
     # A region this small leaves many a sample's nearest skin out of bounds when the trunk bends.
-    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces, region=0.07)
+    patch = Patch(contact.rest_samples, body.shaped(), body.faces, region=0.07)
     weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
     transforms = dressed.transforms(motion.poses[[8]])
     skin_now = skin(torch.as_tensor(patch.rest), weights, transforms)[0].numpy()
@@ -158,13 +159,13 @@ def test_contact_search_finds_the_closest_allowed_point():
 def test_energy_at_anchors_is_that_of_their_planes(recipe):
     dressed, motion = tube_dress(), swaying()
     contact, body = make_contact(dressed.cloth, recipe), dressed.body
-    patch = Patch.around(contact.rest_samples, body.shaped(), body.faces)
+    patch = Patch(contact.rest_samples, body.shaped(), body.faces)
     weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
     transforms = dressed.transforms(motion.poses[[2, 9]])
     skin_now = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
     garment = skin(dressed.rest(), dressed.weights(5), transforms)
     x = garment - torch.tensor([0.0, 0.0, 0.05])  # the back a little off the skin, the front deep under it
-    anchors, frames, normals = ContactCache(patch, 3), np.array([2, 0]), patch.normals(skin_now)
+    anchors, frames, normals = ContactCache(patch, 3), np.array([2, 0]), byte_normals(skin_now, patch.faces)
     for row, frame in enumerate(frames):
         samples = (contact.sample_matrix @ x[row].numpy()).astype(np.float32)
         anchors.requery(int(frame), samples, skin_now[row])
