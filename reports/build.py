@@ -29,7 +29,7 @@ class Built:
 
     Attributes:
         pdf: path of the PDF.
-        problems: a sentence for each file that could not be read, and for each gap in the rows.
+        problems: a sentence for each file that could not be read, times of several machines, edited files.
         answer: page one in few lines of text, empty for a run that has none.
     """
 
@@ -69,14 +69,9 @@ def build_report(run_dir: str | Path) -> Built:
 
 
 def gaps(run: Run) -> Iterator[str]:
-    """Name what rows lack that numbers need: unit, machine, reason of a bad end; times of two machines."""
+    """Name what a reader of the numbers has to know first: times of two machines, files that were edited."""
     rows = run.frame
-    bad = rows[rows["status"] != "ok"]
     times = rows[rows["unit"].isin(("s", "ms")) & rows["value"].notna()]
-    for column, asked in (("unit", rows), ("hardware", rows), ("reason", bad)):
-        if len(none := asked[asked[column] == ""]):
-            scenes = ", ".join(dict.fromkeys(none["scene"][:SHOWN]))
-            yield f"results.csv: {len(none)} rows have no {column}, the first of {scenes}"
     if len(machines := sorted(set(times["hardware"]) - {""})) > 1:
         yield f"results.csv: times are of several machines: {', '.join(machines)}"
     if run.changed:
@@ -90,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m reports.build",
         description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run.",
         epilog="Exit status: 0 when all is made, 1 when a file of the run could not be read (the report "
-        "names it), was edited, or rows lack unit, machine or reason, 2 when RUN_DIR is no run folder.",
+        "names it), was edited, or times are of several machines, 2 when RUN_DIR is no run folder.",
     )
     parser.add_argument("run_dir", metavar="RUN_DIR", help="folder with run.json and results.csv")
     options = parser.parse_args(arguments)

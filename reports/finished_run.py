@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
@@ -16,7 +15,7 @@ from benchmarks.results import run_folder
 from benchmarks.results.protocol import is_member, one_protocol
 from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.files.array_file import ArrayFileError, read_array, read_arrays
+from reference_sim.files.array_file import read_arrays
 from reference_sim.trajectory import Trajectory, TrajectoryError
 
 STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
@@ -39,13 +38,6 @@ class RollOuts:
     def body(self, scene: str) -> Trajectory | None:
         """Return the moving body of the scene, None where there is none to be read."""
         return self._read(self.folder.trajectory_path(scene, "body")) if self.folder else None
-
-    def rest_areas(self, scene: str) -> np.ndarray | None:
-        """Return areas (F,) [m^2] at rest of the faces of the scene's garment, None where unknown."""
-        try:
-            return read_array(self.folder.rest_areas_path(scene)) if self.folder else None
-        except ArrayFileError:
-            return None
 
     def _read(self, path: Path) -> Trajectory | None:
         """Return the trajectory in a file with the curves that lie beside it, None without one."""

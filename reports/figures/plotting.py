@@ -67,21 +67,6 @@ KNOWN = {
     "xpbd": Style("XPBD", "#332288", "<"),
     "simulation-tolerance": Style("Simulation to a tolerance", "#555555", "*"),
     "simulation-dt": Style("Simulation with smaller steps", "#882255", "*"),
-    # Solvers that start from another method have the colour of that method.
-    "snug+lbfgs": Style("SNUG + L-BFGS", "", "X", "-."),
-    "snug+fast-lbfgs": Style("SNUG + fast L-BFGS", "", "X", "--"),
-    "snug+newton": Style("SNUG + Newton", "", "P", "-."),
-    "skinning+lbfgs": Style("Skinning + L-BFGS", "", "X", "-."),
-    # So has the least that a network's own space allows.
-    "handles-floor": Style("Floor of handles", "", "p", ":"),
-    # So have networks that learn from more or fewer frames.
-    "snug-data": Style("SNUG", "", "o"),
-    "pbns-data": Style("PBNS", "", "^", "-."),
-    "supervised-data": Style("Supervised", "", "s", (0.0, (6.0, 1.5))),
-    "santesteban2019-data": Style("Santesteban 2019", "", "d", (0.0, (1.0, 1.0))),
-    "tailornet-data": Style("TailorNet", "", "H", ":"),
-    "nearest-poses-data": Style("Nearest poses", "", "8", ":"),
-    "pose-regression-data": Style("Ridge on principal components", "", "h", ":"),
 }
 # Roles that a figure shows when it has no room for all; external: roll-outs of the user.
 LEADING = ("reference", "baseline", "network", "external")
@@ -96,26 +81,23 @@ _SPARE_MARKERS = ("h", "8", "d", "v", "p")
 def family_style(run: Run, method: ReportedMethod) -> Style:
     """Return the style of a method's family; an unknown one has a spare colour that depends on its name.
 
-    A method that starts from another has the colour of that one, whether it ran or not; an ablation has the
-    marker of its base.
+    A method that starts from another has the look of that one, whether it ran or not, with a marker of its
+    own where it is a solver; an ablation has the marker of its base alone.
     """
-    name = method.family
-    label = name if method.level is not None else method.label
-    number = zlib.crc32(name.encode())
-    spare = Style(label, _SPARE[number % len(_SPARE)], _SPARE_MARKERS[number % len(_SPARE_MARKERS)])
-    known = KNOWN.get(name)
-    if known and known.colour:
+    label = method.label if method.level is None else method.label.partition(",")[0]
+    if known := KNOWN.get(method.family):
         return replace(known, label=known.label or label)
+    number = zlib.crc32(method.family.encode())
+    spare = Style(label, _SPARE[number % len(_SPARE)], _SPARE_MARKERS[number % len(_SPARE_MARKERS)])
     base = run.methods.get(method.base)
-    if base is method:
-        return spare
-    above = family_style(run, base) if base else KNOWN.get(method.base)
+    above = family_style(run, base) if base and base is not method else KNOWN.get(method.base)
     if above is None:
         return spare
-    if method.role == "ablation" and known is None:
+    if method.role == "ablation":
         return replace(spare, marker=above.marker, line=":")
-    drawn = known or replace(spare, line=":")
-    return replace(drawn, colour=above.colour, label=drawn.label or label)
+    if method.role == "warm-started":
+        return replace(above, label=label, marker="X", line="-.")
+    return replace(above, label=label)
 
 
 def style(run: Run, method: str) -> Style:

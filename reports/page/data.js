@@ -31,7 +31,7 @@ function readValues(bytes, entry) {
   const [frames, count] = entry.shape;
   const levels = bytes.slice(entry.at, entry.at + frames * count);
   for (let k = count; k < levels.length; k++) levels[k] += levels[k - count];
-  return { frames, count, levels, full: entry.full, signed: entry.signed, unknown: new Set(entry.unknown) };
+  return { frames, count, levels, full: entry.full, unknown: new Set(entry.unknown) };
 }
 
 const READERS = {
@@ -101,7 +101,7 @@ function quantile(arrays, share) {
   const found = [];
   for (const array of arrays) {
     for (let k = 0; k < array.levels.length; k += 7) {
-      const part = array.signed ? (array.levels[k] - 128) / 127 : array.levels[k] / 255;
+      const part = array.levels[k] / 255;
       if (part !== 0) found.push(part * part * array.full);
     }
   }

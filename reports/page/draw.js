@@ -8,13 +8,11 @@ uniform mat4 project;
 uniform mat3 turn;
 out vec3 side;
 out float value;
-uniform vec2 scale;
-uniform bool isSigned;
+uniform float scale;
 void main() {
   gl_Position = project * vec4(position, 1.0);
   side = turn * normal;
-  float part = isSigned ? (level * 255.0 - 128.0) / 127.0 : level;
-  value = scale.x + scale.y * part * abs(part);
+  value = scale * level * level;
 }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
@@ -54,7 +52,7 @@ class Drawing {
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(this.program));
     gl.useProgram(this.program);
     this.at = {};
-    for (const name of ['project', 'turn', 'scale', 'isSigned', 'plain', 'coloured']) {
+    for (const name of ['project', 'turn', 'scale', 'plain', 'coloured']) {
       this.at[name] = gl.getUniformLocation(this.program, name);
     }
     gl.enable(gl.DEPTH_TEST);
@@ -145,10 +143,7 @@ class Drawing {
     gl.uniformMatrix3fv(this.at.turn, false, camera.turn);
     gl.uniform3fv(this.at.plain, plain);
     gl.uniform1i(this.at.coloured, values ? 1 : 0);
-    if (values) {
-      gl.uniform1i(this.at.isSigned, values.signed ? 1 : 0);
-      gl.uniform2f(this.at.scale, values.signed ? 0.5 : 0, ((values.signed ? 0.5 : 1) * values.full) / limit);
-    }
+    if (values) gl.uniform1f(this.at.scale, values.full / limit);
     gl.bindVertexArray(mesh.array);
     gl.drawElements(gl.TRIANGLES, mesh.faces.length, gl.UNSIGNED_INT, 0);
   }

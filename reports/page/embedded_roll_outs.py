@@ -16,19 +16,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.sparse
 
 from benchmarks.metrics.curvature import curvature_series
 from benchmarks.results.run_folder import RunFolder
-from reference_sim.geometry.topology import corner_areas
 from reference_sim.obstacle import Obstacle
 from reference_sim.trajectory import Trajectory
 from reports.finished_run import STEP, Run, shown_seeds
 
 STEPS = 2**16 - 1
 FINEST = 1e-4  # [m] of a step: nothing finer is seen, and noise does not deflate
-LEVELS = 255  # of values that are never negative
-HALF_LEVELS = 127  # on either side of 0, of those that may be
+LEVELS = 255  # of values of vertices
 
 
 @dataclass
@@ -53,19 +50,17 @@ class Pack:
         self._add(name, planes, kind="positions", low=[float(x) for x in low], step=step)
         self.entries[name]["shape"] = list(positions.shape)
 
-    def values(self, name: str, values: np.ndarray, *, signed: bool = False) -> None:
-        """Add numbers of vertices (T,V), each byte less that of the frame before.
+    def values(self, name: str, values: np.ndarray) -> None:
+        """Add numbers of vertices (T,V), none negative, each byte less that of the frame before.
 
         A number that is not finite is 0; frames without a finite number are named, and not coloured.
         """
         unknown = np.flatnonzero(~np.isfinite(values).any(axis=1))
         values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        full = max(float(np.abs(values).max(initial=0.0)), 1e-12)
-        root = np.sqrt(np.abs(values) / full)
-        levels = 128 + np.rint(np.sign(values) * HALF_LEVELS * root) if signed else np.rint(LEVELS * root)
-        levels = levels.astype(np.uint8)
+        full = max(float(values.max(initial=0.0)), 1e-12)
+        levels = np.rint(LEVELS * np.sqrt(values / full)).astype(np.uint8)
         changes = np.diff(levels, axis=0, prepend=np.zeros_like(levels[:1]))
-        self._add(name, changes, kind="values", full=full, signed=signed, unknown=unknown.tolist())
+        self._add(name, changes, kind="values", full=full, unknown=unknown.tolist())
 
     def numbers(self, name: str, numbers: np.ndarray) -> None:
         """Add one number per frame (T,), to single precision."""
@@ -128,7 +123,6 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
 
 
 SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
-BLOCK = 32  # frames at a time, to bound memory
 ROOM = 1500  # bytes beside a text: its tags, and what the content says of it
 
 
@@ -168,12 +162,11 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
         body = run.roll_outs.body(scene)
         skin = skin_of(body.positions, body.faces) if body else None
         depths = _depths(cloths, skin) if skin else {}
-        rest = run.roll_outs.rest_areas(scene)
         for method, cloth in cloths.items():
             texts: dict[str, str] = {}
             known = embedded.scenes.get(scene)
             shown = known or {"body": _kept(texts, _body(body)) if body else None, "methods": {}}
-            pack = _cloth(cloth, rest, references[scene], depths.get(method), run.metrics)
+            pack = _cloth(cloth, references[scene], depths.get(method), run.metrics)
             entry = _kept(texts, pack) | {"ending": _ending(cloth)}
             new = {name: text for name, text in texts.items() if name not in embedded.texts}
             budget -= sum(ROOM + len(text) for text in new.values())
@@ -199,19 +192,14 @@ def _ending(cloth: Trajectory) -> str:
 
 
 def _cloth(
-    cloth: Trajectory, rest: np.ndarray | None, reference: Trajectory | None, depths: np.ndarray | None,
-    curves: Container[str],
-) -> Pack:  # fmt: skip
+    cloth: Trajectory, reference: Trajectory | None, depths: np.ndarray | None, curves: Container[str]
+) -> Pack:
     """Pack positions, times, colours, and those numbers per frame that `curves` holds, of a roll-out."""
     pack, faces = Pack(), cloth.faces
     pack.indices("faces", faces)
     pack.numbers("times", cloth.times)
     pack.positions("positions", cloth.positions)
     pack.values("curvature", mean_curvature(cloth.positions, faces))
-    if rest is not None and rest.shape == (len(faces),):
-        blocks = [cloth.positions[k : k + BLOCK] for k in range(0, cloth.frames, BLOCK)]
-        strain = np.concatenate([area_change(block, faces, rest) for block in blocks])
-        pack.values("area", strain, signed=True)
     if reference is not None and _comparable(cloth, reference):
         pack.values("distance", distance(cloth.positions, reference.positions))
     if depths is not None:
@@ -267,15 +255,6 @@ def mean_curvature(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.where(series.area > 0.0, series.curvature, 0.0)
 
 
-def area_change(positions: np.ndarray, faces: np.ndarray, rest_areas: np.ndarray) -> np.ndarray:
-    """Return area over rest area less 1 (T,V) [%], mean over a vertex's faces by rest_areas (F,) [m^2]."""
-    areas = corner_areas(positions[:, faces].reshape(-1, 3, 3)).reshape(len(positions), -1)
-    gather = _gather(faces, positions.shape[1])
-    rest = gather @ np.repeat(rest_areas, 3)
-    now = (gather @ np.repeat(areas, 3, axis=1).T).T
-    return 100.0 * (np.divide(now, rest, out=np.ones_like(now), where=rest > 0.0) - 1.0)
-
-
 def distance(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Return the distance (T,V) [mm] between the same vertices of positions (T,V,3) [m] and a reference.
 
@@ -299,9 +278,3 @@ def skin_of(positions: np.ndarray, faces: np.ndarray) -> Obstacle | None:
         return Obstacle(positions, faces)
     except ValueError:
         return None
-
-
-def _gather(corners: np.ndarray, count: int) -> scipy.sparse.csr_array:
-    """Return (V,3F), which sums values at the corners of faces (F,3) over each vertex."""
-    size = corners.size
-    return scipy.sparse.csr_array((np.ones(size), (corners.ravel(), np.arange(size))), shape=(count, size))

@@ -2,12 +2,10 @@
 
 const MOST = 4;
 const SEQUENTIAL = [[52, 84, 122], [62, 137, 140], [150, 176, 104], [228, 190, 88], [214, 110, 50], [160, 28, 38]];
-const DIVERGING = [[28, 82, 150], [120, 168, 204], [214, 212, 204], [226, 150, 96], [158, 34, 34]];
 const FROM_ZERO = [[112, 132, 156], [240, 208, 110], [222, 118, 52], [150, 22, 40]]; // most of it is 0
 const COLOURS = {
   plain: { title: 'None' },
   curvature: { title: 'Mean curvature', unit: '1/m', stops: SEQUENTIAL },
-  area: { title: 'Change of area from rest', unit: '%', stops: DIVERGING },
   step: { title: 'One-step error', unit: 'mm', stops: SEQUENTIAL, missing: 'step not judged' },
   distance: { title: 'Distance to the simulation', unit: 'mm', stops: SEQUENTIAL },
   depth: { title: 'Depth under the skin', unit: 'mm', stops: FROM_ZERO, through: true }, // the skin would hide it
@@ -141,10 +139,9 @@ function colourScale() {
   const limit = roundUp((quantile(values, BRIGHTEST) || 1) * 1.6 ** Number(byId('limit').value), [1, 1.5, 2, 3, 4, 5, 6, 8]);
   view.limit = limit;
   view.drawing.setColours(own.stops);
-  const signed = values[0].signed;
   byId('scale-title').textContent = `${own.title} [${own.unit}]`;
-  byId('scale-low').textContent = signed ? `−${limit}` : '0';
-  byId('scale-high').textContent = `${signed ? '+' : ''}${numberText(limit)} and more`;
+  byId('scale-low').textContent = '0';
+  byId('scale-high').textContent = `${numberText(limit)} and more`;
   const stops = own.stops.map((stop) => `rgb(${stop.join(',')})`);
   byId('scale-bar').style.background = `linear-gradient(to right, ${stops.join(',')})`;
 }

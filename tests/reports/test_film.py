@@ -57,7 +57,7 @@ def test_a_gif_has_every_frame_in_its_time_and_the_same_bytes_twice(run, tmp_pat
     assert np.abs(half[4][0] - half[4][1]).max() > 100
 
 
-@pytest.mark.parametrize("rate", [15.0, 30.0, 50.0 + 1e-12, 60.0, 120.0])
+@pytest.mark.parametrize("rate", [30.0, 50.0 + 1e-12, 120.0])
 def test_a_gif_takes_its_time_and_no_frame_less_than_browsers_show(tmp_path, rate):
     frames = np.full((120, 8, 120, 3), film.INK, dtype=np.uint8)
     frames[np.arange(120), :, np.arange(120)] = 255  # a line that moves: no frame is like the one before
@@ -119,11 +119,6 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
             assert np.abs(seen[..., 1]).max() <= half and np.abs(seen[..., 0]).max() <= half / film.TALL
     front = camera_axes(0.0)
     assert front[:, 0] == pytest.approx([1.0, 0.0, 0.0]) and front[2, 2] > 0.95  # the body faces +z
-
-
-def test_a_single_frame_has_a_camera():
-    centres, half = film.camera_path(kept_of(np.eye(3)[None]), camera_axes(25.0))
-    assert centres.shape == (1, 3) and half > 0.0
 
 
 @pytest.mark.parametrize(

@@ -57,16 +57,6 @@ def test_the_sentences_of_page_one():
     assert said("How near", SNUG + BESIDE + more) == said("How near", SNUG + BESIDE)
 
 
-def test_page_one_says_how_many_roll_outs_its_numbers_are_over():
-    """A network that diverges in one of two motions has a remark at every number."""
-    gone = row(SCENES[1], "snug", "cost/frame", None, status="diverged", reason="frame 9")
-    rows = of_all([*SNUG, *BESIDE, *PBNS])
-    rows = [gone, *(r for r in rows if (r.scene, r.method) != (SCENES[1], "snug"))]
-    fewer = "(1 of 2 roll-outs)"
-    assert said("How near", rows).startswith("On 2 unseen motions the relative excess is: SNUG 5.0 % (")
-    assert said("How near", rows).count(fewer) == 2
-
-
 def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
     rows = SNUG + BESIDE
     more = [row("skirt/walk", name, "energy/total", 3.0) for name in ("snug", "simulation")]
@@ -77,12 +67,6 @@ def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
     }.items():  # fmt: skip
         scenes = {name: {"role": role} for name, role in zip(SCENES, roles)}
         assert said("How near", rows, scenes=scenes).startswith(f"On {words} the relative excess is: SNUG")
-
-
-def test_run_times_are_of_the_scenes_that_both_have():
-    times = [(SCENES[0], "snug", 9.0), (SCENES[1], "snug", 0.25), (SCENES[1], "simulation", 100.0)]
-    rows = [row(s, m, "cost/frame", t, unit="ms") for s, m, t in times]
-    assert "takes 0.250 ms a frame, the simulation 400 times as long" in said("At what cost", rows)
 
 
 def test_page_one_counts_every_kind_of_ending():
@@ -124,18 +108,6 @@ def test_roll_outs_of_the_user_are_on_page_one_beside_snug_or_alone():
     assert leads(beside, beside.garment_rows)[:3] == ["simulation", "snug", "mine"]
     assert "is: mine " in said("How near", [*BESIDE, *mine])
     assert "mine" in {line[0] for line in make_tables(alone)["overview"].rows}
-
-
-def test_changed_networks_and_other_recipes_lead_where_a_run_has_no_plain_snug():
-    springs = on_two_scenes("snug-springs", 1.0, 9.0)
-    changed = [dataclasses.replace(r, role="ablation", base="snug") for r in springs]
-    run = run_of([*changed, *BESIDE])
-    assert leads(run, run.garment_rows)[:2] == ["simulation", "snug-springs"]
-    both = run_of([*changed, *BESIDE, *SNUG])
-    assert leads(both, both.garment_rows)[:2] == ["simulation", "snug"]
-    names = ("pbns-paper", "snug-paper", "simulation")
-    run = run_of([line for name in names for line in on_two_scenes(name, 1.0, 9.0)])
-    assert leads(run, run.garment_rows) == ["simulation", "snug-paper", "pbns-paper"]
 
 
 def test_the_table_of_page_one_stays_short_and_has_the_last_of_a_family_of_networks():
@@ -182,7 +154,3 @@ def test_every_metric_of_a_printed_table_is_defined_and_no_number_is_infinite_or
     assert definitions["Strain [J]"] == "definition of energy/strain"
     assert "Curvature error [1/m]" in definitions
     assert not re.search(r"\b(nan|inf|NaN|None)\b", json.dumps(made, allow_nan=False))
-
-
-def test_a_method_without_a_family_is_its_own():
-    assert run_of([dataclasses.replace(row(), family="")]).methods["snug"].family == "snug"

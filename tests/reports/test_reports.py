@@ -86,11 +86,6 @@ def test_every_file_of_the_report_is_there(made):
     assert made.report_path.read_bytes().startswith(b"%PDF")
 
 
-def test_the_papers_numbers_are_in_no_file_of_ours(made):
-    for path in made.tables.iterdir():
-        assert "paper" not in path.read_text(encoding="utf-8").lower()
-
-
 def test_made_twice_it_is_the_same_to_the_byte(made):
     def contents() -> dict[str, bytes]:
         return {str(p): p.read_bytes() for p in sorted(made.path.rglob("*")) if p.is_file()}
@@ -109,11 +104,6 @@ def test_pictures_of_roll_outs_that_are_gone_stay_in_the_report(made, tmp_path):
     assert list(kept) == ["frames_tshirt-walk.png", "dots.svg"]
     assert "walk: frame" in kept["frames_tshirt-walk.png"].caption
     assert b"/Subtype/Image" in published.report_path.read_bytes()
-
-
-def test_figures_of_an_earlier_report_are_removed_and_others_stay(made):
-    left = {path.name for path in made.figures.iterdir()}
-    assert left.isdisjoint(OLD) and left.issuperset(KEPT)
 
 
 def test_failed_cells_are_listed_once_with_their_reason(made):
@@ -166,19 +156,6 @@ def test_curves_beside_a_trajectory_are_its_own(tmp_path):
     assert read.roll_outs.cloth(SCENES[0], "snug", 0) is None and "snug.npz" in read.problems[0]
 
 
-def test_rest_areas_that_cannot_be_read_are_unknown(tmp_path):
-    run = run_folder(tmp_path, all_rows())
-    path = run.rest_areas_path(SCENES[0])
-    roll_outs = read_run(run).roll_outs
-    assert roll_outs.rest_areas(SCENES[0]) is None  # no such file
-    path.parent.mkdir(parents=True)
-    np.save(path, np.ones(3))
-    assert roll_outs.rest_areas(SCENES[0]).tolist() == [1.0, 1.0, 1.0]
-    for damaged in (b"", b"PK\x03\x04", path.read_bytes()[:-1]):
-        path.write_bytes(damaged)
-        assert roll_outs.rest_areas(SCENES[0]) is None
-
-
 def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     run = RunFolder(tmp_path)
     run.write_rows(all_rows())
@@ -222,15 +199,8 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
     assert (heat.title, heat.unit) == ("Heat", "J")
 
 
-GAPS = {
-    "rows have no unit": {"unit": ""}, "rows have no hardware": {"hardware": ""},
-    "rows have no reason": {"status": "stalled"}, "times are of several machines": {"hardware": "another"},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("says", GAPS)
-def test_a_gap_in_the_rows_is_named(says):
+def test_times_of_several_machines_are_named():
     times = [row(method=method, metric="cost/frame", unit="ms") for method in ("snug", "pbns")]
     assert list(build.gaps(run_of(times))) == []
-    (gap,) = build.gaps(run_of([times[0], replace(times[1], **GAPS[says])]))
-    assert says in gap
+    (gap,) = build.gaps(run_of([times[0], replace(times[1], hardware="another")]))
+    assert "times are of several machines" in gap

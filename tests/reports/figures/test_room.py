@@ -57,9 +57,6 @@ class Kept(RollOuts):
         moving[:10] += 0.01 * np.arange(10, 0, -1)[:, None, None]
         return mesh(moving, faces, {})
 
-    def rest_areas(self, scene: str) -> np.ndarray:
-        return np.full(18, 0.5 * (0.4 / 3) * (0.5 / 3))
-
 
 def rows_of_all():
     """Rows of every suite that a figure shows."""

@@ -8,9 +8,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from reports.figures.charts import break_even, error_of_page_one
-from reports.figures.figure import Drawing, save_drawing
+from reports.figures.figure import Drawing
 from reports.statistics.pareto import (
-    indistinct,
     points_of,
     run_time,
 )
@@ -40,29 +39,10 @@ def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_p
         assert list(error_of_page_one(run))
 
 
-def test_ablations_are_drawn_where_the_full_recipe_is_not():
-    costs = (("cost/frame", 1.0), ("gap/energy", 0.1))
-    rows = [row("tshirt/walk", m, k, v) for m in ("snug-springs", "newton-1") for k, v in costs]
-    (drawing,) = (part for figure in FIGURES for part in figure(run_of(rows)))
-    assert drawing.name == "error_against_time"
-    rows += [row("tshirt/walk", "snug", *cost) for cost in costs]
-    kept = [r for r in rows if r.method != "newton-1"]
-    assert [part for figure in FIGURES for part in figure(run_of(kept))] == []  # one point is no plot
-
-
 @pytest.fixture(scope="module")
 def drawings() -> list[Drawing]:
     run = run_of(all_rows())
     return [drawing for figure in FIGURES for drawing in figure(run)]
-
-
-def test_every_figure_of_the_suite_is_drawn(drawings, tmp_path):
-    run = run_of(all_rows())
-    assert [drawing.name for drawing in drawings] == ["error_against_time", "break_even"]
-    assert all(save_drawing(tmp_path, drawing).path.is_file() for drawing in drawings)
-    walk = run.frame[run.frame["scene"] == "tshirt/walk"]
-    assert indistinct(run, walk, "distance/rms") == 21.0  # no rival of whom it may be said who is nearer
-    assert indistinct(run, walk, "gap/energy") == 0.015 and indistinct(run, walk, "curvature/error") == 0.0
 
 
 def test_a_caption_speaks_of_a_grey_band_only_where_one_is_seen():

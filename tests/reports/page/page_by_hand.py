@@ -71,7 +71,6 @@ def make_folder(path: Path) -> RunFolder:
             write_mesh(run.trajectory_path(scene, method), cloth, faces, energies)
             if scene in CLIPS:
                 np.savez(run.curves_path(scene, method), **{"step/vertices": steps(cloth)})
-        np.save(run.rest_areas_path(scene), np.full(len(faces), 0.4 / 3 * 0.5 / 3 / 2))
     return run
 
 
@@ -113,8 +112,7 @@ def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
             arrays[name] = np.array(entry["low"]) + entry["step"] * steps[2:]
         elif entry["kind"] == "values":
             levels = np.frombuffer(data, np.uint8, size, entry["at"]).reshape(shape).cumsum(0) % 256
-            part = (levels - 128.0) / 127.0 if entry["signed"] else levels / 255.0
-            arrays[name] = entry["full"] * part * np.abs(part)
+            arrays[name] = entry["full"] * (levels / 255.0) ** 2
         else:
             kind = "<f4" if entry["kind"] == "numbers" else "<u4"
             arrays[name] = np.frombuffer(data, kind, size, entry["at"]).reshape(shape)

@@ -9,13 +9,9 @@ from hashlib import sha256
 from html.parser import HTMLParser
 
 import numpy as np
-import pytest
 
 from reports.finished_run import read_run
 from reports.page.embedded_roll_outs import groups
-from reports.page.write_page import table_data
-from reports.statistics.effects import EXCESS, RATIO, Effect
-from reports.tables.table import Column, Table
 from tests.reports.page.page_by_hand import (
     CLIPS,
     METHODS,
@@ -28,7 +24,7 @@ from tests.reports.page.page_by_hand import (
     steps,
     write,
 )
-from tests.reports.report_folder import row, run_folder, run_of, write_mesh
+from tests.reports.report_folder import write_mesh
 
 
 def test_the_page_holds_the_roll_outs_of_the_run(folder):
@@ -39,7 +35,7 @@ def test_the_page_holds_the_roll_outs_of_the_run(folder):
     np.testing.assert_allclose(arrays["times"], np.arange(len(cloth)) / 30.0, rtol=1e-6)
     np.testing.assert_allclose(arrays["energy/total"], np.linspace(1.0, 2.0, len(cloth)), rtol=1e-6)
     np.testing.assert_allclose(arrays["distance"], 10.0, rtol=1e-2)
-    assert {"curvature", "area", "depth"} <= arrays.keys()
+    assert {"curvature", "depth"} <= arrays.keys()
 
 
 def test_one_step_errors_are_kept_and_frames_that_nobody_judged_are_named(folder):
@@ -52,10 +48,6 @@ def test_one_step_errors_are_kept_and_frames_that_nobody_judged_are_named(folder
     assert scenes[CLIPS[0]]["methods"]["snug"]["arrays"]["curvature"]["unknown"] == []
 
 
-def test_scenes_of_one_motion_share_the_body(folder):
-    assert len({scene["body"]["text"] for scene in content_of(folder)["scenes"].values()}) == 1
-
-
 def test_clips_come_first_and_leading_methods_before_others(folder):
     order = [(scene, list(seeds)) for scene, seeds in groups(folder, read_run(folder))]
     leading = ["simulation", "skinning", "snug", "pbns"]
@@ -63,14 +55,6 @@ def test_clips_come_first_and_leading_methods_before_others(folder):
         *((scene, leading) for scene in CLIPS), *((scene, ["newton-4"]) for scene in CLIPS),
         (WHOLE, leading), (WHOLE, ["newton-4"]),
     ]  # fmt: skip
-
-
-def test_a_roll_out_of_the_user_comes_before_solvers(tmp_path):
-    roles = {"newton-4": "solver", "mine": "external"}
-    run = run_folder(tmp_path, [row(WHOLE, name, role=role, seeded=False) for name, role in roles.items()])
-    for name in roles:
-        write_mesh(run.trajectory_path(WHOLE, name), *moving(0.0), {})
-    assert [list(seeds) for _, seeds in groups(run, read_run(run))] == [["mine"], ["newton-4"]]
 
 
 def test_what_does_not_fit_is_left_out_and_said(tmp_path):
@@ -141,13 +125,6 @@ def test_names_with_markup_stay_text(folder):
     assert content_of(folder)["methods"][NASTY]["label"] == NASTY
 
 
-def test_what_did_not_run_is_counted_at_the_top_and_listed_in_a_table(folder):
-    page = folder.page_path.read_text(encoding="utf-8")
-    assert "Of 18 cells 1 failed, 1 timeout, 1 skipped." in page[: page.index("<main>")]
-    table = next(t for t in content_of(folder)["tables"] if t["name"] == "unfinished")
-    assert {"over 30 s", "no body here"} < {line[-1] for line in table["rows"]}
-
-
 def test_tables_sort_by_numbers_and_define_their_columns(folder):
     table = next(t for t in content_of(folder)["tables"] if t["name"] == "energies")
     total = table["columns"][-1]
@@ -156,36 +133,16 @@ def test_tables_sort_by_numbers_and_define_their_columns(folder):
     assert [value[:2] for value in values] == [[f"{2 + k:.2f}", 2.0 + k] for k in range(len(METHODS))]
 
 
-def test_effects_sort_by_the_numbers_that_they_show():
-    run = run_of([row()])
-    effects = [Effect(0.9, EXCESS), Effect(0.5, EXCESS, second=2.0), Effect(0.7, RATIO)]
-    column, rows = Column("effect", "Effect", mixed=True), tuple((effect,) for effect in effects)
-    cells = [cell for (cell,) in table_data(run, Table("findings", (column,), rows, "Effects."))["rows"]]
-    assert [number for _, number, *_ in cells] == pytest.approx([effect.shown for effect in effects])
-
-
-def test_heads_have_no_unit_where_each_duration_has_its_own():
-    columns = (
-        Column("run", "Run", text=True),
-        Column("train", "Training", "s"),
-        Column("rms", "Distance", "mm"),
-    )
-    data = table_data(run_of([]), Table("t", columns, (("a", 143.4, 5.0),), "t"))
-    assert [column["unit"] for column in data["columns"]] == ["", "", "mm"]
-    assert data["rows"][0][1][:2] == ["2.39 min", 143.4]
-
-
 def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(tmp_path):
     run = make_folder(tmp_path)
     cloth, faces = moving(0.0)
     cloth[3:] = np.nan
     write_mesh(run.trajectory_path(WHOLE, "snug"), cloth, faces, {})
     run.trajectory_path(WHOLE, "pbns").write_bytes(b"no mesh")
-    run.rest_areas_path(WHOLE).write_bytes(b"no areas")
     (problem,) = write(run, tables=False)
     assert "pbns.vtkhdf" in problem
     arrays = arrays_of(run, WHOLE, "snug")
-    assert len(arrays["positions"]) == 3 and "area" not in arrays
+    assert len(arrays["positions"]) == 3
     assert "pbns" not in content_of(run)["scenes"][WHOLE]["methods"]
     first = run.page_path.read_bytes()
     write(run, tables=False)

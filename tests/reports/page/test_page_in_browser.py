@@ -54,7 +54,7 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert state["pointed"] == "pbns" and "pbns" in state["withPointed"] and len(state["withPointed"]) == 4
     assert state["focused"] == "pbns"
     assert state["turned"] and state["scale"] == "Mean curvature [1/m]"
-    assert state["colours"] == ["plain", "curvature", "area", "step", "distance", "depth"]
+    assert state["colours"] == ["plain", "curvature", "step", "distance", "depth"]
     assert state["unjudged"] == ["step not judged"] * 4 and state["judged"] == [""] * 4
     directions, columns = zip(state["up"], state["down"])
     assert directions == ("ascending", "descending")
@@ -73,26 +73,3 @@ def test_a_person_can_use_it(folder, tmp_path):
         and "colour=curvature" in state["address"]
     )
     assert state["scene"] == WHOLE and len(state["panesThere"]) == 4 and state["curves"] == 4
-
-
-OPENED = """addEventListener('DOMContentLoaded', () => setTimeout(() => {
-  const text = (id) => document.getElementById(id).value;
-  const chosen = [...document.querySelectorAll('#methods input:checked')].map((box) => box.value);
-  const note = Object.assign(document.createElement('pre'), { id: 'found' });
-  const playing = document.getElementById('play').getAttribute('aria-label') === 'Pause';
-  const [scene, frame, colour] = ['scene', 'time', 'colour'].map(text);
-  note.textContent = JSON.stringify({ scene, chosen, frame, colour, playing });
-  document.body.append(note);
-}, 3000));"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
-    not (shutil.which("chromium") or shutil.which("chromium-browser")), reason="no chromium on this machine"
-)
-def test_an_address_opens_what_it_names(folder, tmp_path):
-    address = f"#scene={WHOLE}&methods=snug,moon,pbns&colour=area&frame=3"
-    state = in_browser(folder.page_path, OPENED, tmp_path, address)
-    assert state == {
-        "scene": WHOLE, "chosen": ["snug", "pbns"], "frame": "3", "colour": "area", "playing": False,
-    }  # fmt: skip

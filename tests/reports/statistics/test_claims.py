@@ -9,12 +9,10 @@ import pandas as pd
 import pytest
 
 from benchmarks.methods import METHODS
-from reports.pdf import lay_out_table
 from reports.statistics.effects import EXCESS
 from reports.statistics.means_and_spreads import share_of_frames, with_shares
 from reports.statistics.paper_claims import BEFORE, CLAIMS, PRIMARY, counts, in_words, judged, with_before
-from reports.tables import make_tables
-from reports.tables.findings import PRINTED, findings
+from reports.tables.findings import findings
 from tests.reports.report_folder import row, run_of
 
 
@@ -169,39 +167,6 @@ def test_parity_holds_where_no_more_than_the_margin_is_possible(rival, verdict):
     assert told(rows)["dynamics/amplitude", "santesteban2019", "snug"].verdict == verdict
 
 
-def test_within_the_uncertainty_of_the_reference_is_a_tie():
-    run = run_of(seeds("snug", (0.5, 0.51, 0.52)) + seeds("pbns", (1.0, 1.01, 1.0)))
-    assert judged(run)[0].verdict == "holds"
-    unsure = replace(run, frame=run.frame.assign(uncertainty=0.5))
-    assert judged(unsure)[0].verdict == "tie"
-
-
-def test_means_are_compared_over_the_scenes_that_both_have():
-    scenes = (*MOTIONS, "tshirt/spin")
-    rows = [row(scene, "snug", value=1.0 + k, seeded=False) for k, scene in enumerate(scenes)]
-    rows += [row(scene, "pbns", value=2.0 + 2.0 * k, seeded=False) for k, scene in enumerate(MOTIONS)]
-    line = told(rows)[STRAIN]
-    one, other = line.compared.one, line.compared.other
-    assert (one.value, other.value) == (2.5, 5.0) and not one.complete
-    assert line.compared.effect.shown == pytest.approx(0.5)
-    assert line.verdict + line.remark == "holds (4 of 5 roll-outs)"
-    assert findings(run_of([*rows[:5], row("tshirt/other", "pbns", value=2.0)])) == []
-
-
-def test_a_lost_seed_is_said_and_the_others_are_compared():
-    rows = seeds("snug", (0.5, 0.51)) + seeds("pbns", (1.0, 1.01, 1.0))
-    rows += seeds("snug", (None,), status="diverged", reason="no end", seed_from=2)
-    assert (told(rows)[STRAIN].verdict, told(rows)[STRAIN].remark) == ("holds", " (8 of 12 roll-outs)")
-    rows = seeds("snug", (0.5, 0.51, 0.5)) + seeds("pbns", (1.0, 1.01))
-    rows += seeds("pbns", (None,), status="diverged", reason="no end", seed_from=2)
-    assert told(rows)[STRAIN].remark == " (8 of 12 roll-outs)"  # of the second, too
-
-
-def test_without_a_network_there_is_no_table():
-    assert findings(run_of([row(method="simulation")])) == []
-    assert counts(judged(run_of([row(method="simulation")]))).total() == 0
-
-
 # The one row of a network's cell without numbers.
 GONE = {"metric": "cost/frame", "status": "diverged", "reason": "nan", "seeded": True}
 NOTHING = (None, None)  # values of two seeds
@@ -252,40 +217,6 @@ def test_a_method_without_seeds_diverges_with_none():
     gone = seeds("snug-no-strain", (None,), **GONE | {"seeded": False})
     line = told([*seeds("snug", (1.0, 1.1), **metric), *gone])["curvature/error", "snug", "snug-no-strain"]
     assert (line.verdict, line.remark) == ("holds", ": the second diverged")
-
-
-def test_noise_is_judged_beside_zeros_and_not_as_an_ablation():
-    pairs = {(claim.lower, claim.higher) for claim in CLAIMS if "noise" in claim.lower + claim.higher}
-    assert pairs == {("snug-noise-alone", "snug-no-noise")}
-
-
-def test_the_table_says_effect_and_interval_and_what_the_interval_leaves_out(tmp_path):
-    rows = seeds("snug", (0.5, 0.51, 0.52)) + seeds("pbns", (1.0, 1.01, 1.0))
-    run = run_of([*rows, *seeds("snug", (0.0,), "energy/bending"), *seeds("pbns", (1.0,), "energy/bending")])
-    (made,) = findings(run)
-    (block,) = lay_out_table(run, made)
-    (group,) = block["groups"]
-    assert group["title"] == "Table 1: lower energies than PBNS"
-    strain, bending = (
-        {c["title"]: cell for c, cell in zip(block["columns"], line)} for line in group["rows"]
-    )
-    assert [strain[name]["text"] for name in ("Measure", "First", "Claim", "Second")] == [
-        "Strain [J]", "SNUG", "<", "PBNS",
-    ]  # fmt: skip
-    low, high = made.rows[0][8].interval
-    assert strain["Effect"] == {"text": "×0.508", "spread": f"{low:.3f} to {high:.3f}", "mark": "‡"}
-    assert bending["Effect"] == {"text": "−1.00", "spread": "", "mark": ""} and bending["p"]["text"] == "–"
-    assert "‡ The interval is over seeds alone" in block["note"] and "Holm" in block["note"]
-    lines = made.write_csv(tmp_path).read_text().splitlines()
-    assert lines[0].endswith("effect,effect_kind,effect_low,effect_high,effect_covers,p,verdict")
-    assert ",ratio,0.4" in lines[1] and ",seeds," in lines[1] and ",difference,-,-,-,-," in lines[2]
-
-
-def test_the_papers_numbers_stand_below_its_own_columns():
-    made = make_tables(run_of([row(), row(metric="curvature/error", unit="1/m")]))
-    assert dict(made["energies"].references) == PRINTED["energies"]
-    assert made["energies"].references[1][1]["energy/strain"] == "0.064"
-    assert dict(made["curvature"].references) == PRINTED["curvature"]
 
 
 def frame_table(**methods):

@@ -194,11 +194,6 @@ def test_positive_numbers_are_compared_by_their_factors():
     assert effect(mean_over((0.0, 1.0)), mean_over((1.0, 1.0), "pbns")).scale == DIFFERENCE
 
 
-def test_where_nothing_is_repeated_there_is_no_interval_no_p_value_and_no_tie():
-    ratio = effect(mean_over(1.0), mean_over(1.0, "pbns"))
-    assert (ratio.interval, ratio.p_value(), ratio.covers, ratio.equal()) == (None, None, "", False)
-
-
 def test_what_is_the_same_with_every_motion_was_not_repeated():
     """A training has one time, whatever the motions that its network is tested on; a size is one number."""
     times = [np.repeat([values], 4, axis=0) for values in (ONE, 50.0 * ONE)]
@@ -216,32 +211,6 @@ def test_what_every_motion_repeats_exactly_is_certain():
     assert twice.p_value() == pytest.approx(0.0)
     same = mean_over([[1.0], [2.0], [4.0]])
     assert effect(same, replace(same, pairing_group="")).p_value() == 1.0
-
-
-def test_equal_is_what_lies_in_the_tie_with_all_of_its_interval():
-    near, wide = 1.0 + np.array((-0.001, 0.0, 0.001)), 1.0 + np.array((-0.3, 0.0, 0.3))
-    assert effect(mean_over(near), mean_over(near[::-1], "pbns")).equal()
-    assert not effect(mean_over(wide), mean_over(wide[::-1], "pbns")).equal()
-    hundredth = effect(mean_over(near / 100.0), mean_over(near, "pbns"))
-    assert hundredth.equal(factor=100.0) and not hundredth.equal()
-
-
-def test_over_scenes_and_seeds_that_are_left_in_both():
-    """A seed that diverged is in no mean; scenes that one of the two lacks are in neither."""
-    rows = [row(f"tshirt/{m}", value=1.0 + m + 0.1 * s, seed=s) for m in range(3) for s in range(3)]
-    rows += [row(f"tshirt/{m}", "pbns", value=2.0 + m + 0.1 * s, seed=s) for m in range(2) for s in range(2)]
-    rows += [row("tshirt/0", "pbns", value=None, seed=2, status="diverged", reason="no end")]
-    one, other = pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
-    assert set(one.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(3)}
-    assert set(other.cells) == {(f"tshirt/{m}", s) for m in range(2) for s in range(2)} and (
-        other.asked,
-        other.missing,
-    ) == (9, 5)
-    comparison = effect(one, other)
-    assert comparison.covers == "motions and seeds" and not comparison.complete
-    rows = [r for r in rows if r.scene != "tshirt/2"]
-    one, other = pair(run_of(rows).frame, "snug", "pbns", "energy/strain")
-    assert one.complete and not effect(one, other).complete and not effect(other, one).complete
 
 
 def test_shares_of_excess_are_compared_by_logarithm_above_one_percent_and_by_difference_below():
@@ -306,16 +275,6 @@ def replace_moved(means, member, change):
         for mean in means
         for first in [next(iter(mean.moved))]
     ]
-
-
-def test_where_two_members_are_missing_in_different_motions_the_uncertainties_of_motions_decide():
-    means = moved_means({"snug": ((0.2, -0.1), (0.4, 0.3)), "pbns": ((0.0, 0.0), (0.0, 0.0))})
-    means = [
-        replace(mean, uncertainty=0.15, moved={cell: dict([pair]) for cell, pair in zip(mean.moved, pairs)})
-        for mean in means
-        for pairs in [[(TWINS[0], 0.2), (TWINS[1], 0.3)]]
-    ]
-    assert effect(*means, DIFFERENCE).uncertainty == pytest.approx(math.hypot(0.15, 0.15))
 
 
 def test_the_uncertainty_is_the_standard_deviation_of_the_effect_over_the_ensemble():

@@ -64,13 +64,6 @@ def test_as_fast_is_within_the_scatter_of_run_times():
     assert beaten_by(once, once[0]) is None  # no repeats: no scatter
 
 
-def test_a_rival_is_no_faster_for_repeats_that_scatter():
-    point, wide = Point("snug", 1.36, 0.53, 0.1), Point("snug+lbfgs-1", 19.1, 0.32, 19.6)
-    assert beaten_by([point, wide], point) is None
-    shaky = dataclasses.replace(point, time_spread=20.0)
-    assert beaten_by([shaky, wide], shaky) is None
-
-
 def test_a_point_is_of_the_seeds_that_did_every_scene():
     rows = [
         row(scene, "snug", metric, value, seed=seed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from reports.finished_run import Run
@@ -56,32 +55,6 @@ def test_segments_of_a_recording_count_as_one_motion(publish):
     publish(run_of({0: 5.0, 1: 5.0}, scenes, started="before", hard="tshirt/kick"))
     note = published_beside(run_of({0: 5.0}, scenes, hard="tshirt/kick"), "snug")
     assert note == "published 16 % on these motions: reproduced"  # between 5 and 50 on a scale of logarithms
-
-
-@pytest.mark.slow
-def test_the_interval_is_that_of_one_more_seed(publish):
-    """The interval holds 95 % of seeds that are drawn like the published ones."""
-    generator = np.random.default_rng(0)
-    inside = 0
-    drawn = np.sinh(np.arcsinh(5.0) + 0.1 * generator.standard_normal((100, 4)))
-    publish(run_of({}, started="before"))
-    for line in drawn:
-        before = run_of(dict(enumerate(line[:3])), SCENES[:1], started="before")
-        outcomes.read_published = lambda folder, before=before: before
-        inside += published_beside(run_of({0: line[3]}, SCENES[:1]), "snug").endswith(": reproduced")
-    assert 0.91 <= inside / 100 <= 0.985
-
-
-def test_nothing_stands_beside_a_motion_that_was_cut(publish):
-    def framed(frames: int, shares: dict[int, float], started: str = "now") -> Run:
-        scenes = {scene: {"motion": scene[-1]} for scene in SCENES}
-        frames_of = {scene[-1]: frames for scene in SCENES}
-        run = run_of(shares, started=started, motions={"frames": frames_of})
-        return replace(run, config=run.config | {"scenes": scenes})
-
-    publish(framed(98, {0: 5.0, 1: 5.5}, "before"))
-    assert published_beside(framed(98, {0: 5.2}), "snug").endswith(": reproduced")
-    assert published_beside(framed(20, {0: 5.2}), "snug") == ""
 
 
 def test_nothing_stands_beside_another_preset_the_published_run_itself_or_motions_of_ones_own(publish):

@@ -12,13 +12,10 @@ from benchmarks.runner.run_json import described
 from benchmarks.validation.registry import CASES
 from reports.finished_run import make_run
 from reports.pdf import lay_out_table
-from reports.sentences import endings
-from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.tables import make_tables, table
-from reports.tables.pivots import ablation_effects, ablations
 from tests.benchmarks.runner.test_cell_tasks import plan_of
-from tests.reports.report_folder import SCENES, all_rows, row, run_of
+from tests.reports.report_folder import SCENES, row, run_of
 
 
 def seeds_of(method, metric, values, **more):
@@ -74,17 +71,6 @@ def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
     assert "fewer scenes" in block["note"] and "unconverged" in block["note"]
 
 
-def test_a_seed_that_is_lost_is_said_wherever_the_mean_of_the_others_stands():
-    rows = seeds_of("snug", "energy/total", (1.0, 1.1)) + seeds_of("pbns", "energy/total", (2.0, 2.1, 2.2))
-    gone = row(metric="cost/frame", value=None, seed=2, status="diverged", reason="no end")
-    rows += [gone, row("tunic/stop", metric="cost/frame", value=None, seed=3, status="failed", reason="gone")]
-    (mean,) = (
-        line[2] for line in make_tables(run_of(rows))["energies"].rows if line[:2] == ("tshirt", "snug")
-    )
-    assert (mean.missing, mean.complete, mean.fewer) == (1, False, " (2 of 3 roll-outs)")
-    assert mean_of(run_of(rows).garment_rows, "snug", "energy/total", ["tshirt/walk"]) == mean
-
-
 def test_garments_have_their_own_means_and_stand_as_they_are_declared():
     rows = [row("tunic/stop", value=9.0), row("tshirt/walk", value=1.0), row("tshirt/kick", value=3.0)]
     run = run_of(rows)
@@ -95,26 +81,6 @@ def test_garments_have_their_own_means_and_stand_as_they_are_declared():
     assert list(run.garments(run.garment_rows[run.garment_rows["garment"] == "tunic"])) == ["tunic"]
     means = [(line[0], line[2].value) for line in make_tables(run)["energies"].rows]
     assert means == [("tshirt", 2.0), ("tunic", 9.0)]
-
-
-def test_a_cell_of_two_suites_counts_once_in_its_own_table():
-    """Where nothing is worn, a table is scene by scene."""
-    rows = [
-        row("flag", metric="gap/energy", value=v, suite=s) for v, s in ((1.0, "garments"), (2.0, "speed"))
-    ]
-    table = make_tables(run_of(rows))["speed_by_scene"]
-    assert [(*line[:3], line[3].value) for line in table.rows] == [("garments", "flag", "snug", 1.0)]
-
-
-def test_what_is_judged_outside_of_the_checks_stands_with_them():
-    more = {"unit": "weights", "method": "simulation", "tolerance": 2e-6, "expected": 0.0}
-    rows = [row(metric="conservation/momentum_worst", value=1e-9, **more), *all_rows()]
-    table = make_tables(run_of(rows))["validation"]
-    assert [line[0] for line in table.rows] == [
-        "tshirt/walk: Momentum_worst", "falls_freely", "zero_modes", "sag",
-    ]  # fmt: skip
-    assert [line[-1] for line in table.rows] == ["pass", "pass", "pass", "failed"]
-    assert "of 4 checks 1 failed" in endings(run_of(rows))
 
 
 def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
@@ -130,23 +96,7 @@ def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
     assert block["groups"][0]["rows"][2][column(table, "away")]["text"] == "∞"
 
 
-def test_a_wide_table_goes_on_below_with_its_heads():
-    rows = [row(metric=f"energy/{k}", value=float(k)) for k in range(13)]
-    run = run_of(rows)
-    blocks = list(lay_out_table(run, make_tables(run)["energies"]))
-    heads = [[column["title"] for column in block["columns"]] for block in blocks]
-    assert [len(head) for head in heads] == [8, 7] and {head[0] for head in heads} == {"Method"}
-    assert blocks[1]["caption"].endswith("(continued)")
-
-
 # --- ablations ----------------------------------------------------------------------------------------------
-
-
-def test_a_duration_has_its_own_unit_and_none_over_its_column():
-    run = run_of([row("tshirt/walk", "snug", "cost/train", 160.0, unit="s")])
-    (block,) = lay_out_table(run, make_tables(run)["cost"])
-    assert [column["unit"] for column in block["columns"]][1:] == [""]
-    assert [cell["text"] for cell in block["groups"][0]["rows"][0]][1:] == ["2.67 min"]
 
 
 def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
@@ -174,25 +124,8 @@ def test_ablations_leave_the_other_tables_and_stand_below_the_full_recipe():
     assert not re.search("better|worse|significant", json.dumps(block))
 
 
-def test_without_the_full_recipe_ablations_stand_in_the_other_tables():
-    cost = {"unit": "ms", "method": "snug-springs"}
-    rows = [row(method="snug-springs", metric="energy/total"), row(metric="cost/frame", **cost)]
-    full = [row(metric=r.metric) for r in rows]
-    assert [line[1] for line in make_tables(run_of(rows))["energies"].rows] == ["snug-springs"]
-    assert [line[1] for line in make_tables(run_of([*rows, *full]))["energies"].rows] == ["snug"]
-    assert ablations(run_of(rows)) == ablation_effects(run_of(rows)) == ablations(run_of(full)) == []
-
-
 def on_two_scenes(method, *values, metric="energy/total"):
     return [row(scene, method, metric, value) for scene, value in zip(SCENES, values)]
-
-
-def test_ablations_are_compared_over_the_scenes_that_both_have():
-    rows = on_two_scenes("snug", 1.0, 9.0, metric="curvature/error")
-    run = run_of(rows + on_two_scenes("snug-no-noise", 2.0, metric="curvature/error"))
-    (line,) = ablation_effects(run)[0].rows
-    assert line[2].shown == pytest.approx(2.0) and line[2].scale == RATIO and not line[2].complete
-    assert [line[2].value for line in ablations(run)[0].rows] == [5.0, 2.0]
 
 
 def test_pairs_share_their_scenes_or_have_their_own():
@@ -225,18 +158,3 @@ def test_pairs_share_their_scenes_or_have_their_own():
 )
 def test_numbers_as_text(value, text):
     assert table.number(value) == text
-
-
-def test_other_texts():
-    assert table.number(0.2835, 7, trim=True) == "0.2835" and table.number(6.0, 7, trim=True) == "6"
-    assert table.with_spread(0.5, 0.012) == "0.500 ± 0.012" and table.with_spread(0.5, None) == "0.500"
-    assert [table.duration(s) for s in (0.0, 61.0, 402.0, 104400.0, None)] == [
-        "0 s", "61.0 s", "6.70 min", "29.0 h", "–",
-    ]  # fmt: skip
-    assert table.csv_number(None) == "-" and table.csv_number(0.0) == "0"
-
-
-def test_decimal_points_stand_in_a_column():
-    padded = table.aligned(["0.123", "18.2", "400", "–"])
-    assert len({len(text) - text.index(".") for text in padded[:2]}) == 1
-    assert len(padded[2]) - 3 == len(padded[0]) - 1 and padded[3] == "–"

@@ -31,8 +31,3 @@ def test_the_answer_is_a_table_of_few_methods_and_one_line_below():
         "On 3 unseen motions the relative excess is: SNUG 12 % (pooled 12 %) and PBNS 25 %"
     )
     assert last.endswith("The report also has SNUG, cleaned up.")
-
-
-def test_a_run_without_page_one_has_no_answer():
-    run = run_of([row("sag", "simulation", "check", 1.0, suite="validation", garment="", motion="", part="")])
-    assert answer(run, make_tables(run)) == ""

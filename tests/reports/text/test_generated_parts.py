@@ -8,25 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.metrics import find_metric
 from benchmarks.results.run_folder import RunFolder
-from reports.docs import ROOT, documents, main
+from reports.docs import documents, main
 from reports.statistics.outcomes import PUBLISHED
 from reports.statistics.paper_claims import EXPLORATORY
 from reports.text.published_parts import BEGIN, END, evaluation_rows, fill, published_part
-from snug.motion.library import TEST, clip_of
 
 JUDGED = "quick, paper_text, ablations, equal_data"  # as in the documents: what has been judged is kept
-
-
-@pytest.mark.slow
-def test_every_generated_part_is_what_the_published_runs_give():
-    """Continuous integration runs `python -m reports.docs --check`, which is the same."""
-    made_anew = list(documents(ROOT))
-    for path, text, made in made_anew:
-        assert text == made, f"{path}: run python -m reports.docs"
-    places = {path.relative_to(ROOT).parts[0] for path, *_ in made_anew}
-    assert places == {"README.md", "docs", "submissions"}
 
 
 def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys):
@@ -54,22 +42,6 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
             published_part(request)
 
 
-def test_each_run_has_a_row_with_its_commit_and_a_metric_its_definition():
-    lines = published_part("runs of quick, handles").splitlines()[2:]
-    assert [line.split(" | ")[0] for line in lines] == ["| quick", "| handles"]  # quick was merged of two
-    commits = [RunFolder(PUBLISHED / name).read_config()["commit"] for name in ("quick", "handles")]
-    assert [line.split(" | ")[2] for line in lines] == commits
-    assert "| `energy/wind` |" not in published_part("metrics")
-    assert f"| `distance/rms` | mm | {find_metric('distance/rms').definition} |" in published_part("metrics")
-
-
-def test_rows_of_options_and_attributes_can_be_chosen():
-    lines = published_part("options of benchmarks.run; --seeds, --out").splitlines()[2:]
-    assert [line.split(" | ")[0] for line in lines] == ["| `--seeds N,...`", "| `-o DIR, --out DIR`"]
-    lines = published_part("attributes of benchmarks.method.Reporting; level").splitlines()[2:]
-    assert [line.split(" | ")[0] for line in lines] == ["| `level`"]
-
-
 def test_the_command_checks_and_says_so(monkeypatch, tmp_path, capsys):
     page, other = tmp_path / "page.md", tmp_path / "other.md"
     same = (other, "text", "text")
@@ -94,13 +66,6 @@ def test_claims_are_judged_by_the_first_run_that_can_and_times_by_one_that_had_i
     assert not [1 for _, after in judged if re.search(r"\[m?s\]: ", after[1]) and after[-1] == "ablations |"]
 
 
-def test_segments_of_a_recording_are_one_source_of_test_motions():
-    lines = published_part("sources of the library").splitlines()[2:]
-    assert len(lines) == len({clip_of(name) for name in TEST})
-    frames = [int(line.split(" | ")[2]) for line in lines]
-    assert lines[0].startswith("| `01_01_a` to `01_01_g` | forward jumps") and frames[0] == 689
-
-
 def test_runs_alike_in_protocol_split_and_test_set_evaluations_share_a_row(tmp_path):
     number = {"protocol": {"number": "1.0"}}
     for name, config in {
@@ -117,12 +82,6 @@ def test_runs_alike_in_protocol_split_and_test_set_evaluations_share_a_row(tmp_p
         ("1.0", "validation", "0", "`c`"),
         ("1.1", "test", "2", "`later`"),
     ]
-
-
-def test_rows_of_a_table_can_be_chosen_by_method():
-    part = published_part("table energies of quick; method, energy/total; snug, simulation")
-    assert [line.split(" | ")[0] for line in part.splitlines()[2:4]] == ["| Simulation", "| SNUG"]
-    assert not part.splitlines()[4].startswith("|")
 
 
 def test_table_1_of_the_paper_is_of_the_frames_of_its_own_clips():

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from benchmarks.metric import Metric
 from benchmarks.results.row import Row
 from reports.finished_run import make_run
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.table import METHOD, Column, Table, metric_column
-from reports.text.text_table import aligned_text, markdown_table, remarks_on, text_rows
+from reports.text.text_table import remarks_on, text_rows
 from tests.reports.report_folder import DECLARED
 
 RUN = make_run({"methods": DECLARED}, [Row("garments", "a/b", "snug", 0, "energy/total", "J", 1.0)])
@@ -32,24 +30,11 @@ def test_an_interval_has_a_column_of_its_own_and_empty_columns_are_left_out():
     assert skinning == ["skinning", "–", "–", "–"]
 
 
-def test_columns_are_chosen_by_name_and_an_unknown_one_is_refused():
-    rows = text_rows(RUN, small_table(), ("total", "method"))
-    assert [row[0] for row in rows] == ["Total [J]", "0.250", "–"]
-    with pytest.raises(KeyError):
-        text_rows(RUN, small_table(), ("depth",))
-
-
 def test_a_mean_over_fewer_roll_outs_is_marked_and_the_mark_explained():
     fewer = replace(small_table(), rows=(("snug", None, Mean(0.25, None, seeds=3, asked=3), None),))
     rows = text_rows(RUN, fewer)
     assert rows[1] == ["SNUG", "0.250*"]
     assert remarks_on(rows).startswith("* A mean over fewer") and remarks_on(rows[:1]) == ""
-
-
-def test_lines_are_as_wide_as_each_other_and_a_bar_in_a_cell_is_escaped():
-    lines = aligned_text([["a", "b"], ["long name", "1.25"], ["c", "2"]]).splitlines()
-    assert len({len(line) for line in lines}) == 1
-    assert markdown_table([["a|b"], ["1"]]).splitlines()[0] == "| a\\|b |"
 
 
 def test_an_amplitude_of_rounding_alone_is_printed_as_zero():
