@@ -270,4 +270,4 @@ def _last_layer(path: Path) -> Callable[[DressedBody], Space]:
 def make_floor(*, models: Path, seed: int, handles: int = 0, network: str = "") -> SubspaceFloor:
     """Make the floor of so many handles, or that of the last layer of a network."""
     space = _last_layer(model_path(models, network, seed)) if network else _handle_space(handles)
-    return SubspaceFloor(options={}, space=space)
+    return SubspaceFloor(space=space)

@@ -111,12 +111,7 @@ def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
 
 TIME_LIMIT = 100.0  # after which it is ended
 PLACES = ("{scene}", "{out}")
-TAIL_BYTES = 4096  # bytes of what it has said that are looked at
-OWN_ENVIRONMENT = (
-    "PYTHONPATH",
-    "PYTHONHOME",
-    "VIRTUAL_ENV",
-)  # of this process: another environment has its own
+OWN_ENVIRONMENT = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")  # another environment has its own
 
 
 def program(
@@ -175,58 +170,45 @@ class Program(Stored):
             exported.mkdir()
             write_scene_files(exported, self.scene, facts_of(self.scene))
             places = {"{scene}": str(exported), "{out}": str(out), "{seed}": str(self.seed)}
-            self._execute([_filled(word, places) for word in shlex.split(self.command)], output)
+            self._execute(places, output)
             if not out.is_file():
-                raise RuntimeError(
-                    f"the program has ended well and has not written {{out}}{_last_line(output)}"
-                )
+                said = _last_line(output)
+                raise RuntimeError(f"the program has ended well and has not written {{out}}{said}")
             self.path = str(out)
             super().prepare(self.scene)
             declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
-        declared_time = {} if declared is None else {"declared_ms": _milliseconds(declared)}
-        provenance = {"method": "program", **declared_time}
+        provenance: dict[str, Any] = {"method": "program"}
+        if declared is not None:
+            if declared.size != 1 or not 0.0 < float(declared.item()) < 1e6:
+                raise ValueError("seconds_per_frame of the program is no positive number of seconds")
+            provenance["declared_ms"] = 1e3 * float(declared.item())
         return replace(super().run(), provenance=provenance)
 
-    def _execute(self, arguments: list[str], output: Path) -> None:
+    def _execute(self, places: dict[str, str], output: Path) -> None:
+        words = shlex.split(self.command)
+        for place, path in places.items():
+            words = [word.replace(place, path) for word in words]
         environment = {name: value for name, value in os.environ.items() if name not in OWN_ENVIRONMENT}
         with output.open("wb") as stream:
             try:
-                process = subprocess.Popen(
-                    arguments, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment
-                )
+                status = subprocess.run(
+                    words, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment,
+                    timeout=self.seconds,
+                ).returncode  # fmt: skip
             except OSError as error:
                 raise RuntimeError(f"the program cannot be started: {error}") from None
-            try:
-                status = process.wait(self.seconds)
             except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
                 why = f"the program was ended after {self.seconds:g} s{_last_line(output)}"
                 raise WorkerDied(why, "timeout") from None
         if status:
             raise RuntimeError(f"the program has ended with status {status}{_last_line(output)}")
 
 
-def _filled(word: str, places: dict[str, str]) -> str:
-    for place, path in places.items():
-        word = word.replace(place, path)
-    return word
-
-
 def _last_line(output: Path) -> str:
-    """Its last line, behind a colon; empty where it has said nothing."""
-    with output.open("rb") as stream:
-        stream.seek(max(0, stream.seek(0, os.SEEK_END) - TAIL_BYTES))
-        lines = stream.read().decode("utf-8", "replace").split("\n")
-    last = next((" ".join(line.split()) for line in reversed(lines) if line.strip()), "")
+    """Return its last line, behind a colon; empty where it has said nothing."""
+    said = output.read_text("utf-8", "replace").split("\n")
+    last = next((" ".join(line.split()) for line in reversed(said) if line.strip()), "")
     return f": {last}" if last else ""
-
-
-def _milliseconds(seconds: np.ndarray) -> float:
-    """Return [ms] of the program's number [s]. Raises ValueError where it is none."""
-    if seconds.size != 1 or not 0.0 < float(seconds.item()) < 1e6:
-        raise ValueError("seconds_per_frame of the program is no positive number of seconds")
-    return 1e3 * float(seconds.item())
 
 
 def make_program(*, models: Path, seed: int, command: str, seconds: float) -> Program:

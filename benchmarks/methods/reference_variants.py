@@ -7,8 +7,8 @@ runs from perturbed starts differ by is the uncertainty of whatever is compared 
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,23 +20,6 @@ from reference_sim.energies.energy import Energy
 from reference_sim.energies.stretch_spring import StretchSpring
 from reference_sim.energies.stretch_stvk import StretchStVK
 from snug.training.physics_loss import BENDING
-
-
-@dataclass(kw_only=True)
-class OtherMaterial(Simulation):
-    """Reference simulation with some energies exchanged. exchange: one of EXCHANGES."""
-
-    exchange: str
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Exchange the energies and prepare; the start stays that of the scene's own material."""
-        start = scene.start_state
-        energies, minimised = (
-            tuple(map(EXCHANGES[self.exchange], terms)) for terms in (scene.energies, scene.minimised)
-        )
-        super().prepare(
-            dataclasses.replace(scene, energies=energies, minimised=minimised, settle=lambda: start)
-        )
 
 
 def _printed_bending(term: Energy) -> Energy:
@@ -62,30 +45,31 @@ def _pbns_springs(term: Energy) -> Energy:
 EXCHANGES = {"printed-bending": _printed_bending, "springs": _springs, "pbns-springs": _pbns_springs}
 
 
-def make_other_material(*, models: Path, seed: int, exchange: str) -> OtherMaterial:
-    """Make the reference with that exchange."""
-    return OtherMaterial(options={}, exchange=exchange)
+def of_other_material(scene: BuiltScene, exchange: str) -> BuiltScene:
+    """Return the scene with some energies exchanged; the start stays that of its own material."""
+    start, change = scene.start_state, EXCHANGES[exchange]
+    energies, minimised = (tuple(map(change, terms)) for terms in (scene.energies, scene.minimised))
+    return replace(scene, energies=energies, minimised=minimised, settle=lambda: start)
 
 
-@dataclass
-class PerturbedStart(Simulation):
-    """Simulation from a start whose free vertices are each moved by `shift` [m] in a random direction.
+def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:
+    """Return the scene with each free vertex moved by `shift` [m] in a random direction at the start.
 
     The directions are seeded by the shift, so that every run is perturbed differently.
     """
-
-    shift: float = 0.0
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Move the start and prepare the simulation."""
-        seed = np.float64(self.shift).view(np.uint64)
-        direction = np.random.default_rng(int(seed)).standard_normal(scene.start.shape)
-        direction *= self.shift / np.linalg.norm(direction, axis=1, keepdims=True)
-        direction[scene.cloth.pins] = 0.0
-        start = scene.start_state + np.stack([direction, np.zeros_like(direction)])
-        super().prepare(dataclasses.replace(scene, settle=lambda: start))
+    seed = np.float64(shift).view(np.uint64)
+    direction = np.random.default_rng(int(seed)).standard_normal(scene.start.shape)
+    direction *= shift / np.linalg.norm(direction, axis=1, keepdims=True)
+    direction[scene.cloth.pins] = 0.0
+    start = scene.start_state + np.stack([direction, np.zeros_like(direction)])
+    return replace(scene, settle=lambda: start)
 
 
-def make_perturbed_start(*, models: Path, seed: int, shift: float) -> PerturbedStart:
+def make_other_material(*, models: Path, seed: int, exchange: str) -> Simulation:
+    """Make the reference with that exchange, one of EXCHANGES."""
+    return Simulation(change=partial(of_other_material, exchange=exchange))
+
+
+def make_perturbed_start(*, models: Path, seed: int, shift: float) -> Simulation:
     """Make the reference from a start perturbed by `shift` [m]."""
-    return PerturbedStart(options={}, shift=shift)
+    return Simulation(change=partial(of_perturbed_start, shift=shift))

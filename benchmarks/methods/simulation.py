@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +17,20 @@ from reference_sim.trajectory import Trajectory
 
 @dataclass
 class Simulation(Method):
-    """Simulation whose steps are minimised to a tolerance, or stopped after `max_iterations` a step."""
+    """Simulation whose steps are minimised to a tolerance, or stopped after `max_iterations` a step.
 
-    options: dict[str, Any]
-    scene: BuiltScene | None = None
-    stepper: TimeStepper | None = None
-    announced: bool = False
+    options: of a TimeStepper. change: makes the scene that is simulated from the one that is given.
+    """
+
+    options: dict[str, Any] = field(default_factory=dict)
+    change: Callable[[BuiltScene], BuiltScene] | None = None
+    scene: BuiltScene = field(init=False)
+    stepper: TimeStepper = field(init=False)
+    announced: bool = field(default=False, init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
         """Settle the start, set the solver up, and compile by two frames that are thrown away."""
-        self.scene = scene
+        self.scene = scene = self.change(scene) if self.change else scene
         # Solvers that stop early are approximations of the declared terms, and a function that makes a
         # minimiser knows no terms that join a step late.
         declared_alone = "max_iterations" in self.options or callable(self.options.get("method"))
@@ -40,7 +45,6 @@ class Simulation(Method):
 
     def run(self) -> Trajectory:
         """Simulate all frames, with the solver as it was when it was set up."""
-        assert self.scene is not None and self.stepper is not None
         self.stepper.start_again()
         # Hours at the paper's scale: a bar with the time left, a microsecond of a frame's milliseconds.
         # Once: short runs are done again until enough time is measured.
@@ -49,10 +53,9 @@ class Simulation(Method):
         return self._simulate(frames=self.scene.frames, progress=label)
 
     def _simulate(self, *, frames: int, progress: str | None = None) -> Trajectory:
-        scene, stepper = self.scene, self.stepper
-        assert scene is not None and stepper is not None
+        scene = self.scene
         return simulate_with(
-            stepper,
+            self.stepper,
             frames=frames,
             start=scene.start,
             velocity=scene.start_velocity,
@@ -68,4 +71,4 @@ def make_simulation(*, models: Path, seed: int, **options: Any) -> Simulation:
     """
     if ":" in options.get("method", ""):
         options["method"] = load_function(options["method"], "")
-    return Simulation(options=options)
+    return Simulation(options)

@@ -38,60 +38,39 @@ import numpy as np
 
 from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE, step_terms
 from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit, with_types_resolved
-from reference_sim.minimise.descent import Descent, Result, Stop, iterate
+from reference_sim.minimise.descent import Descent, Result, Stop
 from reference_sim.potential import Potential
 
 RUNAWAY_DISTANCE = 100.0  # [m] from the guess: nowhere
 
 
-class SweepRun(Descent):
-    """State of one minimisation by sweeps; x, value and g stay those of the start until the last one.
-
-    Attributes:
-        swept: (V, 3) [m] positions that the sweeps move in place.
-        sweep: moves them once.
-    """
-
-    swept: np.ndarray
-    sweep: Callable[[], object]
-
-
 class SweepSolver(ABC):
     """Minimiser that takes `max_iterations` sweeps; a subclass says how they begin and what one does."""
-
-    timeout = float("inf")
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
         self.potential, self.max_iterations = potential, max_iterations
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Sweep from x0 (V, 3) [m]; the status is "max_iterations" or, where it runs away, "diverged"."""
-        run = SweepRun(self.potential, x0)
-        return run.result(iterate(self, run))
+        run = Descent(self.potential, x0)
+        x, sweep = self.begin(run.x)
+        for run.iterations in range(1, self.max_iterations + 1):
+            sweep()
+            # Written so that NaN is as far.
+            if not (np.abs(x - run.x).max(initial=0.0) < RUNAWAY_DISTANCE):
+                reason = f"sweep {run.iterations} threw a vertex far away"
+                return run.result(Stop("diverged", reason))
+        run.x = x
+        run.value, run.g = run.evaluate(x)
+        return run.result(Stop("max_iterations", f"{run.iterations} sweeps done"))
 
     def start_again(self) -> None:
         """Do nothing: sweeps learn nothing from step to step."""
         return
 
     @abstractmethod
-    def init(self, run: SweepRun) -> Stop | None:
-        """Set `run.swept` and `run.sweep`."""
-
-    def step(self, run: SweepRun) -> Stop | None:
-        """Sweep once."""
-        run.sweep()
-        return None
-
-    def terminate(self, run: SweepRun) -> Stop | None:
-        """Stop after the last sweep, or the one that threw a vertex RUNAWAY_DISTANCE from where it began."""
-        # Written so that NaN is as far.
-        if run.iterations and not (np.abs(run.swept - run.x).max(initial=0.0) < RUNAWAY_DISTANCE):
-            return Stop("diverged", f"sweep {run.iterations} threw a vertex far away")
-        if run.iterations < self.max_iterations:
-            return None
-        run.x = run.swept
-        run.value, run.g = run.evaluate(run.x)
-        return Stop("max_iterations", f"{run.iterations} sweeps done")
+    def begin(self, guess: np.ndarray) -> tuple[np.ndarray, Callable[[], object]]:
+        """Return where the sweeps begin (V, 3) [m], and the function that moves it in place once."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -150,14 +129,9 @@ def sweep_constraints(x, w, terms):
 
 
 class VertexBlockDescent(SweepSolver):
-    """Vertex block descent for one potential.
+    """Vertex block descent for one potential, in sweeps over all free vertices.
 
-    Args:
-        potential: the sum of energies.
-        max_iterations: sweeps over all free vertices.
-
-    Raises:
-        ValueError: the potential has a term without a sweep, or no inertia.
+    Raises ValueError for a term without a sweep, and without inertia.
     """
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
@@ -178,11 +152,10 @@ class VertexBlockDescent(SweepSolver):
             tuple((kernel, (*around, *freeze())) for kernel, around, freeze in self._blocks),
         )
 
-    def init(self, run: SweepRun) -> Stop | None:
+    def begin(self, guess: np.ndarray) -> tuple[np.ndarray, Callable[[], object]]:
         """Begin at the guess."""
-        run.swept = run.x.copy()
-        run.sweep = with_types_resolved(sweep_vertices, run.swept, self._free, *self.freeze())
-        return None
+        x = guess.copy()
+        return x, with_types_resolved(sweep_vertices, x, self._free, *self.freeze())
 
 
 def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
@@ -201,12 +174,7 @@ def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np
 class XPBD(SweepSolver):
     """Extended position-based dynamics for one potential, of which it finds no minimum in general.
 
-    Args:
-        potential: the sum of energies.
-        max_iterations: sweeps over all constraints.
-
-    Raises:
-        ValueError: the potential has a term without a sweep, or no inertia.
+    A sweep is over all constraints. Raises ValueError for a term without a sweep, and without inertia.
     """
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
@@ -216,13 +184,12 @@ class XPBD(SweepSolver):
         masses, dt = terms.inertia.masses, terms.inertia.dt
         self._inverse = np.where(potential.cloth.free, dt**2 / masses, 0.0)
 
-    def init(self, run: SweepRun) -> Stop | None:
+    def begin(self, guess: np.ndarray) -> tuple[np.ndarray, Callable[[], object]]:
         """Begin at the predicted positions; of the guess only the pinned vertices are read."""
         x = self._terms.inertia.x_hat.copy()
         x[:, 1] -= self._inverse * self._terms.weights
         pins = self.potential.cloth.pins
-        x[pins] = run.x[pins]
+        x[pins] = guess[pins]
         frozen = (constraints.freeze() for constraints in self._terms.kernels)
         terms = tuple(zip(self._kernels, frozen))
-        run.swept, run.sweep = x, with_types_resolved(sweep_constraints, x, self._inverse, terms)
-        return None
+        return x, with_types_resolved(sweep_constraints, x, self._inverse, terms)

@@ -44,8 +44,7 @@ class ResidualTransport:
         self._transforms = transforms.numpy()
         self._last: tuple[int, np.ndarray] = (-1, np.zeros((0, 9)))  # a frame, its blended transforms
 
-    def _blended(self, frame: int) -> np.ndarray:
-        """Return the blended linear parts (V, 9) of a frame."""
+    def _blended(self, frame: int) -> np.ndarray:  # linear parts (V, 9)
         linear = self._transforms[frame, :, :, :3].reshape(len(self._transforms[frame]), 9)
         return self._weights @ linear
 
@@ -161,4 +160,4 @@ def make_warm_started(*, models: Path, seed: int, guess: str, solver: str, itera
     if not fast:
         of_solver |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
     path = model_path(models, guess, seed)
-    return WarmStarted(options={}, guess=guess, path=path, solver=of_solver, residual=fast)
+    return WarmStarted(guess=guess, path=path, solver=of_solver, residual=fast)
