@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.provenance import digest
 
@@ -33,34 +33,20 @@ class InputError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class UserBody:
-    """A body of SMPL's family, and the file that it was read from."""
+class Read:
+    """What was read from a user's file: a body of SMPL's family, or a garment on the body of the run.
+
+    name: of the garment, and first part of the names of its scenes.
+    """
 
     path: Path
-    body: Body
+    content: Any
+    name: str = ""
 
     @cached_property
     def digest(self) -> str:
-        """Digest of the body as read."""
-        return digest(self.body)
-
-
-@dataclass(frozen=True, eq=False)
-class UserGarment:
-    """A garment on the body of the run, and the file that it was read from."""
-
-    file: GarmentFile
-    garment: Garment
-
-    @property
-    def name(self) -> str:
-        """Name of the garment, and first part of the names of its scenes."""
-        return self.file.name
-
-    @cached_property
-    def digest(self) -> str:
-        """Digest of the garment as read: of its file, of the options, and of the body that wears it."""
-        return digest(self.garment)
+        """Digest of what was read, for a garment that of the body too that wears it."""
+        return digest(self.content)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +56,16 @@ class Inputs:
     motions: name -> motion at its full length.
     """
 
-    body: UserBody | None = None
-    garment: UserGarment | None = None
+    body: Read | None = None
+    garment: Read | None = None
     motions: Mapping[str, Motion] = field(default_factory=dict)
 
     @cached_property
     def wearer(self) -> Body:
         """The body that wears the garments: the user's, or the package's."""
-        if self.body is not None:
-            return self.body.body
         from snug.body.parametric_body import Body  # not needed where a run has no dressed scene
 
-        return Body.load()
+        return self.body.content if self.body else Body.load()
 
 
 def read_inputs(
@@ -105,22 +89,21 @@ def read_inputs(
     >>> read_inputs().garment is None
     True
     """
-    worn = None
+    inputs = Inputs(motions=_read_motions([path for path in motions if path != LIBRARY], motion_options))
     if body is not None:
         from snug.body.smpl_files import read_body  # loads scipy
 
-        worn = UserBody(body, read_body(body))
-    inputs = Inputs(worn, motions=_read_motions(motions, motion_options))
-    if garment is None:
-        return inputs
-    from snug.garments.reading import read_garment  # it loads libraries of meshes
+        inputs = replace(inputs, body=Read(body, read_body(body)))
+    if garment is not None:
+        from snug.garments.reading import read_garment  # it loads libraries of meshes
 
-    return Inputs(worn, UserGarment(garment, read_garment(garment, inputs.wearer)), inputs.motions)
+        worn = Read(garment.path, read_garment(garment, inputs.wearer), garment.name)
+        inputs = replace(inputs, garment=worn)
+    return inputs
 
 
-def _read_motions(paths: Sequence[str], options: MotionFileOptions | None) -> dict[str, Motion]:
+def _read_motions(files: Sequence[str], options: MotionFileOptions | None) -> dict[str, Motion]:
     motions: dict[str, Motion] = {}
-    files = [path for path in paths if path != LIBRARY]
     if not files:
         return motions
     from snug.motion.files import load_motions  # its readers are slow to load
@@ -133,9 +116,8 @@ def _read_motions(paths: Sequence[str], options: MotionFileOptions | None) -> di
             if motion.name in motions or (motion.name in MADE and motion.name not in CLIPS):
                 raise InputError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST_FRAMES:
-                raise InputError(
-                    f"--motions {path}: {motion.frames} frames; at least {FEWEST_FRAMES} are needed"
-                )
+                few = f"{motion.frames} frames; at least {FEWEST_FRAMES} are needed"
+                raise InputError(f"--motions {path}: {few}")
             motions[motion.name] = motion
     return motions
 
@@ -208,10 +190,10 @@ def open_assets(
     from snug.garments.templates import find_template
 
     inputs = inputs or Inputs()
-    wearer, user_garment = inputs.wearer, inputs.garment
+    wearer, worn = inputs.wearer, inputs.garment
     tailored = {
-        name: user_garment.garment
-        if user_garment and name == user_garment.name
+        name: worn.content
+        if worn and name == worn.name
         else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
         for name in garments
     }

@@ -21,7 +21,7 @@ from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.options import REPLACED, add_study_options, study_of
+from benchmarks.plan.options import add_study_options, study_of
 from benchmarks.plan.plan import STATES, Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
@@ -72,11 +72,7 @@ class Declarations:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     one_thread()
-    parser = Parser(
-        prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES,
-        replaced=REPLACED
-        | {"--seconds": "a method in a tiny scene is ended after two minutes, elsewhere as in a run"},
-    )  # fmt: skip
+    parser = Parser(prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES)
     parser.add_argument("what", nargs="+", metavar="FILE", help="a file")
     parser.add_argument("--scene", metavar="SCENE",
         help="check the methods in this scene of benchmarks.run --list, in place of the tiny ones: for "

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from benchmarks.methods import find_method
 from benchmarks.plan.make_plan import plan_scene
-from benchmarks.plan.options import OF_SCENES, REPLACED, add_study_options, study_of
+from benchmarks.plan.options import OF_SCENES, add_study_options, study_of
 from benchmarks.plan.study import StudyError
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
@@ -34,7 +34,6 @@ exit status: 0 written; 2 the scene is not known or cannot be made, or the folde
 def make_export_parser() -> argparse.ArgumentParser:
     """Return the parser of the command."""
     parser = Parser(
-        replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
         description="Write a scene as plain files: rest mesh, weights, material, motion, posed body, start.",
         epilog=EXAMPLES,

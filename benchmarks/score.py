@@ -19,7 +19,7 @@ from typing import Any, Literal
 from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, parse_roll_out
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import REPLACED, add_study_options, study_of
+from benchmarks.plan.options import add_study_options, study_of
 from benchmarks.plan.plan import Plan
 from benchmarks.plan.study import Study, StudyError, option, read_study
 from benchmarks.results.run_folder import RunFolder
@@ -61,7 +61,6 @@ exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cann
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of the command."""
     parser = Parser(
-        replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
         description="Energies, gap to the minimum of each step, curvature, depth, dynamics of "
         "a roll-out of another program: rows, a report, one line.",

@@ -164,18 +164,8 @@ def _cases(study: Study, cases: Sequence[Case]) -> Iterator[Case]:
 def _check_words(read: ReadStudy) -> None:
     """Raise StudyError for a word of a field that nothing has as its name."""
     study, methods, cases = read.study, list(read.methods), [case.name for case in read.cases]
-    fields: dict[tuple[str, ...], tuple[list[str], tuple[str, ...]]] = {
-        ("scenes",): ([*read.scenes, *cases], study.scenes),
-        ("methods",): (methods, study.methods),
-    }
-    # Scenes that tailor a T-shirt themselves are none of a run with another garment.
-    scenes = list(dict.fromkeys((*read.scenes, *all_scenes((), ()))))
-    for name, part in study.parts.items():
-        patterns = expanded((*part.scenes, *part.optional_scenes), read.motions)
-        fields["parts", name, "scenes"] = scenes, tuple(patterns)
-        fields["parts", name, "methods"] = methods, part.methods
-        fields["parts", name, "cases"] = [*cases, *SETS], part.cases
-    for field, (known, words) in fields.items():
+
+    def check(field: tuple[str, ...], known: Sequence[str], words: Iterable[str]) -> None:
         for word in words:
             if not matching(known, [word.removeprefix("!")]):
                 what, hint = field[-1].removesuffix("s"), ""
@@ -183,6 +173,16 @@ def _check_words(read: ReadStudy) -> None:
                     hint = " (scenes of a dressed body are validation and test motions: see test_motions)"
                 place = study.place(*field)
                 raise StudyError(f"{place}: unknown {what} '{word}'; {nearest(word, known)}{hint}")
+
+    check(("scenes",), [*read.scenes, *cases], study.scenes)
+    check(("methods",), methods, study.methods)
+    # Scenes that tailor a T-shirt themselves are none of a run with another garment.
+    scenes = list(dict.fromkeys((*read.scenes, *all_scenes((), ()))))
+    for name, part in study.parts.items():
+        patterns = expanded((*part.scenes, *part.optional_scenes), read.motions)
+        check(("parts", name, "scenes"), scenes, patterns)
+        check(("parts", name, "methods"), methods, part.methods)
+        check(("parts", name, "cases"), [*cases, *SETS], part.cases)
 
 
 def _check_user_scenes(scenes: Mapping[str, Scene], motions: Motions) -> None:
@@ -193,17 +193,13 @@ def _check_user_scenes(scenes: Mapping[str, Scene], motions: Motions) -> None:
     known = {scene.name: scene for scene in (*SCENES, *further_scenes(motions.first_garment))} | dict(scenes)
     settling = [name for name, scene in known.items() if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes.values() if scene.declared_in):
-        if scene.start_of and scene.start_of not in settling:
-            raise StudyError(
-                f"{scene.declared_in}: scene '{scene.name}': start_of='{scene.start_of}': name another scene "
-                "whose garment settles by itself, of the run or without a motion; "
-                f"{nearest(scene.start_of, settling)}"
-            )
-        if scene.dressed and scene.motion not in (names := [*motions.files, *LIBRARY]):
-            raise StudyError(
-                f"{scene.declared_in}: scene '{scene.name}': no motion is called '{scene.motion}'; "
-                f"{nearest(scene.motion, names)}"
-            )
+        for field, asked, names in (
+            ("start_of", bool(scene.start_of), settling),
+            ("motion", scene.dressed, [*motions.files, *LIBRARY]),
+        ):
+            if asked and (word := getattr(scene, field)) not in names:
+                what = f"{scene.declared_in}: scene '{scene.name}': {field}='{word}'"
+                raise StudyError(f"{what}: nothing that serves is called so; {nearest(word, names)}")
 
 
 def roll_out_cells(study: Study, cells: Sequence[Cell], methods: Mapping[str, MethodEntry]) -> list[Cell]:
@@ -218,9 +214,10 @@ def roll_out_cells(study: Study, cells: Sequence[Cell], methods: Mapping[str, Me
     from benchmarks.methods.outside import entry_of  # loads numpy
 
     scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
-    suites: dict[str, dict[str, None]] = {name: {} for name in scenes}
-    for cell in (cell for cell in cells if cell.scene.name in scenes):
-        suites[cell.scene.name].update(dict.fromkeys(cell.suites))
+    suites = {
+        name: dict.fromkeys(suite for cell in cells if cell.scene.name == name for suite in cell.suites)
+        for name in scenes
+    }
     stored: list[Cell] = []
     for option in study.rollouts.values():
         what = f"{option.name}={option.path}"

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from benchmarks.assets import read_inputs
-from benchmarks.declarations import DeclarationError, by_name
+from benchmarks.declarations import by_name
 from benchmarks.method import installed
 from benchmarks.methods import METHODS, find_method
 from benchmarks.metrics import declared
@@ -25,7 +25,6 @@ from benchmarks.scene import Scene
 from benchmarks.scenes import GarmentScenes, all_scenes
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
-from snug.file_options import GarmentFile
 
 WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
 
@@ -64,13 +63,16 @@ def make_plan(
     """
     folder = choose_folder(folder)
     check_machines(study, folder, scheduler)
-    states = choose_states(only, fresh=fresh)
+    for state in only:
+        if state not in STATES[1:]:
+            raise StudyError(f"--only: unknown state '{state}'; choose from {', '.join(STATES[1:])}")
+    if only and fresh:
+        raise StudyError("--fresh does everything again: leave out --only")
     workers = min(WORKERS, usable_cores()) if workers is None else workers
     if workers < 1:
         raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
     read = read_files(study, scenes)
     cells, cases = choose_cells(read)
-    check_body_shapes(read, [cell.scene for cell in cells])
     asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
     return Plan(
         preset=study.sizes,
@@ -83,7 +85,7 @@ def make_plan(
         seeds=study.seeds,
         device=study.device,
         folder=folder,
-        only=states,
+        only=frozenset(only or DEFAULT_ONLY),
         fresh=fresh,
         workers=workers,
         scheduler=scheduler,
@@ -103,11 +105,7 @@ def plan_scene(study: Study, name: str) -> Plan:
     if name not in read.scenes:
         raise StudyError(f"no scene '{name}'; {nearest(name, list(read.scenes))}")
     cell = Cell(read.scenes[name].at(study.sizes), find_method("simulation"), 0, ("speed",))
-    check_body_shapes(read, [cell.scene])
-    return Plan(
-        preset=study.sizes, suites=("speed",), cells=(cell,), cases=(), motions=read.motions,
-        inputs=read.inputs, seeds=study.seeds, device="cpu", folder=Path(), command="", study=study.written,
-    )  # fmt: skip
+    return Plan(preset=study.sizes, cells=(cell,), motions=read.motions, inputs=read.inputs)
 
 
 def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
@@ -121,22 +119,17 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
         ValueError: one line for the first file that cannot be read or named.
     """
     study, user_scenes, user_methods, user_cases = user_files.declarations_of(study)
-    if study.garment and study.garment.name in {name.split("/")[0] for name in all_scenes("-", "-")}:
-        what = f"garment {study.garment.path}: the project has scenes of that name"
+    garment, self_contact = study.garment, study.self_contact
+    if garment and garment.name in {name.split("/")[0] for name in all_scenes("-", "-")}:
+        what = f"garment {garment.path}: the project has scenes of that name"
         raise StudyError(f"{what}: give the file another name")
-    inputs = read_inputs(study.body, study.garment, study.motions, study.motion_files)
+    if self_contact and not installed("ipctk"):
+        raise StudyError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
+    inputs = read_inputs(study.body, garment, study.motions, study.motion_files)
     motions = split_motions(study, inputs.motions)
-    if study.garment:
-        motions = replace(motions, worn=(scenes_of_file(study.garment), *motions.worn[1:]))
-    if study.self_contact:
-        if not installed("ipctk"):
-            raise StudyError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
-        motions = replace(motions, worn=tuple(replace(w, self_contact=True) for w in motions.worn))
-    cases = by_name("known answer", (*CASES, *user_cases))
-    for scene in user_scenes:
-        if scene.name in cases:
-            what = f"{scene.declared_in}: scene '{scene.name}': a case of the project has this name"
-            raise DeclarationError(f"{what}: give it another")
+    of_file = [GarmentScenes(garment.name, f"a garment of {garment.path.name}")] if garment else []
+    worn = (*of_file, *motions.worn[len(of_file) :])  # in place of the T-shirt
+    motions = replace(motions, worn=tuple(replace(w, self_contact=self_contact) for w in worn))
     roles, dynamic = motions.roles(), motions.roles(dynamic=True)
     measured = all_scenes(
         dict.fromkeys((*motions.measured, *roles["test"], *roles["validation"])),
@@ -145,6 +138,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
     )
     known = by_name("scene", (*measured.values(), *scenes, *user_scenes))
     methods = by_name("method", (*METHODS, *user_methods))
+    cases = by_name("known answer", (*CASES, *user_cases))
     return ReadStudy(study, inputs, motions, known, methods, tuple(cases.values()))
 
 
@@ -159,38 +153,10 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
     return homes
 
 
-def check_body_shapes(read: ReadStudy, scenes: Sequence[Scene]) -> None:
-    """Raise StudyError for a user's body with fewer shapes than a scene of the project sets."""
-    if not (body := read.inputs.body):
-        return
-    for scene in scenes:
-        needed = 0 if scene.declared_in else len(scene.options.get("betas", ()))
-        if needed > body.body.shape_count:
-            raise StudyError(
-                f"body {body.path}: has {body.body.shape_count} body shapes (array 'shapedirs'), scene "
-                f"{scene.name} needs {needed}: give a body with as many, or name other scenes by --scenes"
-            )
-
-
-def scenes_of_file(file: GarmentFile) -> GarmentScenes:
-    """Return the scenes of a user's garment, which take the place of the T-shirt's."""
-    return GarmentScenes(file.name, f"a garment of {file.path.name}")
-
-
-def choose_states(states: Sequence[str], *, fresh: bool) -> frozenset[str]:
-    """Return the states of records whose work is done again. Raises StudyError."""
-    for state in states:
-        if state not in STATES[1:]:
-            raise StudyError(f"--only: unknown state '{state}'; choose from {', '.join(STATES[1:])}")
-    if states and fresh:
-        raise StudyError("--fresh does everything again: leave out --only")
-    return frozenset(states or DEFAULT_ONLY)
-
-
 def check_machines(study: Study, folder: Path, scheduler: str) -> None:
     """Raise ValueError for a device that this machine lacks, for networks of no folder, or of the run's own.
 
-    Where a cluster works, also for files that lie on this machine alone.
+    Where a cluster works, also for what this machine alone has.
     """
     if study.device == "cuda":
         from snug.training.device import find_device  # loads torch
@@ -201,13 +167,10 @@ def check_machines(study: Study, folder: Path, scheduler: str) -> None:
         raise StudyError(f"{place}: no such folder; without DIR the package's are taken")
     if trained and trained.resolve() == folder.resolve():  # where networks of another training are removed
         raise StudyError(f"{place}: the folder of this run itself: give another by --out")
-    for field in ("rollouts", "trained") if scheduler else ():
-        if getattr(study, field):
-            here = "its files lie on this machine alone"
-            raise StudyError(f"{study.place(field)}: {here}; leave out --scheduler")
-    if scheduler and study.device != "cpu":
-        what = f"{study.place('device')}: on a cluster networks train on cpu"
-        raise StudyError(f"{what}; leave out --scheduler")
+    for field, given in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
+        if scheduler and given and given != "cpu":
+            what = f"{study.place(field)}: a cluster has the cpu, and no file of this machine"
+            raise StudyError(f"{what}; leave out --scheduler")
 
 
 def choose_folder(folder: Path | None) -> Path:

@@ -7,15 +7,7 @@ from dataclasses import dataclass
 
 from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
-from snug.motion.library import (
-    DYNAMIC_TEST,
-    DYNAMIC_VALIDATION,
-    LIBRARY,
-    TEST,
-    TRAIN,
-    VALIDATION,
-    clip_of,
-)
+from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION, clip_of
 
 
 @dataclass(frozen=True)
@@ -52,9 +44,9 @@ class Motions:
 
     def role_of(self, motion: str) -> str:
         """Return its role: "training", "validation", "test", or empty where it has none in this run."""
-        for role, name in (("test", "test"), ("validation", "validation"), ("train", "training")):
+        for role in ("test", "validation", "train"):
             if motion in (*self.roles()[role], *self.roles(dynamic=True)[role]):
-                return name
+                return "training" if role == "train" else role
         return ""
 
     @property
@@ -109,13 +101,11 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     held_out = {clip_of(name) for name in (*test, *validation, *of_library)}
     train = tuple(name for name in learned if clip_of(name) not in held_out)
     train = train or tuple(name for name in TRAIN if name not in held_out)
+    split, sizes = study.split, study.sizes
     # Whoever names motions means all of them, whatever the sizes.
-    few = None if getattr(study, f"{study.split}_motions") else study.sizes.test_motions
-    motions = Motions(
-        train[: study.sizes.train_motions], test, validation, tuple(files), split=study.split, few=few
-    )
+    few = None if getattr(study, f"{split}_motions") else sizes.test_motions
+    motions = Motions(train[: sizes.train_motions], test, validation, tuple(files), split=split, few=few)
     if not motions.measured:
-        raise StudyError(
-            f"{study.place('split')}: no motion has this role; name some by {study.split}_motions"
-        )
+        place = study.place("split")
+        raise StudyError(f"{place}: no motion has this role; name some by {split}_motions")
     return motions

@@ -1,4 +1,4 @@
-"""Options of commands that read a study: short forms of its fields, former ones, the text of --list.
+"""Options of commands that read a study: short forms of its fields, the text of --list.
 
 Light, so that --help answers at once.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 from benchmarks.declarations import attributes_of
@@ -52,25 +51,11 @@ SHORT = {  # field -> its placeholder in help; those of a scene first
 }  # fmt: skip
 OF_SCENES = tuple(SHORT)[:4]
 SINGLE = ("body", "garment", "trained")  # given once
-WORDS = {  # what now stands behind a path: former options
-    "ROLLOUT,units=cm": "units up fps other-mesh declared-ms name",
-    "--motions PATH,up=z": "motion-up motion-fps joint-map repair",
-    "--garment FILE,units=cm": "garment-units garment-up garment-shift garment-rest garment-uv-scale "
-    "garment-material",
-}
-REPLACED = {  # former option -> what to say in its place
-    "--preset": "name a study (smoke, paper), or --set sizes=NAME",
-    "--suite": "name parts of a study: python -m benchmarks.run full:NAME",
-    "--frames": "--set sizes.frames=N",
-    **{f"--{f.name.replace('_', '-')}": f"--set {f.name}=..." for f in fields(Study) if f.name not in SHORT},
-    **{f"--{name}": f"say it behind a path: {place}" for place in WORDS for name in WORDS[place].split()},
-}
 
 
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of benchmarks.run."""
     parser = Parser(
-        replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
         description="Run a study: dress a body, simulate the ground truth, train the networks, compare all "
         "methods and write tables, figures and a PDF.",

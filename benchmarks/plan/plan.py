@@ -16,7 +16,6 @@ from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import StudyError
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.protocol import NUMBER, OWN
-from benchmarks.results.row import LONGEST_NAME
 from benchmarks.scene import Scene
 from benchmarks.scenes import all_scenes
 from benchmarks.training import Training
@@ -72,16 +71,16 @@ class Plan:
     """
 
     preset: Preset
-    suites: tuple[str, ...]
     cells: tuple[Cell, ...]
-    cases: tuple[Case, ...]
+    suites: tuple[str, ...] = ("speed",)
+    cases: tuple[Case, ...] = ()
     metrics: tuple[str, ...] = ()
     motions: Motions = field(default_factory=Motions)
     inputs: Inputs = field(default_factory=Inputs)
-    seeds: tuple[int, ...]
-    device: str
-    folder: Path
-    command: str
+    seeds: tuple[int, ...] = (0,)
+    device: str = "cpu"
+    folder: Path = Path()
+    command: str = ""
     only: frozenset[str] = frozenset(DEFAULT_ONLY)
     fresh: bool = False
     workers: int = 1
@@ -107,11 +106,6 @@ class Plan:
         """The garments of the plan's scenes, each once."""
         return tuple(dict.fromkeys(cell.scene.garment for cell in self.cells if cell.scene.dressed))
 
-    def motions_of(self, garment: str) -> tuple[str, ...]:
-        """Return the names of a garment's motions of the split, and of others in the plan's scenes."""
-        done = (scene.motion for scene in self.scenes if scene.garment == garment)
-        return tuple(dict.fromkeys((*self.motions.measured_of(garment), *done)))
-
     @property
     def cut_motions(self) -> dict[str, str]:
         """Motion of a user's file -> which of its frames are measured, where these are not all."""
@@ -126,30 +120,20 @@ class Plan:
         """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
         from benchmarks.assets import embedded_motions, open_assets  # loads numpy
 
-        names = [name for garment in self.garments for name in self.motions_of(garment)]
-        if self.networks:
-            names += self.motions.train
-        names, read = list(dict.fromkeys(names)), self.inputs.motions
+        names, read, train = [], self.inputs.motions, self.motions.train
+        for garment in self.garments:
+            names += self.motions.measured_of(garment)
+            names += [scene.motion for scene in self.scenes if scene.garment == garment]
+        names = list(dict.fromkeys((*names, *(train if self.networks else ()))))
         motions = [read[name] for name in names if name in read]
         motions += embedded_motions(name for name in names if name not in read)
-        train = self.motions.train
         return open_assets(self.preset, motions, self.garments, inputs=self.inputs, training=train)
 
 
 def check_names(cells: Sequence[Cell]) -> None:
-    """Raise StudyError where a name makes no file, or the files of another.
-
-    In names of files slashes become hyphens, and a seed stands behind a hyphen.
-    """
+    """Raise StudyError where two cells have the files of one: slashes of names become hyphens there."""
     cell_of: dict[str, Cell] = {}
     for cell in cells:
-        for what, name in (("scene", cell.scene.name), ("method", cell.method)):
-            if len(name.encode()) > LONGEST_NAME:
-                raise StudyError(
-                    f"{what} '{name[:40]}...': its name has more than {LONGEST_NAME} bytes: shorten it"
-                )
-        if cell.method == "body" or cell.method.endswith("quasi-static"):
-            raise StudyError(f"method '{cell.method}': files of the project have this name: give it another")
         if (other := cell_of.setdefault(cell.name, cell)) is not cell:
             raise StudyError(f"{cell.label} and {other.label} would have the same files: rename one")
 
@@ -186,8 +170,7 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
 
 def protocol_of_case(scene: str, metric: str) -> str:
     """Return the protocol of a row that no cell gives: OWN of a case that is not the project's."""
-    known = scene in _places() or (scene, metric) in _places()
-    return NUMBER if known else OWN
+    return NUMBER if {scene, (scene, metric)} & _places() else OWN
 
 
 @cache

@@ -155,13 +155,12 @@ def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> s
 FILE = "study.toml"  # of a study that is a folder
 PACKAGED = Path(__file__).parents[1] / "studies"
 FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
-HIDDEN = {
-    Study: ("written", "origin"),
-    RollOutOption: ("role",),
-    Preset: ("name", "description"),
-}  # attributes that no file gives
+HIDDEN = {  # attributes that no file gives
+    Study: ("written", "origin"), Preset: ("name", "description"), RollOutOption: ("role",),
+}  # fmt: skip
 WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
+LINE = re.compile(r"\s*(?:\[([^\[\]]+)\]\s*(?:#.*)?$|([\w.\"'-]+)\s*=)")  # a table, or a field of it
 Field = tuple[str, ...]
 Record = TypeVar("Record")
 
@@ -320,12 +319,11 @@ def line_of(text: str, field: Field) -> int:
     header: list[str] = []
     best, line = 0, 1
     for number, words in enumerate(text.splitlines(), 1):
-        if match := re.match(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?$", words):
-            header = name = _names(match[1])
-        elif match := re.match(r"\s*([\w.\"'-]+)\s*=", words):
-            name = [*header, *_names(match[1])]
-        else:
+        if not (match := LINE.match(words)):
             continue
+        table, key = match.groups(default="")
+        header = _names(table) if table else header
+        name = [*header, *_names(key)]
         if len(name) > best and tuple(name) == field[: len(name)]:
             best, line = len(name), number
     return line
@@ -351,36 +349,40 @@ class _Reader:
         """Raise StudyError with the place."""
         raise StudyError(f"{self.place(field)}: {message}")
 
-    def checked(self, field: Field, make: Callable[[], Any]) -> Any:
+    def checked(self, field: Field, make: Callable[..., Any], *given: Any, **named: Any) -> Any:
         """Return what `make` makes; what it refuses gets its place."""
         try:
-            return make()
+            return make(*given, **named)
         except ValueError as error:
             self.refuse((*field, *getattr(error, "field", ())), str(error))
 
     def dataclass_of(self, kind: Any, table: Any, field: Field) -> Any:
         """Return an object of a dataclass from the table of its fields."""
-        if not isinstance(table, Mapping):
-            self.refuse(field, f"{table!r}: give a table")
+        table = self.table(table, field)
         if kind is RollOutOption:
             path = self.layer(field).folder / str(table.get("path", ""))
-            table = {**table, "name": field[-1], "path": str(path)}
+            table |= {"name": field[-1], "path": str(path)}
         if kind is Preset:  # changes to the sizes that `base` names
-            table = dict(table)
-            base = self.checked((*field, "base"), lambda: find_preset(table.pop("base", "quick")))
+            base = asdict(self.checked((*field, "base"), find_preset, table.pop("base", "quick")))
         declared = {f.name: f for f in fields(kind) if f.name not in HIDDEN.get(kind, ())}
         for name in table:
             if name not in declared:
                 near = nearest(name, list(declared), otherwise=f"there are {', '.join(declared)}")
                 self.refuse((*field, name), f"no field is called '{name}'; {near}")
         if kind is Preset:
-            table = _merged(asdict(base), table)
+            table = _merged(base, table)
         for name, f in declared.items():
             if f.default is MISSING and f.default_factory is MISSING and name not in table:
                 self.refuse(field, f"{name} is absent: give it")
         hints = get_type_hints(kind)
         values = {name: self.value(hints[name], value, (*field, name)) for name, value in table.items()}
-        return self.checked(field, lambda: kind(**values))
+        return self.checked(field, kind, **values)
+
+    def table(self, value: Any, field: Field) -> dict[str, Any]:
+        """Return a copy of a table."""
+        if not isinstance(value, Mapping):
+            self.refuse(field, f"{value!r}: give a table")
+        return dict(value)
 
     def value(self, hint: Any, value: Any, field: Field) -> Any:
         """Return the value of a field as its type asks for it."""
@@ -395,9 +397,8 @@ class _Reader:
             values = value if isinstance(value, list | tuple) else [value]
             return tuple(self.value(types[0], v, field) for v in values)
         if origin in (dict, Mapping):
-            if not isinstance(value, Mapping):
-                self.refuse(field, f"{value!r}: give a table")
-            return {name: self.value(types[1], v, (*field, name)) for name, v in value.items()}
+            table = self.table(value, field)
+            return {name: self.value(types[1], v, (*field, name)) for name, v in table.items()}
         if is_dataclass(hint):
             return self.dataclass_of(hint, value, field)
         return self.word(hint, value, field)
@@ -408,7 +409,7 @@ class _Reader:
             return FOLDER if value else None
         if kind is float and type(value) is int:
             return float(value)
-        if type(value) is not (str if kind is Path else kind):
+        if type(value) is not (str if kind is Path else kind) or (kind is Path and not value):
             self.refuse(field, f"{value!r}: give {KINDS.get(kind, 'a path')}")
         folder = self.layer(field).folder
         file = kind is str and (value.endswith(".py") or (field == ("motions",) and value != LIBRARY))

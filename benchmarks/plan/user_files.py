@@ -24,7 +24,7 @@ from benchmarks.scene import Scene
 from benchmarks.training import Training
 from benchmarks.validation.case import Case, cases_of
 
-NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]*")
+NAME = re.compile(r"(?!body$|.*quasi-static$)[A-Za-z0-9_][A-Za-z0-9_+./@:-]{0,149}")  # it names files
 
 
 class Kind(NamedTuple):
@@ -122,28 +122,23 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
 def _placed(kind: Kind, entry: Any, home: str) -> Any:
     """Return the entry with the file that declares it, and all paths made absolute."""
     what, folder = f"{home}: {kind.word[:-1]} '{entry.name}'", Path(find_module(home)).parent
-    _demand(NAME.fullmatch(entry.name), f"{what}: use letters, digits and _ + - . / @ : in its name")
+    _demand(NAME.fullmatch(entry.name),
+            f"{what}: name it by at most 150 letters, digits and _ + - . / @ :, not 'body'")  # fmt: skip
     for field in ("files", "sizes", "metrics"):
         names = getattr(entry, field, None) or ()
         listed = isinstance(names, tuple | list) and all(isinstance(name, str) for name in names)
         _demand(listed, f"{what}: {field}={names!r}: give a tuple of strings")
     measured, known = getattr(entry, "metrics", None) or (), [m.name for m in MEASUREMENTS]
     _demand({*measured} <= {*known}, f"{what}: metrics={measured!r}: choose from {', '.join(known)}")
-    try:
-        digest(dict(entry.options))
-    except (TypeError, ValueError) as error:
-        raise DeclarationError(
-            f"{what}: options: {error}: give numbers, strings, and lists of them"
-        ) from None
     files = tuple(str((folder / name).resolve()) for name in entry.files)
     for file in files:
         _demand(Path(file).is_file(), f"{what}: {file}: no such file")
     source = entry.module or home
-    if source.endswith(".py"):
-        source = str((folder / source).resolve())
+    source = str((folder / source).resolve()) if source.endswith(".py") else source
     try:
+        digest(dict(entry.options))
         find_module(source)
-    except DeclarationError as error:
+    except (TypeError, ValueError) as error:
         raise DeclarationError(f"{what}: {error}") from None
     return replace(entry, module=source, declared_in=home, files=files)
 

@@ -252,7 +252,7 @@ def _head(plan: Plan) -> list[str]:
 
 def _size(plan: Plan, garment: str) -> str:
     if (user_garment := plan.inputs.garment) and garment == user_garment.name:
-        return f"{garment} of {user_garment.file.path}"
+        return f"{garment} of {user_garment.path}"
     return f"{garment} of about {plan.preset.garment_vertices} vertices"
 
 

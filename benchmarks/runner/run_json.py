@@ -62,7 +62,7 @@ class RunLog:
             "cut_motions": plan.cut_motions,
             "split": plan.motions.split,
             "body": [body.path.name, body.digest] if body else "of the package",
-            "garment": [garment.file.path.name, garment.digest] if garment else "tailored",
+            "garment": [garment.path.name, garment.digest] if garment else "tailored",
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.methods import METHODS
 from benchmarks.metrics import measured_in
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.make_plan import make_plan
@@ -88,20 +87,6 @@ def test_a_pattern_of_another_garment_means_its_motions_of_the_split():
     assert {s.name for s in plan.scenes} == {f"shorts/{motion}@clip" for motion in plan.motions.measured}
 
 
-def test_what_is_left_out_of_the_default_study_is_there_where_it_is_named():
-    slow = {"newton-2", "lbfgs-40", "gradient-descent-10", "simulation-perturbed-1e-9"}
-    for words, methods, long in (
-        ((), set(), False), (("full",), slow, True), (("--methods", "*"), slow, False),
-    ):  # fmt: skip
-        plan = planned(*words)
-        assert slow & {cell.method for cell in plan.cells} == methods
-        assert ("slit_annulus_inner" in [case.name for case in plan.cases]) == long
-    cells = planned("--methods", "lbfgs-40").cells
-    assert {cell.method for cell in cells} == {"lbfgs-40"}
-    assert {suite for cell in cells for suite in cell.suites} == {"garments", "speed", "extremes"}
-    assert planned("--scenes", "slit_annulus_inner").cases
-
-
 def test_sizes_quick_have_eight_motions_paper_all_and_either_those_that_are_named():
     def motions(*words):
         cells = planned(*words, "--methods", "simulation").cells
@@ -122,27 +107,6 @@ def test_what_no_part_lists_is_met_by_its_whole_name():
     met = {(cell.scene.name, cell.suites) for cell in planned("--scenes", f"{clip},{whole}").cells}
     assert met == {(clip, ("speed",)), (whole, ("garments",))}
     assert not {clip, whole} & {scene.name for scene in planned().scenes}
-
-
-def test_an_added_scene_or_method_needs_its_line_and_its_name(monkeypatch):
-    from benchmarks import scenes
-    from benchmarks.method import MethodEntry
-    from benchmarks.scene import Scene
-
-    mine = Scene(name="my_scene", description="", module="my_scene")
-    monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, mine))
-    entry = MethodEntry(name="my-method", description="", module="my_method")
-    monkeypatch.setitem(make_plan.__globals__, "METHODS", (*METHODS, entry))
-    cells = planned("--scenes", "my_scene", "--methods", "simulation,my-method").cells
-    assert [(c.scene, c.method, c.suites) for c in cells] == [
-        (mine, "simulation", ("speed",)),
-        (mine, "my-method", ("speed",)),
-    ]
-    worn = planned("--scenes", "tshirt/dance_turn", "--methods", "my-method").cells
-    assert [(c.scene.name, c.suites) for c in worn] == [("tshirt/dance_turn", ("garments",))]
-    for words in ((), ("--scenes", "*")):
-        named = {name for cell in planned(*words).cells for name in (cell.scene.name, cell.method)}
-        assert not {"my_scene", "my-method"} & named
 
 
 def divided(files=(), **fields):

@@ -15,7 +15,6 @@ from benchmarks.runner.schedule import Schedule
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
-from snug.motion.motion import MotionError
 from tests.benchmarks.assets.test_inputs import write_motions
 from tests.benchmarks.plan.planned import planned
 from tests.snug.garments.garment_files import own_chart, saved
@@ -28,21 +27,6 @@ WORDS = ("smoke:garments", "--methods", "skinning")
 def tube():
     """150 vertices, made in milliseconds."""
     return tube_dress().garment
-
-
-def test_scenes_of_other_body_shapes_need_a_body_that_has_shapes(tmp_path):
-    body, path = Body.load(), tmp_path / "mine.npz"
-    table = np.stack([np.maximum(body.parents, 0), np.arange(24)])
-    np.savez(
-        path, v_template=body.template, f=body.faces, weights=body.skinning_weights, kintree_table=table,
-        J_template=body.joint_template,
-    )  # fmt: skip
-    options = ("--body", str(path), "-o", str(tmp_path / "run"))
-    for part, scene, count in (("shapes", "shapes/1", 10), ("extremes", "out_of_distribution/height_+5", 1)):
-        with pytest.raises(StudyError, match=r"mine\.npz: has 0 body shapes .*'shapedirs'") as refused:
-            planned(f"full:{part}", *options)
-        assert f"scene {scene} needs {count}" in str(refused.value) and "\n" not in str(refused.value)
-    assert planned("smoke", *options).inputs.body is not None
 
 
 def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, tube):
@@ -88,14 +72,6 @@ def test_a_garment_of_ones_own_goes_through_a_run(tmp_path):
     assert {row.scene for row in rows} == {"mine/push_recovery"} and all(row.status == "ok" for row in rows)
     assert folder.read_config()["garments"]["mine"]["material"] == asdict(Material())
     assert (folder.models_of("mine") / "snug-seed0.safetensors").is_file()
-
-
-@pytest.mark.parametrize("name", ["walk  slow", "walk ", " walk", "walk,slow"])
-def test_a_name_that_rows_or_options_cannot_have_is_refused(name, tmp_path):
-    folder = write_motions(tmp_path / "clips", name)
-    with pytest.raises(MotionError, match="without a comma, without spaces side by side") as refused:
-        planned(*WORDS, "--motions", folder, "-o", str(tmp_path / "run"))
-    assert f"{folder}/{name}.npz" in str(refused.value) and "\n" not in str(refused.value)
 
 
 def subject(folder: Path, *clips: str) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import embedded_motions, open_assets, read_inputs
-from benchmarks.plan.make_plan import scenes_of_file
 from benchmarks.presets import find_preset
+from benchmarks.scenes import GarmentScenes
 from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check
@@ -132,7 +132,7 @@ def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
 
 
 def file_scene(file):
-    return scenes_of_file(file).scene("walk")
+    return GarmentScenes(file.name, "mine").scene("walk")
 
 
 # --- what is refused --------------------------------------------------------------------------------------
