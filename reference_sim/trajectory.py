@@ -16,14 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim.files.array_file import MOST_PACKED, try_out
 from reference_sim.files.atomic_files import replacing
 
 if TYPE_CHECKING:
     import h5py
 
 TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
-ALWAYS_READ = 1 << 20  # [bytes] that nobody minds
 
 
 class TrajectoryError(ValueError):
@@ -102,21 +100,14 @@ class Trajectory:
             temporary.write_bytes(image)
 
     @classmethod
-    def load(cls, path: str | Path, *, guarded: bool = False) -> Trajectory:
+    def load(cls, path: str | Path) -> Trajectory:
         """Read a file of this project.
-
-        Args:
-            path: the file.
-            guarded: whether a process of its own tries the file first, which takes some 0.2 s: for files
-                of others. A file can be made, or damaged, so that it crashes HDF5.
 
         Raises:
             TrajectoryError: missing file, or not a trajectory.
         """
         try:
-            if guarded and Path(path).is_file() and (wrong := try_out(read_file, Path(path))):
-                raise ValueError(wrong)
-            return read_file(Path(path))
+            return _read(Path(path))
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
         except ImportError:
@@ -139,12 +130,8 @@ class Trajectory:
         return self if whole.all() else self.first(int(np.argmin(whole)))
 
 
-def read_file(path: Path) -> Trajectory:
-    """Read a file.
-
-    Raises:
-        Exception: of any kind, for a file that is no trajectory or is damaged.
-    """
+def _read(path: Path) -> Trajectory:
+    """Read a file. Raises an exception of any kind for one that is no trajectory or is damaged."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -154,32 +141,17 @@ def read_file(path: Path) -> Trajectory:
             raise ValueError("its provenance is no JSON object")
         frames = int(benchmark.attrs["frames"])
         fields = benchmark["frame_fields"]
-        vertex_count = int(_whole(vtk["NumberOfPoints"])[0])
+        vertex_count = int(vtk["NumberOfPoints"][0])
         return Trajectory(
-            positions=_whole(vtk["Points"], frames * vertex_count).reshape(frames, vertex_count, 3),
-            faces=_whole(vtk["Polygons/Connectivity"]).reshape(-1, 3),
-            times=_whole(vtk["Steps/Values"], frames),
-            frame_seconds=_whole(benchmark["frame_seconds"], frames),
+            positions=vtk["Points"][: frames * vertex_count].reshape(frames, vertex_count, 3),
+            faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
+            times=vtk["Steps/Values"][:frames],
+            frame_seconds=benchmark["frame_seconds"][:frames],
             status=str(benchmark.attrs["status"]),
             reason=str(benchmark.attrs["reason"]),
             provenance=provenance,
-            frame_fields={name.replace(":", "/"): _whole(fields[name], frames) for name in fields},
+            frame_fields={name.replace(":", "/"): fields[name][:frames] for name in fields},
         )
-
-
-def _whole(dataset: h5py.Dataset, rows: int | None = None) -> np.ndarray:
-    """Read the first rows of a dataset, by default all, once their size is that of what is stored.
-
-    Raises:
-        ValueError: it declares more numbers than its file can hold, or no plain numbers.
-    """
-    rows = len(dataset) if rows is None else rows
-    if not 0 <= rows <= len(dataset) or dataset.dtype.kind not in "if":
-        raise ValueError(f"{dataset.name} has {dataset.shape} of {dataset.dtype}")
-    size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
-    if size > MOST_PACKED * dataset.file.id.get_filesize() + ALWAYS_READ:
-        raise ValueError(f"{dataset.name} declares {size} bytes, more than its file can hold")
-    return dataset[:rows]
 
 
 def _write_benchmark(file: h5py.File, trajectory: Trajectory) -> None:

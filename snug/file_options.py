@@ -12,11 +12,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-MESH_SUFFIXES = (".obj", ".ply", ".vtk", ".vtp", ".vtu", ".stl", ".off")
+MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off")
 UNITS, AXES, REST_SHAPES = ("m", "cm", "mm", "in"), ("y", "z"), ("mesh", "uv")
 GARMENT_WORDS = """behind the path of a garment, as in shirt.obj,units=cm,up=z: units (m, cm, mm, in),
 up (y, z), shift='0 0.1 0' [m] where the body stood elsewhere, rest=uv where the UV chart is the pattern,
-uv_scale (metres per unit of the chart), material (.toml or .json of young_modulus [Pa], poisson_ratio,
+uv_scale (metres per unit of the chart), material (.toml of young_modulus [Pa], poisson_ratio,
 thickness [m], density [kg/m^3], bending_stiffness [J])"""
 MOTION_WORDS = """behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none),
 joint_map (TOML, a name of our joints = a name of a BVH file), repair (interpolate over recording errors:
@@ -28,7 +28,7 @@ class GarmentFile:
     """A mesh file with all that it does not state itself.
 
     Attributes:
-        path: OBJ, PLY, VTK, VTP, VTU, STL or OFF.
+        path: OBJ, PLY, STL or OFF.
         units: of the file, "m", "cm", "mm" or "in".
         up: vertical axis of the file, "y" or "z".
         shift: (3,) [m], added after conversion.

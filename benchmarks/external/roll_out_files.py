@@ -240,7 +240,7 @@ def _meshes(path: str) -> dict[str, Any]:
 def _trajectory(path: str) -> dict[str, Any]:
     from reference_sim.trajectory import Trajectory
 
-    trajectory = Trajectory.load(path, guarded=True)
+    trajectory = Trajectory.load(path)
     claims = trajectory.frame_fields.get("converged")
     return {
         "positions": trajectory.positions,

@@ -96,7 +96,7 @@ class Study:
         validation_motions: names of the motions that validate; neither these nor those that test train.
         split: which motions are measured: test, or validation, to choose recipes by.
         body: your own body of SMPL's family, .npz or .pkl; garments are made for it.
-        garment: your own garment (OBJ, PLY, VTK), made for the body, in place of the T-shirt; or a table:
+        garment: your own garment (OBJ, PLY), made for the body, in place of the T-shirt; or a table:
             path, units, up, shift, rest, uv_scale, material.
         self_contact: whether the cloth of simulations is kept from crossing itself (needs ipctk).
         trained: networks of the package (true), or of the run in a folder, in place of training; methods

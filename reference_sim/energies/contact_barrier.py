@@ -19,7 +19,6 @@ needs, as between arm and chest, that term gives way: cloth goes into the body a
 
 from __future__ import annotations
 
-import copy
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -60,24 +59,27 @@ class ContactBarrier(Energy):
         self.cloth = cloth
         self.stencils = np.zeros((0, 4), dtype=np.int64)
         self.distance, self.stiffness = float(distance), float(stiffness)
-        self.pairs = Pairs(cloth, self.distance)
-        package = self.pairs.package
-        self.potential = package.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
+        self.package = ipctk = _load()
+        self.potential = ipctk.BarrierPotential(self.distance, self.stiffness, use_physical_barrier=True)
+        self._slack = self.distance / 4  # how far vertices may move before candidates are searched again
+        self._ccd = ipctk.AdditiveCCD()
+        triangles = np.asfortranarray(cloth.faces, dtype=np.int32)
+        self.mesh = ipctk.CollisionMesh(
+            np.asfortranarray(cloth.rest_positions), ipctk.edges(triangles), triangles
+        )
+        sides = self.mesh.faces_to_edges.ravel()
+        self.mesh.vertex_areas = cloth.vertex_areas
+        self.mesh.edge_areas = np.bincount(sides, np.repeat(cloth.areas / 3, 3), len(self.mesh.edges))
         self._hessians_of: Any = None
         self._hessians: dict[str, sp.csc_matrix] = {}
-
-    def __copy__(self) -> ContactBarrier:
-        """Return a copy with pairs of its own."""
-        twin = object.__new__(type(self))
-        vars(twin).update(vars(self), pairs=copy.copy(self.pairs))
-        return twin
+        self.search_again()
 
     def parameters(self) -> dict[str, Any]:
         """Return distance, stiffness and the version of the package."""
         return {
             "distance_m": self.distance,
             "stiffness_Pa": self.stiffness,
-            "package": f"ipctk {self.pairs.package.__version__}",
+            "package": f"ipctk {self.package.__version__}",
         }
 
     def energy(self, x: Tensor) -> Tensor:
@@ -89,19 +91,30 @@ class ContactBarrier(Energy):
 
     def prepare(self, step: Step) -> None:
         """Keep nothing from the step before, so that sums over pairs have one order."""
-        self.pairs.forget()
+        self.search_again()
 
     def search_again(self) -> None:
-        """Forget the pairs found so far."""
-        self.pairs.forget()
+        """Search candidates and pairs anew when they are needed next."""
+        self._way: tuple[np.ndarray, np.ndarray] | None = None  # what the candidates were searched for
+        self._at: np.ndarray | None = None  # where the pairs were found
+
+    def pairs(self, x: np.ndarray) -> tuple[Any, np.ndarray]:
+        """Return the pairs closer than the distance at x (V, 3), and x as ipctk reads it."""
+        if self._at is None or not np.array_equal(self._at, x):
+            candidates, positions = self._candidates(x, x), np.asfortranarray(x)
+            pairs = self.package.NormalCollisions()
+            pairs.use_area_weighting = True
+            pairs.build(candidates, self.mesh, positions, self.distance)
+            self._pairs, self._at = (pairs, positions), x.copy()
+        return self._pairs
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         if not np.isfinite(x).all():
             return float("nan"), np.full(x.shape, np.nan)
-        pairs, positions = self.pairs.at(x)
-        gradient = self.potential.gradient(pairs, self.pairs.mesh, positions)
-        return self.potential(pairs, self.pairs.mesh, positions), gradient.reshape(-1, 3)
+        pairs, positions = self.pairs(x)
+        gradient = self.potential.gradient(pairs, self.mesh, positions)
+        return self.potential(pairs, self.mesh, positions), gradient.reshape(-1, 3)
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
         """Return the second derivatives (3V, 3V) [N/m] at x (V, 3) [m]; see Energy."""
@@ -113,89 +126,57 @@ class ContactBarrier(Energy):
 
     def _hessian(self, x: np.ndarray, projection: str) -> sp.csc_matrix:
         """Return (3V, 3V), with the negative eigenvalues of each pair or without; kept while x stays."""
-        found = self.pairs.at(x)
+        found = self.pairs(x)
         if self._hessians_of is not found:
             self._hessians_of, self._hessians = found, {}
         if projection not in self._hessians:
             pairs, positions = found
-            method = getattr(self.pairs.package.PSDProjectionMethod, projection)
-            self._hessians[projection] = self.potential.hessian(pairs, self.pairs.mesh, positions, method)
+            method = getattr(self.package.PSDProjectionMethod, projection)
+            self._hessians[projection] = self.potential.hessian(pairs, self.mesh, positions, method)
         return self._hessians[projection]
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         """Return the share of `direction` that may be gone before anything meets; see Energy."""
-        return self.pairs.largest_step(x, direction) if np.isfinite(direction).all() else 1.0
+        if not np.isfinite(direction).all():
+            return 1.0
+        pairs, positions = self.pairs(x)
+        gap = min(self.distance, pairs.compute_minimum_distance(self.mesh, positions) ** 0.5)
+        farthest = float(np.sqrt(np.einsum("vi,vi->v", direction, direction).max()))
+        if 2 * farthest < gap:
+            return 1.0  # nothing is close enough to be reached
+        part = min(1.0, LONGEST_STEP / farthest)
+        goal = x + part * direction
+        return part * self._free_share(self._candidates(x, goal), x, goal)
 
     def ccd_fraction(self, x: np.ndarray, goal: np.ndarray) -> float:
         """Return the share of the way to goal (V, 3) [m] that is free of collisions; see Energy."""
-        return self.pairs.free_share(x, goal)
+        candidates = self.package.Candidates()
+        candidates.build(self.mesh, np.asfortranarray(x), np.asfortranarray(goal), 0.0)
+        return self._free_share(candidates, x, goal)
 
     def infeasibility(self, x: np.ndarray) -> str:
         """Name an edge that cuts a face; "" if there is none."""
-        return self.pairs.first_intersection(x) if np.isfinite(x).all() else ""
-
-
-def _check_heights(cloth: Cloth, distance: float) -> None:
-    """Raise ValueError where a barrier reaches across a triangle: it would push the resting cloth apart."""
-    corners = cloth.rest_corners
-    edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
-    heights = 2 * cloth.areas / edges.max(axis=1)
-    face = int(np.argmin(heights))
-    if heights[face] <= distance:
-        raise ValueError(
-            f"ContactBarrier distance = {distance:g} m: face {face} is only {heights[face]:.3g} m high at "
-            "rest; choose a distance below that, or a mesh without slivers"
-        )
-
-
-class Pairs:
-    """Pairs of a cloth with itself that are closer than a distance [m], or about to meet.
-
-    Candidate pairs serve as long as nothing has moved farther than they were searched for.
-
-    Attributes:
-        package: the module ipctk.
-        mesh: ipctk.CollisionMesh, weighed by rest areas, perhaps from the cloth's uv.
-
-    Raises:
-        ImportError: ipctk is not installed.
-    """
-
-    def __init__(self, cloth: Cloth, distance: float) -> None:
-        self.package = ipctk = _load()
-        self._distance = distance
-        self._slack = distance / 4  # how far vertices may move before candidates are searched again
-        self._ccd = ipctk.AdditiveCCD()
-        triangles = np.asfortranarray(cloth.faces, dtype=np.int32)
-        self.mesh = ipctk.CollisionMesh(
-            np.asfortranarray(cloth.rest_positions), ipctk.edges(triangles), triangles
-        )
-        sides = self.mesh.faces_to_edges.ravel()
-        self.mesh.vertex_areas = cloth.vertex_areas
-        self.mesh.edge_areas = np.bincount(sides, np.repeat(cloth.areas / 3, 3), len(self.mesh.edges))
-        self.forget()
-
-    def forget(self) -> None:
-        """Search candidates and pairs anew when they are needed next."""
-        self._way: tuple[np.ndarray, np.ndarray] | None = None  # what the candidates were searched for
-        self._at: np.ndarray | None = None  # where the pairs were found
-
-    def at(self, x: np.ndarray) -> tuple[Any, np.ndarray]:
-        """Return the pairs closer than the distance at x (V, 3), and x as ipctk reads it."""
-        if self._at is None or not np.array_equal(self._at, x):
-            candidates, positions = self._candidates(x, x), np.asfortranarray(x)
-            pairs = self.package.NormalCollisions()
-            pairs.use_area_weighting = True
-            pairs.build(candidates, self.mesh, positions, self._distance)
-            self._pairs, self._at = (pairs, positions), x.copy()
-        return self._pairs
+        mesh, ipctk, positions = self.mesh, self.package, np.asfortranarray(x)
+        if not np.isfinite(x).all() or not ipctk.has_intersections(mesh, positions):
+            return ""
+        search = ipctk.LBVH()
+        search.can_vertices_collide = mesh.can_collide
+        search.build(positions, mesh.edges, mesh.faces, 1e-6 * float(np.ptp(positions, axis=0).max()))
+        for pair in search.detect_edge_face_candidates():
+            edge, face = mesh.edges[pair.edge_id], mesh.faces[pair.face_id]
+            if ipctk.is_edge_intersecting_triangle(*positions[edge], *positions[face]):
+                return f"edge ({min(edge)}, {max(edge)}) of the cloth cuts face {pair.face_id} of the cloth"
+        return "an edge cuts a face"
 
     def _candidates(self, a: np.ndarray, b: np.ndarray) -> Any:
-        """Return pairs that may come within the distance near the way from a to b, within the slack."""
+        """Return pairs that may come within the distance near the way from a to b, within the slack.
+
+        They serve as long as nothing has moved farther than they were searched for.
+        """
         if not (self._covers(a) and (b is a or self._covers(b))):
             candidates = self.package.Candidates()
             start, end = np.asfortranarray(a), np.asfortranarray(b)
-            candidates.build(self.mesh, start, end, self._distance / 2 + self._slack)
+            candidates.build(self.mesh, start, end, self.distance / 2 + self._slack)
             self._candidate_pairs, self._way = candidates, (a.copy(), b.copy())
         return self._candidate_pairs
 
@@ -209,40 +190,22 @@ class Pairs:
             off -= np.clip(t, 0.0, 1.0)[:, None] * way
         return bool(np.einsum("vi,vi->v", off, off).max() <= self._slack**2)
 
-    def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
-        """Return the share of `direction` (V, 3) [m] that the cloth may go from x (V, 3)."""
-        pairs, positions = self.at(x)
-        gap = min(self._distance, pairs.compute_minimum_distance(self.mesh, positions) ** 0.5)
-        farthest = float(np.sqrt(np.einsum("vi,vi->v", direction, direction).max()))
-        if 2 * farthest < gap:
-            return 1.0  # nothing is close enough to be reached
-        part = min(1.0, LONGEST_STEP / farthest)
-        goal = x + part * direction
-        return part * self._free_share(self._candidates(x, goal), x, goal)
-
-    def free_share(self, x: np.ndarray, goal: np.ndarray) -> float:
-        """Return the free share of the way from x to goal (V, 3)."""
-        candidates = self.package.Candidates()
-        candidates.build(self.mesh, np.asfortranarray(x), np.asfortranarray(goal), 0.0)
-        return self._free_share(candidates, x, goal)
-
     def _free_share(self, candidates: Any, x: np.ndarray, goal: np.ndarray) -> float:
         start, end = np.asfortranarray(x), np.asfortranarray(goal)
         return candidates.compute_collision_free_stepsize(self.mesh, start, end, 0.0, self._ccd)
 
-    def first_intersection(self, x: np.ndarray) -> str:
-        """Return an edge and a face that cut each other at x (V, 3), in words; "" if there are none."""
-        mesh, ipctk, positions = self.mesh, self.package, np.asfortranarray(x)
-        if not ipctk.has_intersections(mesh, positions):
-            return ""
-        search = ipctk.LBVH()
-        search.can_vertices_collide = mesh.can_collide
-        search.build(positions, mesh.edges, mesh.faces, 1e-6 * float(np.ptp(positions, axis=0).max()))
-        for pair in search.detect_edge_face_candidates():
-            edge, face = mesh.edges[pair.edge_id], mesh.faces[pair.face_id]
-            if ipctk.is_edge_intersecting_triangle(*positions[edge], *positions[face]):
-                return f"edge ({min(edge)}, {max(edge)}) of the cloth cuts face {pair.face_id} of the cloth"
-        return "an edge cuts a face"
+
+def _check_heights(cloth: Cloth, distance: float) -> None:
+    """Raise ValueError where a barrier reaches across a triangle: it would push the resting cloth apart."""
+    corners = cloth.rest_corners
+    edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
+    heights = 2 * cloth.areas / edges.max(axis=1)
+    face = int(np.argmin(heights))
+    if heights[face] <= distance:
+        raise ValueError(
+            f"ContactBarrier distance = {distance:g} m: face {face} is only {heights[face]:.3g} m high at "
+            "rest; choose a distance below that, or a mesh without slivers"
+        )
 
 
 def _load() -> ModuleType:

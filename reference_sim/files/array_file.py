@@ -1,44 +1,28 @@
-"""Arrays from files that anyone may have written, and the trial of a file that may crash its reader.
+"""Arrays from files that anyone may have written; nothing that such a file names is run.
 
-Size has a limit, and nothing that a file names is run. A pickle is a program: it names functions and calls
-them. Here a name can only stand for plain values, arrays of numpy and what SMPL's files hold besides: arrays
-of chumpy are taken as the array that they hold, compressed sparse columns of scipy as a dense array.
-
-HDF5 and VTK follow what a file says: a tree of links that comes back to itself, or a wrong count, crashes
-them or keeps them going for ever. So a file of somebody else is first read where that harms nobody.
+A pickle is a program: it names functions and calls them. Here a name can only stand for plain values, arrays
+of numpy and what SMPL's files hold besides: arrays of chumpy are taken as the array that they hold,
+compressed sparse columns of scipy as a dense array.
 """
 
 from __future__ import annotations
 
-import math
-import os
 import pickle
-import subprocess
-import sys
-import warnings
-import zipfile
-from collections.abc import Callable, Collection
-from contextlib import suppress
-from importlib import import_module
+from collections.abc import Collection
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
-LIMIT = 1 << 30  # [bytes] of all arrays that are read of a file together, unpacked
 PLAIN_KINDS = "biufcSU"  # kinds of types: truths, numbers, text
-MOST_PACKED = 1032  # bytes that deflate packs into one, at most
-TRIAL_MEMORY, TRIAL_SECONDS = 2 << 30, 20  # [bytes] and [s] of CPU time, and for each byte of the file
-MEMORY_OF_BYTE, SECONDS_OF_BYTE = 20, 2e-7
-REFUSED = 3  # exit status of a trial that has said why
 
 
 class ArrayFileError(ValueError):
-    """File that is no .npy or .npz of plain arrays; the message names file and array."""
+    """File that holds no plain arrays; the message names file and array."""
 
 
 def read_array(path: str | Path) -> np.ndarray:
-    """Read the array of an .npy file, as long as the file.
+    """Read the array of an .npy file.
 
     Raises:
         ArrayFileError: as `read_arrays`.
@@ -51,25 +35,20 @@ def read_array(path: str | Path) -> np.ndarray:
     """
     path = Path(path)
     try:
-        with path.open("rb") as stream:
-            return _array(stream)
+        return _plain(np.load(path, allow_pickle=False))
     except Exception as error:
         raise refusal(path, "", error) from None
 
 
-def read_arrays(
-    path: str | Path, names: Collection[str] | None = None, *, limit: int = LIMIT
-) -> dict[str, np.ndarray]:
+def read_arrays(path: str | Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """Read the arrays of an .npz file by name.
 
     Args:
         path: the file.
         names: arrays to read, as far as they are in it; others are not touched. Default all.
-        limit: [bytes] of all of them together, unpacked.
 
     Raises:
-        ArrayFileError: no such file, no archive, encrypted, packed in an unknown way, damaged, an array that
-            is not plain or not as long as it declares, two of one name, more than `limit` bytes together.
+        ArrayFileError: no such file, no archive, damaged, or an array that is not plain.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -78,29 +57,12 @@ def read_arrays(
     {'x': array([0., 1., 2.])}
     """
     path, name = Path(path), ""
-    arrays: dict[str, np.ndarray] = {}
-    members: set[str] = set()
+    arrays = {}
     try:
-        with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
-            for member in archive.infolist():
-                name = member.filename.removesuffix(".npy")
-                if names is not None and name not in names:
-                    continue
-                if name in members:
-                    raise ValueError("is there twice")
-                members.add(name)
-                if name == member.filename:  # no array, though numpy calls it by the name of one
-                    continue
-                if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                    raise ValueError(f"is packed by method {member.compress_type}, only 0 and 8 are read")
-                if member.file_size > limit:  # zipfile unpacks no more than that
-                    size, left = member.file_size / 1e6, limit / 1e6
-                    raise ValueError(
-                        f"has {size:.0f} MB unpacked, too large: {left:.0f} MB more are read at most"
-                    )
-                limit -= member.file_size
-                with archive.open(member) as array:
-                    arrays[name] = _array(array)
+        with path.open("rb") as stream, np.lib.npyio.NpzFile(stream) as archive:
+            for name in archive.files:
+                if names is None or name in names:
+                    arrays[name] = _plain(archive[name])
         return arrays
     except Exception as error:
         raise refusal(path, name, error) from None
@@ -122,18 +84,11 @@ def write_array(path: str | Path, array: np.ndarray) -> None:
         stream.write(array.reshape(-1).data)
 
 
-def _array(stream: IO[bytes]) -> np.ndarray:
-    """Read the array that a stream holds and nothing else; raise whatever its bytes make numpy raise."""
-    with warnings.catch_warnings():  # of headers that Python 2 wrote, and of odd bytes in them
-        warnings.simplefilter("ignore")
-        try:
-            array = np.lib.format.read_array(stream, allow_pickle=False)
-        except MemoryError:
-            raise ValueError("declares more numbers than fit into memory") from None
-    if array.dtype.kind not in PLAIN_KINDS or array.dtype.itemsize == 0:
-        raise ValueError(f"has type {array.dtype}, only plain numbers and text are read")
-    if stream.read(1):
-        raise ValueError(f"is longer than its shape {array.shape} of {array.dtype}")
+def _plain(array: Any) -> np.ndarray:
+    """Return an array of plain numbers or text; raise ValueError for any other, as of bytes."""
+    kind = getattr(array, "dtype", np.dtype(object))
+    if kind.kind not in PLAIN_KINDS:
+        raise ValueError(f"has type {kind}, only plain numbers and text are read")
     return array
 
 
@@ -206,13 +161,11 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
         names: entries to return, as far as they are in it.
 
     Raises:
-        ArrayFileError: no such file, no pickle of a dict, larger than 1 GiB, or more in it than plain values.
+        ArrayFileError: no such file, no pickle of a dict, or more in it than plain values.
     """
     path, name = Path(path), ""
     arrays = {}
     try:
-        if path.stat().st_size > LIMIT:
-            raise ValueError(f"larger than {LIMIT >> 20} MiB")
         with path.open("rb") as stream:
             held = _Unpickler(stream, encoding="latin1").load()
         if type(held) is not dict:
@@ -222,9 +175,7 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
             if type(value) is _Stand:
                 value = value.array()
             if isinstance(value, np.ndarray | np.generic | int | float | list | tuple):
-                arrays[name] = np.asarray(value)
-                if arrays[name].dtype.kind not in PLAIN_KINDS:
-                    raise ValueError(f"has type {arrays[name].dtype}, only plain numbers and text are read")
+                arrays[name] = _plain(np.asarray(value))
         name = ""
         if not arrays:
             raise ValueError(f"none of its entries is known ({', '.join(map(str, list(held)[:12]))})")
@@ -232,49 +183,3 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
     # A broken pickle can fail in nearly every way, and none of them is this program's own.
     except Exception as error:
         raise refusal(path, name, error) from None
-
-
-def try_out(read: Callable[[Path], object], *paths: Path) -> str:
-    """Return why a function cannot read one of the files, in one line; empty where it can read all.
-
-    A process of its own reads them, under a cap of memory and CPU time.
-
-    Args:
-        read: a function of a module, which the process imports by its name.
-        paths: files that exist.
-    """
-    size = sum(path.stat().st_size for path in paths)
-    memory = TRIAL_MEMORY + MEMORY_OF_BYTE * size
-    seconds = math.ceil(TRIAL_SECONDS + SECONDS_OF_BYTE * size)
-    caps, names = (str(memory), str(seconds)), (str(path.absolute()) for path in paths)
-    # Each thread of a linear algebra library takes addresses for itself: on many cores more than the cap.
-    alone = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
-    done = subprocess.run(
-        [sys.executable, "-c", f"import sys, {__name__} as a; sys.exit(a.try_here(*sys.argv[1:]))",
-         read.__module__, read.__name__, *caps, *names],
-        env=os.environ | alone, stdin=subprocess.DEVNULL, capture_output=True,
-    )  # fmt: skip
-    if done.returncode == REFUSED:
-        return " ".join(done.stdout.decode(errors="replace").split())[:300]
-    if done.returncode == 0:
-        return ""
-    return f"reading it crashes the reader, or takes more than {memory / 1e9:.0f} GB or {seconds} s"
-
-
-def try_here(module: str, name: str, memory: str, seconds: str, *paths: str) -> int:
-    """Read the files by that function under caps of memory [bytes] and CPU time [s]; return a status."""
-    read = getattr(import_module(module), name)
-    with suppress(ImportError):  # Windows has no such caps
-        import resource
-
-        for what, most in ((resource.RLIMIT_AS, int(memory)), (resource.RLIMIT_CPU, int(seconds))):
-            _, hard = resource.getrlimit(what)
-            most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-            resource.setrlimit(what, (most, hard))
-    try:
-        for path in paths:
-            read(Path(path))
-    except Exception as error:  # whatever it is, the file is to blame
-        print(error or type(error).__name__)
-        return REFUSED
-    return 0

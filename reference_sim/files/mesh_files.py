@@ -1,7 +1,7 @@
 """Mesh files of other programs: read one, read a sequence, bring both to metres with y up.
 
 OBJ is read here, since meshio refuses the texture coordinates of a garment with seams; PLY, STL and OFF are
-read by meshio, VTK's files by VTK, which may crash: a process of its own tries these first.
+read by meshio.
 """
 
 from __future__ import annotations
@@ -9,29 +9,25 @@ from __future__ import annotations
 import contextlib
 import glob
 import io
-import logging
 import re
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.array_file import try_out
 
-VTK_SUFFIXES = (".vtk", ".vtp", ".vtu")
-MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", *VTK_SUFFIXES)
+MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off")
 # What a header has that ends; meshio looks for it for ever.
 HEADERS = {".ply": rb"^\s*end_header\s*$", ".off": rb"^\s*\d+\s+\d+\s+\d+\s*$"}
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
 LARGEST_COORDINATE = 1e12  # in any unit: squares and cubes of it are still numbers
-# What programs call the texture coordinates of a vertex: two numbers, or one array of both.
-UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
-UV_ARRAYS = ("UV", "uv", "TCoords", "Texture Coordinates", "TEXCOORD_0")
+UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))  # of a vertex, as programs call them
+# Points, polygons, texture coordinates, and places in these parallel to polygons, -1 for a corner without.
+Contents = tuple[Any, Sequence[Any], Any, Sequence[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,32 +36,14 @@ class Surface:
 
     Attributes:
         positions: (V, 3).
-        faces: (F, 3) triangles.
-        quads: number of four-cornered faces that were cut in two along the diagonal from their first corner.
+        faces: (F, 3) triangles; quads are cut in two along the diagonal from their first corner.
         uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a
             corner has none, None where no corner has any.
-        vertex_data: name -> (V,) or (V, k), further values of the vertices in PLY and VTK files.
     """
 
     positions: np.ndarray
     faces: np.ndarray
-    quads: int = 0
     uv: np.ndarray | None = None
-    vertex_data: Mapping[str, np.ndarray] = field(default_factory=dict)
-
-
-class Contents(NamedTuple):
-    """Contents of a file, before polygons become triangles.
-
-    uv_polygons are places in uv (N, 2), parallel to polygons and -1 for a corner without; none in a file
-    whose vertex_data have the texture coordinates.
-    """
-
-    points: Any
-    polygons: Sequence[Any]
-    vertex_data: Mapping[str, np.ndarray]
-    uv: Sequence[Sequence[float]] = ()
-    uv_polygons: Sequence[Any] = ()
 
 
 def read_mesh(path: str | Path) -> Surface:
@@ -82,22 +60,12 @@ def read_mesh(path: str | Path) -> Surface:
     ...     read_mesh(f"{folder}/a.obj").faces
     array([[0, 1, 2]])
     """
-    return next(_read([Path(path)]))
-
-
-def _read(paths: Sequence[Path]) -> Iterator[Surface]:
-    for path in paths:
-        if not path.is_file():
-            raise MeshError(f"{path}: no such file")
-        if path.suffix.lower() not in MESH_SUFFIXES:
-            raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
-    of_vtk = [path for path in paths if path.suffix.lower() in VTK_SUFFIXES]
-    if of_vtk and try_out(read_vtk, *of_vtk):
-        path, reason = next((path, why) for path in of_vtk if (why := try_out(read_vtk, path)))
-        raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ or PLY")
-    for path in paths:
-        read = _read_obj if path.suffix.lower() == ".obj" else read_vtk if of_vtk else _read_with_meshio
-        yield _surface(path, read(path))
+    path = Path(path)
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
+    return _surface(path, *(_read_obj if path.suffix.lower() == ".obj" else _read_with_meshio)(path))
 
 
 def _read_obj(path: Path) -> Contents:
@@ -120,7 +88,7 @@ def _read_obj(path: Path) -> Contents:
                     uv_polygons.append([_counted(c[1], len(uv)) if c[1] else -1 for c in corners])
             except (ValueError, IndexError):
                 raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
-    return Contents(points, polygons, {}, uv, uv_polygons)
+    return points, polygons, uv, uv_polygons
 
 
 def _counted(text: str, count: int) -> int:
@@ -151,39 +119,18 @@ def _read_with_meshio(path: Path) -> Contents:
         reason = " ".join(message.split())[:300] or type(error).__name__
         raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ") from None
     kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
-    data = {name: np.asarray(values) for name, values in mesh.point_data.items()}
-    return Contents(mesh.points, [polygon for block in kinds for polygon in block.data], data)
+    polygons, data = [polygon for block in kinds for polygon in block.data], mesh.point_data
+    for u, v in UV_NAMES:
+        if u in data and v in data:
+            return mesh.points, polygons, np.stack([data[u], data[v]], axis=1), polygons
+    return mesh.points, polygons, (), ()
 
 
-def read_vtk(path: Path) -> Contents:
-    """Read surface cells and values of vertices by VTK. Raises an exception of pyvista, or crashes."""
-    import pyvista
-
-    try:
-        with (
-            warnings.catch_warnings(),
-            pyvista.vtk_verbosity("off"),
-            pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False),
-        ):
-            warnings.simplefilter("ignore")
-            logging.disable(logging.CRITICAL)  # to which readers of pyvista hand errors on
-            mesh: Any = pyvista.read(path)
-    finally:
-        logging.disable(logging.NOTSET)
-    if isinstance(mesh, pyvista.PolyData):
-        polygons = list(mesh.irregular_faces)
-    else:
-        kinds = (pyvista.CellType.TRIANGLE, pyvista.CellType.QUAD, pyvista.CellType.POLYGON)
-        polygons = [mesh.get_cell(i).point_ids for i, kind in enumerate(mesh.celltypes) if kind in kinds]
-    data = {name: np.asarray(mesh.point_data[name]) for name in mesh.point_data}
-    if mesh.active_texture_coordinates is not None:
-        data[UV_ARRAYS[0]] = np.asarray(mesh.active_texture_coordinates)
-    return Contents(mesh.points, polygons, data)
-
-
-def _surface(path: Path, parts: Contents) -> Surface:
+def _surface(
+    path: Path, points: Any, polygons: Sequence[Any], uv: Any, uv_polygons: Sequence[Any]
+) -> Surface:
     """Check the contents of a file, and cut its quads into triangles."""
-    positions, polygons = np.asarray(parts.points, dtype=np.float64), parts.polygons
+    positions, uv = np.asarray(points, dtype=np.float64), np.asarray(uv, dtype=np.float64)
     if not polygons:
         raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
     if positions.ndim != 2 or positions.shape[1] != 3:
@@ -202,44 +149,18 @@ def _surface(path: Path, parts: Contents) -> Surface:
     bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
     if bad.size:
         raise MeshError(f"{path}: triangle {bad[0]} names a vertex beyond the {len(positions)} there are")
-    uv = _corner_uv(path, parts, faces)
-    return Surface(positions, faces, int((corners == 4).sum()), uv, parts.vertex_data)
+    places = np.array(_halved(uv_polygons), np.int64)
+    if (places < 0).all():
+        return Surface(positions, faces)
+    bad = np.flatnonzero((places >= len(uv)).any(axis=1) | (places < -1).any(axis=1))
+    if bad.size:
+        raise MeshError(f"{path}: triangle {bad[0]} names a texture coordinate beyond the {len(uv)}")
+    return Surface(positions, faces, np.where(places[..., None] < 0, np.nan, uv[places]))
 
 
 def _halved(polygons: Sequence[Any]) -> list[tuple[int, int, int]]:
     """Cut quads into triangles; triangles stay."""
     return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
-
-
-def _corner_uv(path: Path, parts: Contents, faces: np.ndarray) -> np.ndarray | None:
-    """Return the texture coordinates (F, 3, 2) of the faces' corners, NaN where there are none."""
-    places = faces
-    if parts.uv_polygons:
-        uv, places = np.asarray(parts.uv, dtype=np.float64), np.array(_halved(parts.uv_polygons), np.int64)
-    else:
-        vertex_uv = _uv_of_vertices(parts.vertex_data)
-        if vertex_uv is None:
-            return None
-        uv = vertex_uv
-    if (places < 0).all():
-        return None
-    bad = np.flatnonzero((places >= len(uv)).any(axis=1) | (places < -1).any(axis=1))
-    if bad.size:
-        raise MeshError(
-            f"{path}: triangle {bad[0]} names a texture coordinate beyond the {len(uv)} there are: export it "
-            "again"
-        )
-    return np.where(places[..., None] < 0, np.nan, uv[places])
-
-
-def _uv_of_vertices(data: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    for u, v in UV_NAMES:
-        if u in data and v in data:
-            return np.stack([data[u], data[v]], axis=1).astype(np.float64)
-    for name in UV_ARRAYS:
-        if name in data and data[name].ndim == 2 and data[name].shape[1] >= 2:
-            return data[name][:, :2].astype(np.float64)
-    return None
 
 
 def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
@@ -262,11 +183,15 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     (2, 3, 3)
     """
     paths = _paths(str(pattern))
-    surfaces = _read(paths)
-    first = next(surfaces)
+    first = read_mesh(paths[0])
     frames = [first.positions]
-    for path, surface in zip(paths[1:], surfaces, strict=True):
-        _check_corresponds(path, surface, paths[0], first)
+    for path in paths[1:]:
+        surface = read_mesh(path)
+        if surface.positions.shape != first.positions.shape or not np.array_equal(surface.faces, first.faces):
+            raise MeshError(
+                f"{path}: other vertices or faces than {paths[0].name}: a sequence needs one numbering: "
+                "export OBJ or PLY without reordering"
+            )
         frames.append(surface.positions)
     return np.stack(frames), first
 
@@ -294,22 +219,6 @@ def _paths(pattern: str) -> list[Path]:
             f"{pattern}: meshes of several kinds ({', '.join(kinds)}): name one, as in '*{kinds[0]}'"
         )
     return sorted(paths, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", str(p))])
-
-
-def _check_corresponds(path: Path, surface: Surface, first_path: Path, first: Surface) -> None:
-    remedy = "a sequence needs one numbering: export OBJ or PLY without reordering"
-    for noun, rows, first_rows in (
-        ("vertices", surface.positions, first.positions),
-        ("faces", surface.faces, first.faces),
-    ):
-        if len(rows) != len(first_rows):
-            raise MeshError(
-                f"{path}: {len(rows)} {noun}, but {first_path.name} has {len(first_rows)}: {remedy}"
-            )
-    bad = np.flatnonzero((surface.faces != first.faces).any(axis=1))
-    if bad.size:
-        face, first_face = surface.faces[bad[0]].tolist(), first.faces[bad[0]].tolist()
-        raise MeshError(f"{path}: face {bad[0]} = {face}, but {first_face} in {first_path.name}: {remedy}")
 
 
 def to_metres_y_up(positions: np.ndarray, *, units: str = "m", up: str = "y") -> np.ndarray:

@@ -41,10 +41,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
     kept = np.sort(first)
     place = np.empty(count, dtype=np.int64)
     place[of_vertex[kept]] = np.arange(len(kept))
-    data = {name: values[kept] for name, values in surface.vertex_data.items()}
-    joined = replace(
-        surface, positions=surface.positions[kept], faces=place[of_vertex][surface.faces], vertex_data=data
-    )
+    joined = replace(surface, positions=surface.positions[kept], faces=place[of_vertex][surface.faces])
     return joined, kept
 
 

@@ -120,22 +120,17 @@ def _check_edges(faces: np.ndarray, size: int) -> None:
     half = half_edges(faces)
     undirected = np.sort(half, axis=1) @ np.array([size, 1])
     _, inverse, count = np.unique(undirected, return_inverse=True, return_counts=True)
-    count = count[inverse]
-    for wrong, message in (
-        (count == 1, "is not closed: edge ({a}, {b}) of face {face} has one face only: fill the hole"),
-        (count > 2, "has {count} faces at edge ({a}, {b}), {face} one of them: separate what meets there"),
+    _, again, times = np.unique(half @ np.array([size, 1]), return_inverse=True, return_counts=True)
+    for wrong, problem in (
+        (count[inverse] == 1, "has one face only: fill the hole"),
+        (count[inverse] > 2, "has more than two faces: separate what meets there"),
+        (times[again] > 1, "is walked the same way by the face beside it: wind all faces outwards"),
     ):
         if wrong.any():
             k = int(np.argmax(wrong))
-            text = message.format(a=half[k, 0], b=half[k, 1], face=k // 3, count=count[k])
-            raise MeshError(f"obstacle {text}")
-    directed, first, times = np.unique(half @ np.array([size, 1]), return_index=True, return_counts=True)
-    if len(directed) < len(half):
-        k = int(first[np.argmax(times > 1)])
-        raise MeshError(
-            f"obstacle faces disagree: edge ({half[k, 0]}, {half[k, 1]}) of face {k // 3} is walked the same "
-            "way by the face beside it: wind all faces outwards"
-        )
+            raise MeshError(
+                f"obstacle is not closed: edge ({half[k, 0]}, {half[k, 1]}) of face {k // 3} {problem}"
+            )
 
 
 def _check_shape(corner: np.ndarray, frame: int) -> None:

@@ -51,18 +51,8 @@ def has_kernel(term: Energy, use: str) -> bool:
     """Return whether the class of the term declares a kernel; what a parent class declares does not count.
 
     A subclass may compute something else: one that does not says `kernels = Parent.kernels`.
-
-    Raises:
-        ValueError: the class declares a use that does not exist, or no function for one.
     """
-    declared = vars(type(term)).get("kernels", {})
-    for name, function in declared.items():
-        if name not in USES:
-            known = ", ".join(USES)
-            raise ValueError(f"{type(term).__name__}.kernels: unknown use {name!r}, choose of {known}")
-        if not callable(function):
-            raise ValueError(f"{type(term).__name__}.kernels: {name!r} is {function!r}: give the function")
-    return use in declared
+    return use in vars(type(term)).get("kernels", {})
 
 
 def fast_kernel(term: Energy, use: str) -> Any:

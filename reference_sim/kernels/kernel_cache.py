@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import shutil
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from importlib import import_module
@@ -36,10 +35,8 @@ from numba.core.extending import _Intrinsic
 from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
-KEPT = 4  # folders of one module, so that going back to another branch compiles nothing
 CONSTANTS = (bool, int, float, complex, str, tuple, np.generic)
 FLAGS = (set, frozenset)  # of fastmath
-USED = ".used"  # file whose date says when a folder was last asked for
 
 _config: Any = numba.config
 _digests: dict[str, str] = {}  # of modules that hold kernels, by name
@@ -122,18 +119,8 @@ def _folder(function: Any, digest: str) -> Path | None:
         folder = Path(base, f"{function.__module__}-{digest}")
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
-            (folder / USED).touch()
-            _remove_old(folder)
             return folder
     return None
-
-
-def _remove_old(folder: Path) -> None:
-    """Keep the KEPT folders of the same module that were used last; whoever misses one compiles again."""
-    others = folder.parent.glob(folder.name.rpartition("-")[0] + "-*/" + USED)
-    with contextlib.suppress(OSError):  # another process removes them at the same time
-        for used in sorted(others, key=lambda file: file.stat().st_mtime)[:-KEPT]:
-            shutil.rmtree(used.parent, ignore_errors=True)
 
 
 @cache  # numba knows the dtype of a record again by its identity

@@ -155,7 +155,6 @@ SUFFICIENT_DECREASE = 1e-4
 STEP_HALVINGS = 24  # of a step before its direction is given up
 
 Value = TypeVar("Value")
-Observer = Callable[[np.ndarray], object]  # is called with positions (V, 3) [m]
 
 
 class Descent:
@@ -165,7 +164,6 @@ class Descent:
         potential: the sum of energies.
         x: (V, 3) [m] start.
         after: an earlier descent, whose counts and clock go on.
-        observe: called by `show` with a copy of x.
 
     Attributes:
         x: (V, 3), the point kept last; value [J] and g (3n,) [N] belong to it.
@@ -174,15 +172,8 @@ class Descent:
         started: clock [s] at the beginning.
     """
 
-    def __init__(
-        self,
-        potential: Potential,
-        x: np.ndarray,
-        *,
-        after: Descent | None = None,
-        observe: Observer | None = None,
-    ) -> None:
-        self.potential, self.observe = potential, observe
+    def __init__(self, potential: Potential, x: np.ndarray, *, after: Descent | None = None) -> None:
+        self.potential = potential
         self.x = np.array(x, dtype=np.float64, order="C")
         self.free = potential.cloth.free
         self.weight = mean_weight(potential)
@@ -202,11 +193,6 @@ class Descent:
     def finite(self) -> bool:
         """True if value and gradient are numbers."""
         return bool(np.isfinite(self.value) and np.isfinite(self.g).all())
-
-    def show(self) -> None:
-        """Show the observer the point kept last."""
-        if self.observe is not None:
-            self.observe(self.x.copy())
 
     def timed(self, part: str, function: Callable[..., Value], *arguments: object) -> Value:
         """Return function(*arguments), and add its seconds to those of `part`."""
@@ -333,7 +319,6 @@ def iterate(solver: Any, run: Descent) -> Stop:
     """
     if stop := solver.init(run):
         return stop
-    run.show()
     while True:
         # Asked first: on a saddle, terminate takes an iteration and wants the step after it.
         last = run.iterations >= solver.max_iterations
@@ -346,4 +331,3 @@ def iterate(solver: Any, run: Descent) -> Stop:
         if stop := solver.step(run):
             return stop
         run.iterations += 1
-        run.show()

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from reference_sim.cholesky import analyse
-from reference_sim.minimise.descent import Descent, Observer, Stop, dot, mean_weight
+from reference_sim.minimise.descent import Stop, dot, mean_weight
 from reference_sim.potential import Potential
+
+if TYPE_CHECKING:
+    from reference_sim.minimise.newton import NewtonRun
 
 REFERENCE_DT = 1 / 30  # [s], in shifts by M/dt^2 of a potential without inertia
 
@@ -77,45 +82,13 @@ class FactorisedHessian:
         return max(self.flat, 1e-13 * self.stiffest(values)) / self.metric
 
 
-class FactorisedDescent(Descent):
-    """Descent that factorises a Hessian, counts that and takes its time."""
-
-    def __init__(
-        self,
-        potential: Potential,
-        x: np.ndarray,
-        hessian: FactorisedHessian,
-        *,
-        after: Descent | None = None,
-        observe: Observer | None = None,
-    ) -> None:
-        super().__init__(potential, x, after=after, observe=observe)
-        self.hessian = hessian
-        self.factorised = False  # whether the last factorisation exists, to solve with
-
-    def assemble(self, convexity: float) -> np.ndarray:
-        """Return values (nnz,) of the Hessian at the point kept last."""
-        with np.errstate(all="ignore"):
-            return self.timed("assemble", self.hessian.assemble, self.x, convexity)
-
-    def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
-        """Factorise, as the Hessian does; False if not positive definite."""
-        self.factorised = self.timed("factorise", self.hessian.factorise, values, shift)
-        self.factorisations += 1
-        return self.factorised
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last factorisation, as the Hessian does."""
-        return self.timed("solve", self.hessian.solve, b)
-
-
 POWER = 8  # inverse iterations for the direction of most negative curvature
 FIRST_ESCAPE = 100  # of the step tolerance: first length of the step along it
 LAST_SHIFT = 1e12  # in units of M/dt^2
 
 
 def convergence_check(
-    run: FactorisedDescent,
+    run: NewtonRun,
     values: np.ndarray,
     *,
     tolerance: float,
@@ -151,12 +124,11 @@ def convergence_check(
         return Stop("converged", f"{why}, {evidence}", relaxed)
     if escape_saddle(run, values, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1
-        run.show()
         return None
     return Stop("stalled", "a saddle: negative curvature, and no step along it lowers the energy")
 
 
-def escape_saddle(run: FactorisedDescent, values: np.ndarray, length: float) -> bool:
+def escape_saddle(run: NewtonRun, values: np.ndarray, length: float) -> bool:
     """Step along the direction of most negative curvature.
 
     length: of the first step tried [m]. Returns whether the energy fell.
@@ -177,7 +149,7 @@ def escape_saddle(run: FactorisedDescent, values: np.ndarray, length: float) -> 
     return False
 
 
-def most_negative(run: FactorisedDescent, values: np.ndarray) -> np.ndarray | None:
+def most_negative(run: NewtonRun, values: np.ndarray) -> np.ndarray | None:
     """Return the direction (3n,) of most negative curvature by inverse iteration.
 
     None if no shift outdoes it.

@@ -26,7 +26,6 @@ from reference_sim.minimise.descent import (
     TOLERANCE,
     Descent,
     LBFGSHistory,
-    Observer,
     Result,
     Stop,
     check_tolerance,
@@ -56,8 +55,6 @@ class LBFGS:
             it the result can only be "max_iterations", "stalled", "timeout" or "diverged": nothing but a look
             at the curvature can say "converged".
         timeout: seconds, for both together.
-        observe: called with every point (V, 3) [m] that either of them kept, the start included; of the
-            compiled part with the last.
 
     Raises:
         ValueError: no term of the potential has a scalar stiffness, or a tolerance that is no finite number
@@ -73,12 +70,10 @@ class LBFGS:
         memory: int = 10,
         finish: bool = True,
         timeout: float = float("inf"),
-        observe: Observer | None = None,
     ) -> None:
         self.potential, self.memory = potential, memory
         self.tolerance, self.timeout = tolerance, timeout
         check_tolerance(tolerance)
-        self.observe = observe
         self.max_iterations = min(PATIENCE, max_iterations) if finish else max_iterations
         small = potential.cloth.vertex_count <= LARGEST_COMPILED
         fast = finish and memory > 0 and small and potential.time_step is not None
@@ -89,12 +84,18 @@ class LBFGS:
         self.switch = max(COMPILED_SWITCH if fast else SWITCH, tolerance) if finish else tolerance
         if not any(energy.has_scalar_stiffness for energy in potential.energies):
             raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
-        self._compiled = _compiled(potential, self.max_iterations, self.switch) if fast else None
+        self._compiled: CompiledLBFGS | None = None
+        if fast:  # its kernels are loaded only where they serve
+            from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
+
+            self._compiled = CompiledLBFGS(
+                potential, max_iterations=self.max_iterations, tolerance=self.switch
+            )
         self._newton: Newton | None = None
         if finish:
             self._newton = Newton(
                 potential, tolerance=tolerance, max_iterations=max_iterations, timeout=timeout, reuse=True,
-                start_projected=True, observe=observe,
+                start_projected=True,
             )  # fmt: skip
 
     @cached_property
@@ -113,8 +114,6 @@ class LBFGS:
         if self._newton is not None and self._compiled is not None:
             first = Descent(self.potential, x0)
             if self._in_float32(self._compiled, first):
-                if self.observe is not None:
-                    self.observe(x0.copy())
                 return self._newton.minimise(first.x, after=first)
             refused = first
         run = LBFGSRun(self, x0)
@@ -164,19 +163,11 @@ class LBFGS:
         return falls and (loose or run.gradient_norm() > self.tolerance)
 
 
-def _compiled(potential: Potential, max_iterations: int, switch: float) -> CompiledLBFGS:
-    from reference_sim.minimise.compiled_lbfgs import (
-        CompiledLBFGS,  # its kernels are loaded only where they serve
-    )
-
-    return CompiledLBFGS(potential, max_iterations=max_iterations, tolerance=switch)
-
-
 class LBFGSRun(Descent):
     """State of one minimisation by L-BFGS: its history, and the preconditioner factorised at the start."""
 
     def __init__(self, solver: LBFGS, x: np.ndarray) -> None:
-        super().__init__(solver.potential, x, observe=solver.observe)
+        super().__init__(solver.potential, x)
         self.preconditioner = solver.preconditioner
         self.history = LBFGSHistory(solver.memory)
 

@@ -29,7 +29,6 @@ from reference_sim.minimise.descent import (
     TOLERANCE,
     Descent,
     LBFGSHistory,
-    Observer,
     Result,
     Stop,
     approximate_wolfe,
@@ -38,7 +37,7 @@ from reference_sim.minimise.descent import (
     iterate,
     sufficient_decrease,
 )
-from reference_sim.minimise.factorised import FactorisedDescent, FactorisedHessian, convergence_check
+from reference_sim.minimise.factorised import FactorisedHessian, convergence_check
 from reference_sim.potential import Potential
 
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
@@ -67,7 +66,6 @@ class Newton:
         reuse: whether a factorisation serves further quasi-Newton steps, each of them an iteration.
         start_projected: whether the first iterations take all negative curvature out: one Hessian is then
             assembled where the search for the least projection assembles five.
-        observe: called with every point (V, 3) [m] that was kept, the start included.
 
     Raises:
         ValueError: a tolerance that is no finite number above 0.
@@ -82,10 +80,9 @@ class Newton:
         timeout: float = float("inf"),
         reuse: bool = False,
         start_projected: bool = False,
-        observe: Observer | None = None,
     ) -> None:
         check_tolerance(tolerance)
-        self.potential, self.reuse, self.observe = potential, reuse, observe
+        self.potential, self.reuse = potential, reuse
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
         self.hessian = FactorisedHessian(potential, tolerance=tolerance)
         self.first_level = len(CONVEXITY) - 1 if start_projected else 0
@@ -166,7 +163,7 @@ class Newton:
         return None
 
 
-class NewtonRun(FactorisedDescent):
+class NewtonRun(Descent):
     """State of one minimisation by Newton's method.
 
     Attributes:
@@ -180,7 +177,9 @@ class NewtonRun(FactorisedDescent):
     """
 
     def __init__(self, newton: Newton, x: np.ndarray, after: Descent | None) -> None:
-        super().__init__(newton.potential, x, newton.hessian, after=after, observe=newton.observe)
+        super().__init__(newton.potential, x, after=after)
+        self.hessian = newton.hessian
+        self.factorised = False  # whether the last factorisation exists, to solve with
         self.max_iterations, self.timeout = newton.max_iterations, newton.timeout
         self.values, self.target = np.empty(0), newton.tolerance
         self.quasi_newton_steps = self.iterations
@@ -188,6 +187,21 @@ class NewtonRun(FactorisedDescent):
         self.residuals: list[float] = []
         self.projection_level, self.raised = newton.first_level, newton.first_level > 0
         self.predicting, self.watchdog_steps = False, WATCHDOG_STEPS
+
+    def assemble(self, convexity: float) -> np.ndarray:
+        """Return values (nnz,) of the Hessian at the point kept last."""
+        with np.errstate(all="ignore"):
+            return self.timed("assemble", self.hessian.assemble, self.x, convexity)
+
+    def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
+        """Factorise, as the Hessian does, and count it; False if not positive definite."""
+        self.factorised = self.timed("factorise", self.hessian.factorise, values, shift)
+        self.factorisations += 1
+        return self.factorised
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the last factorisation, as the Hessian does."""
+        return self.timed("solve", self.hessian.solve, b)
 
     def first_projection(self) -> int:
         """Return the level to begin with: wrinkled cloth stays near that of the last step for a while."""

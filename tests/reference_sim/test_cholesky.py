@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from reference_sim import Cloth, Potential
 from reference_sim.cholesky import CholmodSolver, SuperLUSolver, analyse, nested_dissection
-from reference_sim.energies import Inertia, StretchStVK
 from tests.reference_sim.meshes import patch
 
 both = pytest.mark.parametrize("backend", [CholmodSolver, SuperLUSolver])
@@ -77,46 +75,6 @@ def test_a_matrix_that_is_not_positive_definite_is_an_answer_and_makes_no_noise(
     assert not solver.factorise(semidefinite)
     captured = capfd.readouterr()
     assert captured.out == "" and captured.err == ""
-
-
-@both
-def test_an_indefinite_matrix_with_a_positive_diagonal_is_found_out(backend):
-    """[[1, 2], [2, 1]]: only elimination sees the negative eigenvalue."""
-    solver = backend(np.array([0, 2, 3]), np.array([0, 1, 1]), np.arange(2))
-    assert not solver.factorise(np.array([1.0, 2.0, 1.0]))
-    assert solver.factorise(np.array([1.0, 0.5, 1.0]))
-    assert solver.solve(np.array([1.5, 1.5])) == pytest.approx([1.0, 1.0], rel=1e-14)
-
-
-@both
-def test_the_pattern_serves_again_after_success_and_after_failure(backend):
-    problem = Problem(50, seed=3)
-    solver = problem.solver(backend)
-    b = np.random.default_rng(1).normal(size=50)
-    generator = np.random.default_rng(2)
-    for k in range(4):
-        data = problem.data * np.where(problem.off, generator.uniform(0.1, 1.0, len(problem.data)), 1.0 + k)
-        assert not solver.factorise(problem.indefinite())
-        assert solver.factorise(data)
-        assert solver.solve(b) == pytest.approx(np.linalg.solve(problem.dense(data), b), rel=1e-12, abs=1e-13)
-
-
-@both
-def test_a_membrane_with_its_own_pattern_and_order(backend):
-    x, faces = patch(2, cells=5)
-    cloth = Cloth(x, faces, pins=[0, 5])
-    potential = Potential([StretchStVK(cloth), Inertia(cloth, 1 / 30)])
-    free = np.ones(cloth.vertex_count, dtype=bool)
-    free[cloth.pins] = False
-    pattern = potential.pattern(free)
-    data = pattern.assemble(1.1 * x)
-    dense = pattern.symmetric(data).toarray()
-    solver = backend(pattern.indptr, pattern.indices, pattern.order)
-    assert solver.factorise(data)
-    b = np.random.default_rng(4).normal(size=pattern.size)
-    condition = np.linalg.cond(dense)
-    assert condition < 1e4
-    assert np.abs(dense @ solver.solve(b) - b).max() < 1e-15 * condition * np.abs(b).max()
 
 
 def test_analyse_takes_cholmod_where_it_is_and_superlu_where_it_is_not(monkeypatch):

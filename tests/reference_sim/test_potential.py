@@ -115,29 +115,6 @@ def test_value_and_gradient_are_sums_and_terms_names_them():
     assert list(potential.terms(x).values()) == pytest.approx([value for value, _ in parts], rel=1e-12)
 
 
-def test_leaving_a_term_out_takes_away_that_term_and_nothing_else():
-    cloth = bent_cloth()
-    energies, x = all_terms(cloth), crumpled(cloth)
-    whole = Potential(energies)
-    for k, energy in enumerate(energies):
-        rest, alone = Potential(energies[:k] + energies[k + 1 :]), Potential([energy])
-        assert rest.value(x) + alone.value(x) == pytest.approx(whole.value(x), rel=1e-13)
-        left = rest.gradient(x) + alone.gradient(x) - whole.gradient(x)
-        assert np.abs(left).max() < 1e-12 * np.abs(whole.gradient(x)).max()
-        assert abs(rest.hessian(x) + alone.hessian(x) - whole.hessian(x)).max() < 1e-12 * 1e3
-        assert energy.name not in rest.terms(x)
-
-
-def test_second_derivatives_of_another_shape_are_refused():
-    class Flat(Gravity):
-        def active_hessian_blocks(self, x, convexity=0.0):
-            return np.arange(len(x)), np.zeros((len(x), 2, 2))
-
-    cloth = bent_cloth()
-    with pytest.raises(ValueError, match=r"shape \(25, 2, 2\): expected \(25, 3, 3\)"):
-        Potential([Flat(cloth)]).hessian(cloth.rest_positions)
-
-
 @pytest.mark.parametrize(
     ("terms", "message"),
     [

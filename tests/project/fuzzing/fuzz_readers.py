@@ -105,7 +105,6 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 POSITIONS = np.stack([CORNERS, CORNERS + 0.1])
 MESH = meshio.Mesh(CORNERS, [("triangle", FACES)])
-SURFACE = pyvista.PolyData.from_regular_faces(CORNERS, FACES)
 ROLLED_OUT = Trajectory(
     POSITIONS, FACES, np.array([0.0, 0.1]), np.zeros(2), "ok", frame_fields={"iterations": np.arange(2.0)}
 )
@@ -229,9 +228,7 @@ READERS: tuple[Reader, ...] = (
     Reader("amc", ".amc", lambda path: path.write_text(CLIP), read_amc, MotionError),
     Reader("asf", ".asf", lambda path: path.write_text(cmu_like()), read_asf, MotionError),
     *(Reader(suffix, suffix, lambda path: MESH.write(path), read_cloth, MeshError)
-      for suffix in (".obj", ".ply", ".off", ".vtu")),
-    Reader("VTK", ".vtk", lambda path: MESH.write(path, binary=False), read_cloth, MeshError),
-    Reader("VTP", ".vtp", lambda path: SURFACE.save(path, binary=False), read_cloth, MeshError),
+      for suffix in (".obj", ".ply", ".off")),
     Reader("trajectory", ".vtkhdf", ROLLED_OUT.save, Trajectory.load, TrajectoryError),
     Reader("model", ".safetensors", lambda path: model().save(path), TrainedModel.load, ModelFileError),
     Reader("model's header", ".json", write_header, read_header, ModelFileError, values_of),

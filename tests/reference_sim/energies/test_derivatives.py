@@ -223,27 +223,6 @@ def test_contact_takes_planes_per_frame():
         assert float(energies[k].sum()) == pytest.approx(value, rel=1e-12)
 
 
-def test_contact_without_planes_is_no_contact_in_both_forms():
-    cloth = curved_cloth()
-    energy = ContactPenalty(cloth)
-    x = cloth.rest_positions
-    value, gradient = energy.value_and_gradient(x)
-    assert value == 0 and (gradient == 0).all() and not blocks_of(energy, x).any()
-    assert (energy.energy(torch.as_tensor(x)) == 0).all()
-
-
-def test_each_kind_of_contact_sample_carries_the_whole_area():
-    cloth = curved_cloth()
-    energy = ContactPenalty(cloth)
-    counts = np.cumsum([cloth.vertex_count, len(cloth.edges), len(cloth.faces)])
-    assert len(energy.stencils) == counts[-1]
-    for areas in np.split(energy.sample_areas, counts[:-1]):
-        assert areas.sum() == pytest.approx(cloth.areas.sum(), rel=1e-13)
-    x = cloth.rest_positions
-    expected = np.concatenate([x, x[cloth.edges].mean(axis=1), x[cloth.faces].mean(axis=1)])
-    assert energy.sample_matrix @ x == pytest.approx(expected, abs=1e-15)
-
-
 def test_every_term_has_its_line_above():
     tested = {type(case()[0]).__name__ for case in CASES}
     # Terms that are dynamic have no definition in torch; test_self_contact.py holds theirs.

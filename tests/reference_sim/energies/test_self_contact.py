@@ -76,7 +76,7 @@ def crumpled(distance: float = 3e-3) -> tuple[ContactBarrier, np.ndarray]:
 
 def with_pairs() -> tuple[ContactBarrier, np.ndarray]:
     barrier, x = crumpled()
-    kinds = barrier.pairs.at(x)[0]
+    kinds = barrier.pairs(x)[0]
     assert min(map(len, (kinds.fv_collisions, kinds.ee_collisions, kinds.ev_collisions))) > 0
     return barrier, x
 
@@ -178,14 +178,6 @@ def test_a_start_that_intersects_is_refused_with_the_elements_that_cut():
 def test_impossible_barriers_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         ContactBarrier(two_sheets()[0], **options)
-
-
-def test_areas_that_weigh_pairs_are_the_rest_state_of_the_cloth():
-    x, faces = grid(3, 3, width=0.1, depth=0.1)
-    cloth = Cloth(x, faces, Material(), rest_uv=2 * x[:, [0, 2]])
-    mesh = ContactBarrier(cloth).pairs.mesh
-    assert mesh.vertex_areas == pytest.approx(cloth.vertex_areas, rel=1e-12)
-    assert mesh.edge_areas.sum() == pytest.approx(cloth.areas.sum(), rel=1e-12)
 
 
 @pytest.mark.parametrize("held", [True, False])

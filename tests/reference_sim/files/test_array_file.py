@@ -6,7 +6,6 @@ import io
 import os
 import pickle
 import struct
-import zipfile
 from collections import OrderedDict, defaultdict
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from reference_sim.files.array_file import (
     read_array,
     read_arrays,
     read_pickled_arrays,
-    try_out,
     write_array,
 )
 
@@ -33,20 +31,6 @@ OTHERS = {
     "letters": np.array([b"a", b"bc"]),
     "truth": np.array([True, False]),
 }
-
-
-def npy(shape: str, descr: str = "'<f8'", data: bytes = b"", version: tuple[int, int] = (1, 0)) -> bytes:
-    """An .npy file that declares this, and holds those bytes."""
-    header = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}\n".encode("latin-1")
-    length = struct.pack("<H" if version == (1, 0) else "<I", len(header))
-    return b"\x93NUMPY" + bytes(version) + length + header + data
-
-
-def npz(member: bytes, method: int = zipfile.ZIP_DEFLATED) -> bytes:
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", method) as archive:
-        archive.writestr("poses.npy", member)
-    return stream.getvalue()
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
@@ -78,75 +62,28 @@ def test_an_array_of_objects_is_refused_only_where_it_is_asked_for(tmp_path):
         read_arrays(tmp_path / "a.npz")
 
 
-SHORT = "negative|read all|could not read|convert to|too large|EOF|more numbers than fit"
+def whole_archive() -> bytes:
+    np.savez(stream := io.BytesIO(), poses=POSES)
+    return stream.getvalue()
 
 
 @pytest.mark.parametrize(
-    ("shape", "descr", "reason"),
+    ("data", "reason"),
     [
-        ("(10**30,)", "'<f8'", "Header|malformed"),
-        (f"({10**30},)", "'<f8'", SHORT),
-        ("(40000, 40000)", "'<f8'", SHORT),
-        ("(-1, 3)", "'<f8'", SHORT),
-        ("(3,)", "'<f8'", SHORT),
-        ("(1,)", "'<f8'", "longer than its shape"),
-        (f"({10**14},)", "'S0'", "."),
-        ("(2,)", "'|O'", "Object arrays"),
-        ("(2,)", "[('a', '<f8')]", "type"),
-        ("(2,)", "('<f8', (10**9,))", "."),
-        ("(" * 3000, "'<f8'", "."),
-        ("-" * 9000 + "1", "'<f8'", "."),
+        (None, "no such file"),
+        (b"", "not a zip file"),
+        (whole_archive()[:-30], "not a zip file"),
+        (whole_archive().replace(b"(4, 3)", b"(9, 9)"), "array 'poses': "),
+        (whole_archive().replace(b"<f8", b"<f0"), "array 'poses': "),
     ],
 )
-def test_a_declaration_that_the_file_does_not_bear_out_is_refused(tmp_path, shape, descr, reason):
-    for data, name, read in ((npy(shape, descr, bytes(16)), "a.npy", read_array),
-                             (npz(npy(shape, descr, bytes(16))), "b.npz", read_arrays)):  # fmt: skip
-        (tmp_path / name).write_bytes(data)
-        with pytest.raises(ArrayFileError, match=reason) as refusal:
-            read(tmp_path / name)
-        assert str(tmp_path / name) in str(refusal.value) and "\n" not in str(refusal.value)
-
-
-@pytest.mark.filterwarnings("ignore:Duplicate name")
-@pytest.mark.parametrize("second", ["poses.npy", "poses"])
-def test_two_arrays_of_one_name_are_refused(tmp_path, second):
-    """Readers differ in which of the two they take."""
-    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
-        for name, value in (("poses.npy", b"1"), (second, b"2")):
-            archive.writestr(name, npy("(2,)", data=8 * value + bytes(8)))
-    with pytest.raises(ArrayFileError, match="array 'poses': is there twice"):
-        read_arrays(tmp_path / "a.npz")
-
-
-def test_a_small_file_of_a_large_array_is_refused_before_it_is_unpacked(tmp_path):
-    data = npz(member := npy("(625000,)", data=bytes(5_000_000)))
-    true, claimed = (struct.pack("<I", n) for n in (len(member), 4_000_000_000))
-    for file, limit in ((data, 4_000_000), (data.replace(true, claimed), 1 << 30)):
-        (tmp_path / "a.npz").write_bytes(file)
-        with pytest.raises(ArrayFileError, match=r"array .poses.: .*too large"):
-            read_arrays(tmp_path / "a.npz", limit=limit)
-
-
-def test_archives_that_cannot_be_unpacked_are_refused(tmp_path):
-    whole, path = npz(npy("(2,)", data=bytes(16))), tmp_path / "a.npz"
-    place = whole.index(b"PK\1\2")
-    encrypted = bytearray(whole)
-    encrypted[6] |= 1
-    encrypted[place + 8] |= 1
-    damaged = bytearray(whole)
-    damaged[60] ^= 16
-    for data, reason in (
-        (bytes(encrypted), "encrypted"),
-        (bytes(damaged), "."),
-        (npz(npy("(2,)", data=bytes(16)), zipfile.ZIP_LZMA), "method 14"),
-        (whole[:-30], "not a zip file"),
-        (b"", "not a zip file"),
-    ):
+def test_an_archive_that_cannot_be_read_is_refused_in_one_line(tmp_path, data, reason):
+    path = tmp_path / "a.npz"
+    if data is not None:
         path.write_bytes(data)
-        with pytest.raises(ArrayFileError, match=reason):
-            read_arrays(path)
-    with pytest.raises(ArrayFileError, match="no such file"):
-        read_arrays(tmp_path / "absent.npz")
+    with pytest.raises(ArrayFileError, match=reason) as caught:
+        read_arrays(path)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
 ROLL_OUT = {
@@ -168,7 +105,7 @@ def pickled(path: Path, content: object, protocol: int = 4) -> Path:
     return path
 
 
-@pytest.mark.parametrize("protocol", range(6))
+@pytest.mark.parametrize("protocol", (0, 2, 5))
 def test_a_pickle_gives_its_arrays_by_name(tmp_path, protocol):
     read = read_pickled_arrays(pickled(tmp_path / "a.pkl", ROLL_OUT, protocol), ROLL_OUT)
     assert set(read) == set(ROLL_OUT) - {"metrics", "config", "rows"}
@@ -264,15 +201,3 @@ def test_a_hostile_or_broken_pickle_is_refused_in_one_line_and_nothing_is_run(tm
         read_pickled_arrays(path, ("a", "x"))
     message = str(caught.value)
     assert not marker.exists() and str(path) in message and "\n" not in message and len(message) < 500
-
-
-def crash(path: Path) -> None:
-    """Read a file as a library does that runs out of its stack."""
-    os.abort()
-
-
-def test_a_trial_tells_a_crash_from_a_refusal_and_a_good_file(tmp_path):
-    np.save(tmp_path / "a.npy", POSES)
-    assert try_out(read_array, tmp_path / "a.npy") == ""
-    assert try_out(crash, tmp_path / "a.npy").startswith("reading it crashes the reader")
-    assert try_out(read_array, tmp_path / "a.npy", tmp_path).startswith(f"{tmp_path}: ")

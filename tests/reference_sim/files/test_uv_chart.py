@@ -9,7 +9,7 @@ from reference_sim import Cloth, Material
 from reference_sim.cloth import MeshError
 from reference_sim.energies import BendHinge, Gravity, StretchSpring, StretchStVK
 from reference_sim.files.mesh_files import Surface
-from reference_sim.files.uv_chart import join_seams, rest_chart, stretches
+from reference_sim.files.uv_chart import join_seams, rest_chart
 from tests.reference_sim.meshes import grid, patch
 from tests.snug.garments.garment_files import doubled_along, own_chart
 
@@ -68,19 +68,12 @@ def test_vertices_doubled_for_their_chart_are_joined_by_place_and_keep_it():
     cut = np.flatnonzero(np.abs(positions[:, 0]) < 1e-9)
     twice, split = doubled_along(positions, faces, cut)
     chart = twice[split][:, :, [0, 2]] + np.where(split.max(1) >= len(positions), 9.0, 0.0)[:, None, None]
-    joined, kept = join_seams(Surface(twice, split, uv=chart, vertex_data={"w": np.arange(len(twice))}))
+    joined, kept = join_seams(Surface(twice, split, uv=chart))
     np.testing.assert_array_equal(joined.positions, positions)
     np.testing.assert_array_equal(joined.faces, faces)
     np.testing.assert_array_equal(kept, np.arange(len(positions)))
-    np.testing.assert_array_equal(joined.vertex_data["w"], kept)
     cloth = Cloth(joined.positions, joined.faces, rest_uv=rest_chart(joined, 1.0))
     np.testing.assert_allclose(cloth.edge_lengths, Cloth(positions, faces).edge_lengths, rtol=1e-12)
-
-
-def test_principal_stretches_of_a_known_map():
-    chart = own_chart(*SHEET)
-    corners = SHEET[0][SHEET[1]] * [1.2, 1.0, 0.7]
-    np.testing.assert_allclose(stretches(corners, chart), np.tile([1.2, 0.7], (len(chart), 1)), rtol=1e-10)
 
 
 def test_a_chart_in_another_unit_is_refused_with_the_scale_that_mends_it():
@@ -91,22 +84,16 @@ def test_a_chart_in_another_unit_is_refused_with_the_scale_that_mends_it():
     np.testing.assert_allclose(rest_chart(surface, 0.25), own_chart(positions, faces))
 
 
-def test_a_texture_is_no_pattern():
-    positions, faces = SHEET
-    chart = own_chart(positions, faces) * [4.0, 0.25]  # each triangle along its own axes
-    with pytest.raises(MeshError, match=r"that is a texture and no pattern; rest=mesh"):
-        rest_chart(Surface(positions, faces, uv=chart), 1.0)
-
-
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
         (lambda uv: None, "has no UV"),
         (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 7, np.nan, uv), "triangle 7 has a corner"),
         (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 4, 0.0, uv), "triangle 4 has no area"),
+        (lambda uv: uv * [4.0, 0.25], "that is a texture and no pattern"),  # each triangle along its own axes
     ],
 )
-def test_an_incomplete_chart_is_named(spoil, message):
+def test_a_chart_that_is_no_pattern_is_refused(spoil, message):
     positions, faces = SHEET
     with pytest.raises(MeshError, match=message):
         rest_chart(Surface(positions, faces, uv=spoil(own_chart(positions, faces))), 1.0)

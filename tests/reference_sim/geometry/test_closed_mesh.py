@@ -41,9 +41,7 @@ def test_closed_surfaces_pass():
     ("positions", "faces", "message"),
     [
         (BALL, FACES, r"expected \(T, B, 3\) and \(F, 3\)"),
-        (BALL[None], FACES[:, :2], r"expected \(T, B, 3\) and \(F, 3\)"),
         (BALL[None][:0], FACES, "nothing to touch"),
-        (BALL[None], FACES[:0], "nothing to touch"),
         (BALL[None], FACES + 1, r"vertex outside 0\.\.17"),
         (with_vertex(1, 4, np.nan), FACES, "vertex 4 of frame 1 is not finite"),
         (
@@ -51,12 +49,12 @@ def test_closed_surfaces_pass():
             FACES[1:],
             r"not closed: edge \(\d+, \d+\) of face \d+ has one face only: fill the hole",
         ),
-        (BALL[None], turned(3), r"faces disagree: edge \(\d+, \d+\) of face \d+ .*wind all faces outwards"),
+        (BALL[None], turned(3), r"edge \(\d+, \d+\) of face \d+ .*wind all faces outwards"),
         (BALL[None], FACES[:, ::-1], "inside out .*reverse its faces"),
         (
             boxes_sharing_an_edge()[0][None],
             boxes_sharing_an_edge()[1],
-            r"has 4 faces at edge \((6, 7|7, 6)\)",
+            r"edge \((6, 7|7, 6)\) .* has more than two faces",
         ),
     ],
 )

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import igl
 import numpy as np
 import pytest
 
-from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.presets import find_preset
-from benchmarks.scenes import of_garment
 from reference_sim.geometry.closest_point import FaceSearch
 from reference_sim.geometry.leaf_bounds import LANES, closest_on_triangle
 from reference_sim.kernels.kernel_cache import njit
@@ -162,19 +157,6 @@ def test_only_faces_near_the_place_at_rest_are_met(name, region):
     assert name == "soup 7" or (closest != tree.nearest(points).faces).any()
 
 
-def test_a_refitted_tree_answers_as_one_built_for_the_pose():
-    positions, faces = mesh("sphere")
-    tree = tree_of(positions, faces)
-    generator = np.random.default_rng(4)
-    for scale in (1.0, 100.0, 0.01):
-        moved = scale * positions * [1.0, 0.1, 3.0] + generator.normal(0, 0.1 * scale, positions.shape)
-        tree.refit(moved)
-        points = moved[generator.permutation(len(moved))] * 1.1
-        closest, fresh = tree.nearest(points), tree_of(moved, faces).nearest(points)
-        assert (closest.faces == fresh.faces).all() and (closest.points == fresh.points).all()
-    assert_closest(tree, moved, points)
-
-
 @pytest.mark.parametrize("count", [1, LANES - 1, LANES, LANES + 1])
 def test_company_changes_nothing(count):
     """Samples are searched in groups: each gets what it would alone, with hints or without, in any order."""
@@ -186,31 +168,3 @@ def test_company_changes_nothing(count):
     for some in (None, hints[chosen]):
         closest = tree.nearest(points[chosen], samples=tree.listed(home[chosen], 0.8), hints=some)
         assert (closest.faces == whole.faces[chosen]).all() and (closest.points == whole.points[chosen]).all()
-
-
-def test_on_a_lively_motion_each_answer_is_that_of_the_plain_search():
-    """A T-shirt on a jumping and spinning body, thrown about by centimetres from frame to frame."""
-    frames = 3
-    preset = replace(find_preset("smoke"), frames=frames, garment_vertices=350)
-    scene = of_garment("tshirt").scene("spin_jump").at(preset).build(
-        open_assets(preset, embedded_motions(["spin_jump"]), ["tshirt"])
-    )  # fmt: skip
-    obstacle, generator = scene.obstacle, np.random.default_rng(12)
-    (contact,) = (energy for energy in scene.energies if energy.name == "collision")
-    home, x = contact.rest_samples, scene.cloth.rest_positions
-    search, hints = FaceSearch(obstacle.faces, obstacle.rest_centroids), None
-    samples, chosen = search.listed(home, obstacle.region), np.arange(0, len(home), 20)
-    for frame in range(1, frames + 1):
-        x = obstacle.transported(x, frame, scene.cloth.rest_positions)
-        x += generator.normal(0, 0.01, (1, 3)) + generator.normal(0, 0.001, x.shape)
-        points, body = contact.sample_matrix @ x, obstacle.at(frame)
-        search.refit(body)
-        answers = search.nearest(points, hints=hints, samples=samples)
-        hints = answers.faces
-        corners = body[np.sort(obstacle.faces, axis=1)]
-        faces, distances = one_by_one(
-            corners, points[chosen], obstacle.rest_centroids, home[chosen], obstacle.region
-        )
-        assert (answers.faces[chosen] == faces).all()
-        distance = np.linalg.norm(points - answers.points, axis=1)[chosen]
-        assert np.abs(distance - np.sqrt(distances)).max() < 1e-12

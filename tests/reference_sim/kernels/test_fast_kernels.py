@@ -37,14 +37,6 @@ class Same(StretchStVK):
     kernels: ClassVar = StretchStVK.kernels
 
 
-class Misspelt(StretchStVK):
-    kernels: ClassVar = {"float32": len}
-
-
-class Named(StretchStVK):
-    kernels: ClassVar = {"float32_lanes": "lanes"}
-
-
 @pytest.fixture
 def cloth() -> Cloth:
     positions, faces = patch(0)
@@ -64,15 +56,6 @@ def test_what_a_class_inherits_is_not_its_own(cloth):
     assert terms_without_kernel(potential, "float32_lanes") == [potential.energies[0]]
     with pytest.raises(ValueError, match="no kernel for the term 'strain'"):
         CompiledLBFGS(potential, max_iterations=1)
-
-
-def test_an_unknown_use_is_named(cloth):
-    with pytest.raises(
-        ValueError, match=r"Misspelt\.kernels: unknown use 'float32', choose of vertex_inertia"
-    ):
-        has_kernel(Misspelt(cloth), "float32_lanes")
-    with pytest.raises(ValueError, match=r"Named\.kernels: 'float32_lanes' is 'lanes': give the function"):
-        has_kernel(Named(cloth), "float32_lanes")
 
 
 def test_a_slow_minimisation_is_announced_once(cloth, told_anew):

@@ -152,25 +152,12 @@ def test_an_edit_of_a_kernel_that_is_an_argument_is_seen(project, run):
     assert run(CALL_GIVEN, project) == ["25.0 0.0", "1"]
 
 
-def test_the_users_own_cache_folder_is_respected(project, call):
-    _, _, place = call(project, NUMBA_CACHE_DIR=str(project / "mine"))
-    assert place.is_relative_to(project / "mine") and not (project / "__pycache__").exists()
-    edit(project / "deep.py", "x + 1", "x + 2")
-    assert call(project, NUMBA_CACHE_DIR=str(project / "mine"))[:2] == (1000, False)
-
-
 def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(project, call):
     (project / "__pycache__").write_text("a file, so that no folder can be made")
     user = project / "user"
     _, _, place = call(project, XDG_CACHE_HOME=str(user), HOME=str(user), LOCALAPPDATA=str(user))
     assert place.is_relative_to(user)
     assert call(project, XDG_CACHE_HOME=str(user), HOME=str(user), LOCALAPPDATA=str(user))[1]
-
-
-def test_without_any_folder_kernels_are_compiled_in_the_process(project, run):
-    (project / "no").write_text("a file")
-    code = "import caller\nprint(caller.outer(3), caller.outer.stats.cache_path)"
-    assert run(code, project, NUMBA_CACHE_DIR=str(project / "no")) == ["640 None"]
 
 
 def test_no_file_takes_a_decorator_from_numba_itself():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from reference_sim import GRAVITY, Cloth, Material, Potential, minimise
+from reference_sim import GRAVITY, Cloth, Potential, minimise
 from reference_sim.energies import BendHinge, Energy, Gravity, Inertia, StretchSpring, StretchStVK
 from reference_sim.minimise.descent import STATUSES
 from reference_sim.minimise.minimisers import MINIMISERS
-from tests.reference_sim.meshes import patch, random_rotation
+from tests.reference_sim.meshes import random_rotation
 from tests.reference_sim.minimise.minima import (
     FACES,
     SHEET,
@@ -40,30 +40,6 @@ def test_a_sheet_hangs_from_two_corners(method):
     assert all(seconds >= 0 for seconds in result.seconds.values())
 
 
-def test_both_methods_find_the_same_minimum_where_there_is_one():
-    """A stretched sheet has one minimum: tolerance 1e-6 weights over a stiffness of 30 N/m, 1e-10 m."""
-    cloth = Cloth(SHEET, FACES, pins=SIDES)
-    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
-    newton, lbfgs = (minimise(potential, 1.3 * SHEET, method) for method in ("newton", "lbfgs"))
-    assert_minimum(potential, 1.3 * SHEET, newton)
-    assert_minimum(potential, 1.3 * SHEET, lbfgs)
-    assert newton.positions == pytest.approx(lbfgs.positions, abs=1e-8)
-
-
-@both
-def test_the_energy_never_rises(method):
-    potential, x0 = hanging()
-    x0 = x0 + np.random.default_rng(3).normal(0, 0.01, x0.shape) * (x0[:, :1] > 0)
-    options = {} if method == "newton" else {"finish": False}
-    kept: list[np.ndarray] = []
-    result = minimise(potential, x0, method, max_iterations=40, observe=kept.append, **options)
-    energies = [potential.value(x) for x in kept]
-    assert len(kept) == result.iterations + 1 > 10 and energies[0] == potential.value(x0)
-    steps = np.diff(energies)
-    assert (steps <= 1e-12 * np.abs(energies[:-1])).all(), steps.max()
-    assert energies[-1] == result.energy < energies[0] - 0.01
-
-
 @pytest.mark.parametrize("energies", [(StretchStVK,), (StretchSpring, BendHinge)])
 def test_a_flat_compressed_sheet_is_a_saddle_and_not_an_answer(energies):
     """Pressed together between two held sides and flat, it is in balance out of its plane, and unstable."""
@@ -78,21 +54,6 @@ def test_a_flat_compressed_sheet_is_a_saddle_and_not_an_answer(energies):
         assert_minimum(potential, x0, result)
     # Flat, the membrane keeps about E2 G^2 / 2 of energy per area; buckled, nearly nothing.
     assert result.energy < 0.05 * potential.value(x0)
-
-
-@pytest.mark.parametrize("spread", [0.0, 1e-14])
-def test_a_sheet_collapsed_to_a_point_is_no_answer(spread):
-    """F = 0: the force vanishes and every direction falls. The energy there is (lambda + mu)/2 per area."""
-    x, faces = patch(4)
-    cloth = Cloth(x, faces)
-    potential = Potential([StretchStVK(cloth)])
-    m = cloth.material
-    x0 = np.full_like(x, 0.1) + np.random.default_rng(0).normal(0, 1, x.shape) * spread
-    assert potential.value(x0) == pytest.approx((m.lame_lambda + m.lame_mu) / 2, rel=1e-12)
-    result = minimise(potential, x0)
-    assert result.status != "converged" or result.energy < 1e-12
-    # The solver at hand does get away from there, which is more than it promises.
-    assert result.energy < 0.01 * potential.value(x0)
 
 
 @pytest.mark.parametrize("term", [BendHinge, StretchSpring])
@@ -135,22 +96,6 @@ def test_too_few_iterations_is_said(method):
     assert "3 iterations" in result.reason and result.gradient_norm > TOLERANCE
 
 
-def test_converged_in_the_very_last_iteration_is_converged():
-    potential, x0 = crumpled()
-    iterations = minimise(potential, x0).iterations
-    assert_minimum(potential, x0, minimise(potential, x0, max_iterations=iterations))
-    assert minimise(potential, x0, max_iterations=iterations - 1).status == "max_iterations"
-
-
-@both
-def test_a_cloth_without_a_minimum_is_not_converged(method):
-    """Gravity and nothing to hold it: the potential has no lower bound."""
-    cloth = Cloth(SHEET, FACES)
-    potential = Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)])
-    result = minimise(potential, SHEET, method, max_iterations=15)
-    assert result.status in STATUSES and result.status != "converged"
-
-
 @pytest.mark.parametrize("rest_angles", [0.0, "rest"])
 @both
 def test_an_unpinned_cloth_finds_its_rest_shape_somewhere(method, rest_angles):
@@ -180,14 +125,6 @@ def test_at_rest_there_is_nothing_to_do(method):
     assert np.abs(result.positions - SHEET).max() == 0
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
-def test_the_tolerance_is_in_vertex_weights_whatever_the_stiffness(factor):
-    material = Material(young_modulus=70e3 * factor)
-    cloth = Cloth(SHEET, FACES, material, pins=SIDES)
-    potential = Potential([StretchStVK(cloth), Gravity(cloth), Inertia(cloth, 1 / 30)])
-    assert_minimum(potential, 1.2 * SHEET, minimise(potential, 1.2 * SHEET))
-
-
 def crumpled() -> tuple[Potential, np.ndarray]:
     """A step of a sheet that is far from any minimum: its Hessian is indefinite for a while."""
     cloth = Cloth(SHEET, FACES)
@@ -200,14 +137,10 @@ def crumpled() -> tuple[Potential, np.ndarray]:
 @pytest.mark.parametrize("case", [hanging, crumpled])
 def test_a_factorisation_used_again_saves_others_and_ends_in_a_minimum(case):
     potential, x0 = case()
-    kept: list[np.ndarray] = []
-    fresh = minimise(potential, x0)
-    again = minimise(potential, x0, reuse=True, observe=kept.append)
+    fresh, again = minimise(potential, x0), minimise(potential, x0, reuse=True)
     assert_minimum(potential, x0, again)
     # 16 or 18 of 20 where the sheet hangs: that much is round-off.
     assert again.factorisations <= 0.9 * fresh.factorisations and again.iterations > again.factorisations
-    assert len(kept) <= again.iterations + 1  # every step that was kept is an iteration
-    assert (np.diff([potential.value(x) for x in kept]) <= 1e-12 * abs(again.energy)).all()
 
 
 def test_unknown_names_are_refused():
