@@ -24,7 +24,6 @@ from typing import Any, NamedTuple
 
 import meshio
 import numpy as np
-import pyvista
 
 from benchmarks.external.roll_out_files import RollOutFileError, read_roll_out
 from benchmarks.results.row import ResultsError
