@@ -84,8 +84,8 @@ class Case:
             if isinstance(measured, Mapping):
                 measured = measured[self.name]
             if not isinstance(measured, Measurement):
-                pair = measured if isinstance(measured, tuple) else (measured, self.expected)
-                measured = self.judged(*(None if number is None else float(number) for number in pair))
+                value, expected = measured if isinstance(measured, tuple) else (measured, self.expected)
+                measured = self.judged(float(value), None if expected is None else float(expected))
         except Exception as error:
             measured = Measurement(reason=f"{type(error).__name__}: {error}")
         return Row(
@@ -107,7 +107,7 @@ class Case:
         reason = ""
         if self.tolerance is not None and expected is None:
             reason = "a tolerance, but nothing to compare with"
-        elif self.tolerance is not None and abs(value - expected) > self.tolerance:
+        elif self.tolerance is not None and expected is not None and abs(value - expected) > self.tolerance:
             reason = f"{value:.6g} is further than {self.tolerance:g} from {expected:g} ({self.reason})"
         return Measurement(value=value, status="failed" if reason else "ok", reason=reason, expected=expected)
 
