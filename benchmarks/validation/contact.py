@@ -13,7 +13,7 @@ import numpy as np
 import reference_sim as sim
 from benchmarks.meshes import jittered_patch, right_grid
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import ends, flat_cloth, minimum, motion, order
+from benchmarks.validation.equilibrium import COTTON, ends, flat_cloth, minimum, motion, order
 from reference_sim import energies
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ def penalty_depth() -> float:
     """
     from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
 
-    contact, x, areal_density = _sheet_at_rest("vertices")
-    exact = np.sqrt(areal_density * sim.GRAVITY / (3 * DEFAULT_STIFFNESS))
+    contact, x = _sheet_at_rest("vertices")
+    exact = np.sqrt(COTTON.areal_density * sim.GRAVITY / (3 * DEFAULT_STIFFNESS))
     return float(((contact.margin - x[:, 1]) / exact).mean())
 
 
@@ -45,19 +45,18 @@ def contact_sampled_area() -> float:
 @known_answer(expected=1.0, tolerance=2e-6, reason="the residual gradient that the solver may leave")
 def contact_force_is_weight() -> float:
     """Return the total contact force over the weight of a sheet at rest on a plane, all samples on."""
-    contact, x, areal_density = _sheet_at_rest("all")
+    contact, x = _sheet_at_rest("all")
     upward = -contact.value_and_gradient(x)[1][:, 1].sum()
-    return float(upward / (areal_density * sim.GRAVITY))  # the sheet has unit area
+    return float(upward / (COTTON.areal_density * sim.GRAVITY))  # the sheet has unit area
 
 
-def _sheet_at_rest(samples: str) -> tuple[energies.ContactPenalty, np.ndarray, float]:
+def _sheet_at_rest(samples: str) -> tuple[energies.ContactPenalty, np.ndarray]:
     points, faces = jittered_patch(8)
     cloth = flat_cloth(points - 0.5, faces, lies=True)
     contact = energies.ContactPenalty(cloth, samples=samples)
     start = cloth.rest_positions + np.array([0.0, 0.002, 0.0])
     contact.prepare(energies.Step(start, np.zeros_like(start), start, 1 / 30, sim.Obstacle(*box())))
-    terms = [energies.StretchStVK(cloth), energies.Gravity(cloth), contact]
-    return contact, minimum(terms, start), cloth.material.areal_density
+    return contact, minimum([energies.StretchStVK(cloth), energies.Gravity(cloth), contact], start)
 
 
 def box() -> tuple[np.ndarray, np.ndarray]:
@@ -131,12 +130,11 @@ def _leaving(rate: int) -> float:
 
     The point is a triangle of 4 mm. It starts at rest, as deep in the margin as its weight presses it.
     """
-    material = sim.Material()
     corners = 0.004 / 3**0.5 * np.array([[np.cos(a), 0.0, np.sin(a)] for a in 2 * np.pi / 3 * np.arange(3)])
-    cloth = sim.Cloth(corners, np.array([[0, 2, 1]]), material)
+    cloth = sim.Cloth(corners, np.array([[0, 2, 1]]), COTTON)
     contact = energies.ContactPenalty(cloth, samples="vertices", stiffness=HARD)
     density = contact.stiffness[0] / contact.sample_areas[0]
-    depth = np.sqrt(material.areal_density * sim.GRAVITY * np.cos(START) / (3 * density))
+    depth = np.sqrt(COTTON.areal_density * sim.GRAVITY * np.cos(START) / (3 * density))
     turn = np.array([[np.cos(START), np.sin(START), 0], [-np.sin(START), np.cos(START), 0], [0, 0, 1.0]])
     start = (corners + np.array([0.0, RADIUS, 0.0])) @ turn.T
     start *= (RADIUS + contact.margin - depth) / np.linalg.norm(start, axis=1, keepdims=True)

@@ -25,50 +25,35 @@ COLLAPSED = 1e-3  # share of its area below which a triangle has collapsed
 STATUS = {"converged": "ok", "max_iterations": "stalled"}
 
 
-@dataclass(frozen=True)
-class StressStep:
-    """Prepared potential, guess (V, 3) [m] to start from, pins, and the mean weight of a vertex [N].
-
-    `weight` is that under Earth's gravity, whatever the step's own.
-    """
-
-    potential: sim.Potential
-    guess: np.ndarray
-    pins: np.ndarray
-    weight: float
+def solve_and_check(potential: sim.Potential, guess: np.ndarray) -> Measurement:
+    """Minimise a prepared potential from `guess` (V, 3) [m] as the simulator does, and check the result."""
+    result = sim.minimise(potential, guess, method="lbfgs", tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT)
+    return check_result(potential, guess, result)
 
 
-def solve_and_check(step: StressStep) -> Measurement:
-    """Minimise as the simulator does, and check the result."""
-    result = sim.minimise(
-        step.potential, step.guess, method="lbfgs", tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT
-    )
-    return check_result(step, result)
-
-
-def check_result(step: StressStep, result: sim.Result) -> Measurement:
+def check_result(potential: sim.Potential, guess: np.ndarray, result: sim.Result) -> Measurement:
     """Check the solver's claim against independent numbers.
 
     The value of the row is the relative residual, computed independently.
     """
-    measured = partial(Measurement, terms="+".join(energy.name for energy in step.potential.energies))
+    measured = partial(Measurement, terms="+".join(energy.name for energy in potential.energies))
     status, x = STATUS.get(result.status, result.status), result.positions
     if not np.isfinite(x).all():
         return measured(reason=f"positions that are not finite are called {result.status}")
-    if not np.array_equal(x[step.pins], step.guess[step.pins]):
+    if not np.array_equal(x[potential.cloth.pins], guess[potential.cloth.pins]):
         return measured(reason="pinned vertices moved")
-    if status == "diverged" and not np.isfinite(energy_of(step.potential, step.guess)[0]):
+    if status == "diverged" and not np.isfinite(energy_of(potential, guess)[0]):
         return measured(status=status, reason=result.reason)
-    optimum = optimality_of(step, x)
+    optimum = optimality_of(potential, x)
     if not np.isfinite(optimum.residual):
         return measured(reason=f"a gradient that is not finite is called {result.status}")
     measured = partial(measured, value=optimum.residual)
-    (before, size), (after, _) = energy_of(step.potential, step.guess), energy_of(step.potential, x)
+    (before, size), (after, _) = energy_of(potential, guess), energy_of(potential, x)
     if not after <= before + EVALUATION_ROUND_OFF * size:
         return measured(reason=f"the energy rose from {before:.17g} to {after:.17g} J")
     if status != "ok":
-        areas = corner_areas(x[step.potential.cloth.faces])
-        lost = int((areas < COLLAPSED * step.potential.cloth.areas).sum())
+        areas = corner_areas(x[potential.cloth.faces])
+        lost = int((areas < COLLAPSED * potential.cloth.areas).sum())
         collapse = f"; {lost} triangles collapsed, where a hinge's energy jumps: no minimum need exist"
         reason = f"{result.reason} ({result.iterations} iterations){collapse if lost else ''}"
         return measured(status=status, reason=reason)
@@ -105,16 +90,17 @@ class OptimalityCheck:
     zero_curvature: float
 
 
-def optimality_of(step: StressStep, x: np.ndarray) -> OptimalityCheck:
+def optimality_of(potential: sim.Potential, x: np.ndarray) -> OptimalityCheck:
     """Compute gradient and curvature at x (V, 3) over the free vertices."""
     import torch
 
-    potential = step.potential
-    free = np.setdiff1d(np.arange(len(x)), step.pins)
+    cloth = potential.cloth
+    weight = float(cloth.masses.mean() * sim.GRAVITY)  # [N] of a vertex on Earth, whatever the step's own
+    free = np.setdiff1d(np.arange(len(x)), np.asarray(cloth.pins))
     variable = torch.as_tensor(x).clone().requires_grad_(True)
     total = torch.stack([energy.energy(variable).sum() for energy in potential.energies]).sum()
     (gradient,) = torch.autograd.grad(total, variable)
-    residual = float(gradient[torch.as_tensor(free)].abs().max()) / step.weight
+    residual = float(gradient[torch.as_tensor(free)].abs().max()) / weight
     hessian = dense_hessian(potential.energies, x)
     places = (3 * free[:, None] + np.arange(3)).ravel()
     hessian = hessian[np.ix_(places, places)]
@@ -122,10 +108,10 @@ def optimality_of(step: StressStep, x: np.ndarray) -> OptimalityCheck:
         return OptimalityCheck(residual, 0.0, float("-inf"), 0.0)
     values = np.linalg.eigvalsh(hessian)
     stiffest = float(np.abs(np.diagonal(hessian)).max())
-    round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(x).max()) / step.weight
-    width = float(np.sqrt(potential.cloth.areas.sum()))
+    round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(x).max()) / weight
+    width = float(np.sqrt(cloth.areas.sum()))
     # Round-off of the eigenvalues, or a curvature that gains less than the tolerance over the sheet's width.
-    zero = max(2e-13 * float(np.abs(values).max()), 2 * RELATIVE_RESIDUAL * step.weight / width)
+    zero = max(2e-13 * float(np.abs(values).max()), 2 * RELATIVE_RESIDUAL * weight / width)
     return OptimalityCheck(residual, min(round_off, ROUND_OFF), float(values[0]), zero)
 
 

@@ -20,8 +20,6 @@ curvature makes it one of nu = 0; without that term the limit is another plate, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -289,32 +287,22 @@ def corner(which: str, poisson_ratio: str = "zero") -> tuple[float, float]:
         which: "inner" or "outer".
         poisson_ratio: "zero", or "hinges" for that of the hinges alone, -1/3.
     """
-    coarse, fine = (lifted(rows, poisson_ratio) for rows in ANNULUS_ROWS)
+    zero = D if poisson_ratio == "zero" else 0.0
+    coarse, fine = (lifted(rows, zero) for rows in ANNULUS_ROWS)
     place = ("inner", "outer").index(which)
     return float((2 * fine - coarse)[place]), SZE[place]
 
 
 @cache
-def lifted(rows: int, poisson_ratio: str = "zero") -> np.ndarray:
-    """Return the lifts [m] of the inner and the outer corner, with so many rows of triangles."""
-    plate = annulus(rows)
-    terms: list[energies.Energy] = [energies.StretchStVK(plate.cloth), energies.BendHinge(plate.cloth)]
-    if poisson_ratio == "zero":
-        terms.append(GaussianCurvature.without_poisson_effect(plate.cloth, D))
-    return lift(plate, terms)
+def lifted(
+    rows: int, zero: float, material: sim.Material = ANNULUS_MATERIAL, family: str = "equilateral"
+) -> np.ndarray:
+    """Return the lifts [m] of the free lip's inner and outer corner, with so many rows of triangles.
 
+    zero: D [J] of a plate that is made one of nu = 0; at 0 it is that of hinges alone.
 
-@dataclass(frozen=True)
-class Plate:
-    """Flat annulus, clamped at one lip: angle from the clamp (V,) [rad] and radius (V,) [m]."""
-
-    cloth: sim.Cloth
-    turn: np.ndarray
-    radius: np.ndarray
-
-
-def annulus(rows: int, material: sim.Material = ANNULUS_MATERIAL, family: str = "equilateral") -> Plate:
-    """Return the plate with so many rows of triangles of a family, see meshes.FAMILIES."""
+    Raises RuntimeError where a stage of the load does not converge.
+    """
     width = np.log(OUTER / INNER)
     columns = round(2 * np.pi / width * rows * (ROW if family == "equilateral" else 1.0))
     flat, faces = rectangle(family, columns, rows, 2 * np.pi, width)
@@ -322,23 +310,18 @@ def annulus(rows: int, material: sim.Material = ANNULUS_MATERIAL, family: str = 
     turn = flat[:, 0] * columns / (columns - 0.5) - h / 2  # the clamp: half-way between two pinned columns
     radius = INNER * np.exp(flat[:, 1])
     rest = np.stack([radius * np.cos(turn), 0.0 * turn, -radius * np.sin(turn)], axis=1)
-    return Plate(sim.Cloth(rest, faces, material, pins=np.flatnonzero(turn < 0.6 * h)), turn, radius)
-
-
-def lift(plate: Plate, terms: Sequence[energies.Energy]) -> np.ndarray:
-    """Return the lifts [m] of the free lip's inner and outer corner under the whole load.
-
-    Raises RuntimeError where a stage of the load does not converge.
-    """
-    cloth, turn, radius = plate.cloth, plate.turn, plate.radius
+    cloth = sim.Cloth(rest, faces, material, pins=np.flatnonzero(turn < 0.6 * h))
+    terms: list[energies.Energy] = [energies.StretchStVK(cloth), energies.BendHinge(cloth)]
+    if zero:
+        terms.append(GaussianCurvature(cloth, -NU * zero))
     lip = np.flatnonzero(turn > 2 * np.pi - 1e-6)
     lip = lip[np.argsort(radius[lip])]
     share = np.gradient(radius[lip])
     share[[0, -1]] /= 2
-    forces = np.zeros_like(cloth.rest_positions)
-    x = cloth.rest_positions.copy()
+    forces = np.zeros_like(rest)
+    x = rest.copy()
     x[:, 1] = 1e-3 * turn**2
-    x[cloth.pins] = cloth.rest_positions[cloth.pins]
+    x[cloth.pins] = rest[cloth.pins]
     for stage in range(1, STAGES + 1):
         forces[lip, 1] = LOAD * share * (stage / STAGES) ** 2
         x = minimum([*terms, DeadLoad(cloth, forces)], x, tolerance=1e-4)

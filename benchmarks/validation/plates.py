@@ -244,6 +244,9 @@ def _stiffness(points: np.ndarray, faces: np.ndarray, terms: Terms) -> tuple[sim
 class GaussianCurvature(energies.Energy):
     """Energy E = c (total curvature - that of the flat rest state), summed over the corners on the border.
 
+    c = -NU D makes a plate of nu = 0 of hinges on equilateral triangles, D [J] their C11: the two energies
+    differ by D (nu_0 - nu) det(S) per area, nu_0 = 0 and nu that of the hinges.
+
     Args:
         cloth: the rest state; it has to be flat.
         stiffness: c [J].
@@ -258,14 +261,6 @@ class GaussianCurvature(energies.Energy):
         self.stencils = corners[on_border]
         self.stiffness = stiffness
         self.rest_angles = corner_angles(cloth.rest_positions, cloth.faces)[on_border]
-
-    @classmethod
-    def without_poisson_effect(cls, cloth: sim.Cloth, D: float) -> GaussianCurvature:
-        """Return the term that makes a plate of nu = 0 of hinges on equilateral triangles, D [J] their C11.
-
-        The two energies differ by D (nu_0 - nu) det(S) per area, nu_0 = 0 and nu that of the hinges.
-        """
-        return cls(cloth, -NU * D)
 
     def element_energy(self, u: Tensor) -> Tensor:
         """Return E [J] of each corner: u (..., N, 3, 3) [m] -> (..., N)."""

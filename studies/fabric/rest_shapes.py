@@ -11,7 +11,7 @@ from benchmarks import known_answer
 from benchmarks.validation.clamped_strip import exact_elastica
 from benchmarks.validation.equilibrium import demand_converged
 from benchmarks.validation.large_bending import bent_strip, critical_load
-from benchmarks.validation.plates import GaussianCurvature
+from benchmarks.validation.plates import NU, GaussianCurvature
 from fabrics import FABRICS, find_fabric, isotropic, measured_fabrics
 from reference_sim import simulate
 from reference_sim.energies import BendHinge, Energy, Gravity, StretchStVK
@@ -136,7 +136,7 @@ def drape(
     material = find_fabric(fabric)
     specimen = disc(material, rings, membrane_factor)
     if poisson_ratio == "zero":
-        further = [GaussianCurvature.without_poisson_effect(specimen.cloth, material.rigidity)]
+        further = [GaussianCurvature(specimen.cloth, -NU * material.rigidity)]
         return at_rest(specimen, rate, further)
     return at_rest(specimen, rate)
 

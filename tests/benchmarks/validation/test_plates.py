@@ -33,7 +33,7 @@ def kirchhoff(curvature, nu):
 
 
 def hinges_without_poisson_effect(cloth):
-    return [*hinges("length_area")(cloth), GaussianCurvature.without_poisson_effect(cloth, D)]
+    return [*hinges("length_area")(cloth), GaussianCurvature(cloth, -NU * D)]
 
 
 @pytest.mark.parametrize(
