@@ -30,7 +30,7 @@ which over a turn of phi is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -50,7 +50,10 @@ SOLVED = 1e-11  # mean vertex weights that may be left of a step's gradient
 BELT = 0.5  # [m/s]
 THROWN, FALLING = 4.0, 1.0  # [m/s]
 LEVEL, STILL = np.eye(3), np.zeros((1, 1, 3))
-SUMMED_TWICE = "the residual gradient that the solver may leave, summed twice"
+PATH = partial(
+    known_answer, unit="m", expected=0.0, tolerance=1e-10,
+    reason="the residual gradient that the solver may leave, summed twice",
+)  # fmt: skip
 
 
 @known_answer(
@@ -64,10 +67,7 @@ def creep_speed(ratio: float) -> float:
     return speed / (SPEED * (1 - np.sqrt(1 - ratio)))
 
 
-@known_answer(
-    {"friction_slope_below": {"ratio": 0.8}, "friction_slope_at": {"ratio": 1.0}},
-    unit="m", expected=0.0, tolerance=1e-10, reason=SUMMED_TWICE,
-)  # fmt: skip
+@PATH({"friction_slope_below": {"ratio": 0.8}, "friction_slope_at": {"ratio": 1.0}})
 def slope_path(ratio: float) -> float:
     """Return the worst distance of a patch on a slope to its path by (1), over 30 steps."""
     path, downhill = _slope(ratio)
@@ -76,9 +76,7 @@ def slope_path(ratio: float) -> float:
     return float(np.abs((path - path[0]) @ downhill - exact).max())
 
 
-@known_answer(
-    {"friction_slide": {"ratio": 1.2}}, unit="m", expected=0.0, tolerance=1e-10, reason=SUMMED_TWICE
-)  # fmt: skip
+@PATH({"friction_slide": {"ratio": 1.2}})
 def slide_path(ratio: float) -> float:
     """Return the worst distance of a patch on a slope to the path of the constant g (sin a - mu cos a)."""
     path, downhill = _slope(ratio)
@@ -87,10 +85,7 @@ def slide_path(ratio: float) -> float:
     return float(np.abs((path - path[0]) @ downhill - exact).max())
 
 
-@known_answer(
-    {"friction_belt": {}, "friction_belt_in_substeps": {"substeps": 4}},
-    unit="m", expected=0.0, tolerance=1e-10, reason=SUMMED_TWICE,
-)  # fmt: skip
+@PATH({"friction_belt": {}, "friction_belt_in_substeps": {"substeps": 4}})
 def belt_path(substeps: int = 1) -> float:
     """Return the worst distance of a patch put on a belt to its path by (1); u: how fast it lags."""
     along = np.array([BELT * DT, 0.0, 0.0]) * np.arange(16)[:, None, None]
@@ -126,8 +121,7 @@ def _slip(u: float, drive: float, c: float, *, steps: int, dt: float = DT) -> np
 
 
 def _slope(ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    angle = np.arctan(ratio * MU)
-    c, s = np.cos(angle), np.sin(angle)
+    c, s = (function(np.arctan(ratio * MU)) for function in (np.cos, np.sin))
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     return _patch(turn=turn, frames=31), -turn[:, 0]
 
@@ -181,7 +175,7 @@ LENGTH = 1.0  # [m] of the strip
 COLUMNS = 40
 
 
-@known_answer(unit="m", expected=0.0, tolerance=1e-10, reason=SUMMED_TWICE)
+@PATH()
 def friction_spring_path() -> float:
     """Return the worst distance of a point that a spring pulls to discrete steps by scipy, 300 steps."""
     path, exact = _pulled_point()[:2]

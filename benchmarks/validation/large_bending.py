@@ -20,7 +20,7 @@ curvature makes it one of nu = 0; without that term the limit is another plate, 
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -36,6 +36,9 @@ ELASTICA_STIFFNESS = 1e-3  # [J] hinge stiffness
 # 330 N/m: at Gamma = 1000 the strip weighs 0.9 N per metre of width, and stretches by 0.3 %.
 ELASTICA_MATERIAL = sim.Material(young_modulus=700e3, poisson_ratio=0.0, bending_stiffness=ELASTICA_STIFFNESS)
 COLUMNS = 120
+ELASTICA = partial(
+    known_answer, smoke=False, expected=0.0, reason="120 cells, their error halves with the cell"
+)
 SYMMETRIC = ("cross", "union_jack", "equilateral", "delaunay")
 
 
@@ -65,23 +68,15 @@ def bent_strip(
     return made.chord(bent) / length, np.array([x[-1], drop[-1]])
 
 
-@known_answer(
+@ELASTICA(
     {
-        "end_loaded_cantilever_1": {"load": 1.0},
-        "end_loaded_cantilever_3": {"load": 3.0},
-        "end_loaded_cantilever_10": {"load": 10.0},
+        **{f"end_loaded_cantilever_{load:g}": {"load": load} for load in (1.0, 3.0, 10.0)},
         "heavy_elastica_10": {"weight": 10.0},
     },
-    smoke=False, expected=0.0, tolerance=3e-3, reason="120 cells, their error halves with the cell",
-)  # fmt: skip
-@known_answer(
-    {"heavy_elastica_100": {"weight": 100.0}, "heavy_elastica_1000": {"weight": 1000.0}},
-    smoke=False, expected=0.0, tolerance=6e-3, reason="120 cells, their error halves with the cell",
-)  # fmt: skip
-@known_answer(
-    {"heavy_elastica_1": {"weight": 1.0}},
-    smoke=False, expected=0.0, tolerance=1e-4, reason="120 cells, their error halves with the cell",
-)  # fmt: skip
+    tolerance=3e-3,
+)
+@ELASTICA({f"heavy_elastica_{weight:g}": {"weight": weight} for weight in (100.0, 1000.0)}, tolerance=6e-3)
+@ELASTICA({"heavy_elastica_1": {"weight": 1.0}}, tolerance=1e-4)
 def tip_distance(weight: float = 0.0, load: float = 0.0) -> float:
     """Return the distance of a cantilever's tip to the elastica, over its length, worst of the families.
 
