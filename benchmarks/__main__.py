@@ -15,6 +15,7 @@ COMMANDS = {
     "publish": ("benchmarks.publish", "run published studies again"),
     "train": ("snug.train", "train a network"),
     "check-garment": ("snug.check", "say whether a garment, body or motion can be used"),
+    "simulate": ("reference_sim.simulate", "simulate meshes of your own"),
     "report": ("reports.build", "make the report of a run again"),
     "compare": ("reports.compare", "compare two runs"),
     "film": ("reports.film", "film roll-outs"),

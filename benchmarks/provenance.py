@@ -158,7 +158,7 @@ LAYERS = ("reference_sim", "snug", "benchmarks")
 NO_PART = (".pyc", ".md", ".nbi", ".nbc", ".safetensors")
 # Commands decide no result.
 NO_RESULT = (
-    "reference_sim/command_line.py", "snug/check.py", "snug/train.py",
+    "reference_sim/command_line.py", "reference_sim/simulate.py", "snug/check.py", "snug/train.py",
 )  # fmt: skip
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 

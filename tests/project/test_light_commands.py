@@ -28,6 +28,7 @@ LIGHT = [
     ("benchmarks.run --help", "hanging_sheet", MEASURED),
     ("benchmarks.run --list", "hanging_sheet", MEASURED),
     ("benchmarks.run --dry-run", "hanging_sheet", MEASURED),
+    ("reference_sim.simulate --help", "--obstacle", {"torch", "numba", "igl", "meshio", "h5py"}),
     ("snug.check --help", "usage:", LIBRARIES | {"numpy"}),
     ("snug.train --help", "examples:", {"torch"}),
     ("reports.build --help", "usage:", MEASURED | {"numpy", "h5py", "typst", "reference_sim.cloth"}),

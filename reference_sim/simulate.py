@@ -1,0 +1,169 @@
+"""python -m reference_sim.simulate: a garment and an obstacle from files, a trajectory out.
+
+Whatever else the simulator can do is a few lines of Python, see the function `reference_sim.simulate`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from reference_sim.command_line import Parser, announce_compilation, command
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from reference_sim.cloth import Cloth
+    from reference_sim.obstacle import Obstacle
+
+FRAMES_ALONE = 60  # of a garment that meets nothing, or an obstacle that stands still
+TOP = 0.01  # share of the height, from the highest vertex down, that `top` pins
+EXAMPLES = """examples:
+  python -m reference_sim.simulate sheet.obj --pins top --frames 90 -o sheet.vtkhdf
+  python -m reference_sim.simulate shirt.obj --obstacle body.obj --obstacle-rest body.obj -o shirt.vtkhdf
+  python -m reference_sim.simulate shirt.ply --units cm --up z --obstacle 'walk/body_*.ply' -o walk.vtkhdf
+  python -m reference_sim.simulate skirt.obj --pins top --self-contact --material silk.toml -o skirt.vtkhdf
+
+The output is in metres with y up, whatever the input was in; ParaView opens it.
+Exit status: 0 all frames converged, 1 some frame did not, 2 bad input (nothing is written)."""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser of all options, with units."""
+    parser = Parser(
+        prog="python -m reference_sim.simulate",
+        description="Simulate a cloth: backward Euler, every step minimised to a stated tolerance.",
+        epilog=EXAMPLES,
+    )
+    add = parser.add_argument
+    add("garment", help="triangle mesh at rest: OBJ, PLY, VTK, STL or OFF")
+    add("-o", "--out", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
+    add("--units", choices=("m", "cm", "mm", "in"), default="m", help="of all meshes (default m)")
+    add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
+    add("--pins", metavar="WHICH", help="vertices held in place: '0,9,12', or 'top'")
+    add("--material", type=Path, metavar="FILE",
+        help=".toml or .json: young_modulus [Pa], poisson_ratio, thickness [m], density [kg/m^3], "
+        "bending_stiffness [J] (default: the cotton of the SNUG paper)",
+    )  # fmt: skip
+    add("--obstacle", metavar="MESHES", help="closed mesh, or one per frame: a folder or a quoted glob")
+    add("--obstacle-rest", metavar="MESH",
+        help="the obstacle as the garment was made for it: cloth then meets only what lies near it there",
+    )  # fmt: skip
+    add("--self-contact", action="store_true", help="the cloth never crosses itself (needs ipctk)")
+    add("--frames", type=int, metavar="N", help=f"default: those of the obstacle, or {FRAMES_ALONE}")
+    add("--dt", type=float, default=1 / 30, metavar="S", help="time between frames [s] (default 1/30)")
+    return parser
+
+
+@command("simulate")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Read, simulate and write as the arguments say; return the exit status.
+
+    Raises:
+        ValueError: bad input, before anything is written; the message names file, element and remedy.
+        OSError: a file cannot be read or written.
+    """
+    options = make_parser().parse_args(arguments)
+    announce_compilation()
+    path: Path = options.out
+    if path.suffix.lower() != ".vtkhdf" or path.exists() or not path.parent.is_dir():
+        raise ValueError(f"{path}: name a new file that ends in .vtkhdf, in a folder that exists")
+    from reference_sim import energies
+    from reference_sim.time_loop import simulate
+
+    cloth, obstacle = read_cloth(options), read_obstacle(options)
+    terms = [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)]
+    if obstacle is not None:
+        terms.append(energies.ContactPenalty(cloth))
+    if options.self_contact:
+        terms.append(energies.ContactBarrier(cloth))
+    moves = obstacle is not None and obstacle.frames > 1
+    frames = options.frames or (obstacle.frames if obstacle is not None and moves else FRAMES_ALONE)
+    found = simulate(cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, progress=path.name)
+    found.save(path)
+    fields = found.frame_fields
+    last = [f"{name[7:]} {values[-1]:.3g}" for name, values in fields.items() if name.startswith("energy/")]
+    print(
+        f"frames     {found.frames} of {frames}, {int(fields['converged'].sum())} converged\n"
+        f"status     {found.status}{found.reason and ': '}{found.reason}\n"
+        f"energies   {', '.join(last)} J at the last frame\nwrote      {path}"
+    )
+    return 0 if found.frames == frames and found.status == "converged" else 1
+
+
+def read_cloth(options: argparse.Namespace) -> Cloth:
+    """Return the cloth of the garment's file, its pins and material.
+
+    Raises:
+        ValueError: a file, an option or the mesh is no good; the message names it and the remedy.
+    """
+    from reference_sim.cloth import Cloth, MeshError
+    from reference_sim.files.mesh_files import read_mesh, to_metres_y_up
+    from reference_sim.material import Material
+
+    material = Material.from_file(options.material) if options.material else Material()
+    surface = read_mesh(options.garment)
+    positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
+    try:
+        return Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))
+    except MeshError as error:
+        raise ValueError(f"{options.garment}: {error}") from None
+
+
+def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
+    """Return the vertices that `which` names among positions (V, 3) [m, y up]: "0,9,12", or "top".
+
+    Raises:
+        ValueError: not understood, or an index out of range.
+    """
+    if which is None:
+        return []
+    height = positions[:, 1]
+    if which == "top":
+        chosen: list[int] = (
+            (height >= height.max() - TOP * (height.max() - height.min())).nonzero()[0].tolist()
+        )
+        return chosen
+    words = [word.strip() for word in which.split(",")]
+    if not all(word.isdecimal() and int(word) < len(positions) for word in words):
+        raise ValueError(f"--pins {which!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'")
+    return [int(word) for word in words]
+
+
+def read_obstacle(options: argparse.Namespace) -> Obstacle | None:
+    """Return the obstacle; None without one.
+
+    Raises:
+        ValueError: a file or the mesh is no good; the message names it and the remedy.
+    """
+    if options.obstacle is None:
+        return None
+    from reference_sim.cloth import MeshError
+    from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
+    from reference_sim.obstacle import Obstacle  # its search for contact serves no cloth that meets nothing
+
+    positions, surface = read_sequence(options.obstacle)
+    axes, rest = {"units": options.units, "up": options.up}, None
+    if options.obstacle_rest:
+        as_made = read_mesh(options.obstacle_rest)
+        if as_made.faces.tolist() != surface.faces.tolist():
+            raise ValueError(
+                f"{options.obstacle_rest}: other faces than {options.obstacle}: export both from one mesh"
+            )
+        rest = to_metres_y_up(as_made.positions, **axes)
+    try:
+        return Obstacle(to_metres_y_up(positions, **axes), surface.faces, rest_positions=rest)
+    except MeshError as error:
+        raise ValueError(f"{options.obstacle}: {error}") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())
+
+from reference_sim.time_loop import simulate  # noqa: E402
+
+# An import would put this module in the place of the function `reference_sim.simulate`.
+sys.modules[__name__] = simulate  # type: ignore[assignment]

@@ -1,0 +1,77 @@
+"""The command python -m reference_sim.simulate, from files to files."""
+
+from __future__ import annotations
+
+import runpy
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from reference_sim import Trajectory
+from reference_sim.trajectory import write_obj
+from tests.reference_sim.meshes import grid, sphere
+
+SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
+BALL, BALL_FACES = sphere(2, 0.15)
+
+
+@pytest.fixture
+def simulate(tmp_path, monkeypatch):
+    """Return a function of the command's words; a sheet and a ball of 3 frames below it lie in the folder."""
+    monkeypatch.chdir(tmp_path)
+    write_obj(tmp_path / "sheet.obj", SHEET - [0.2, 0.0, 0.2], FACES)
+    write_obj(tmp_path / "sheet_cm.obj", 100 * (SHEET - [0.2, 0.0, 0.2])[:, [0, 2, 1]] * [1, -1, 1], FACES)
+    (tmp_path / "ball").mkdir()
+    for frame in range(3):
+        write_obj(tmp_path / f"ball/{frame}.obj", BALL + np.array([0.01 * frame, -0.156, 0.0]), BALL_FACES)
+    write_obj(tmp_path / "half.obj", BALL, BALL_FACES[: len(BALL_FACES) // 2])
+
+    def run(words: str) -> int:
+        monkeypatch.setattr(sys, "argv", ["simulate", *words.split()])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_module("reference_sim.simulate", run_name="__main__")
+        return ended.value.code
+
+    return run
+
+
+def test_a_sheet_falls_onto_a_moving_ball(simulate, capsys):
+    assert simulate("sheet.obj --obstacle ball --obstacle-rest ball/0.obj -o out.vtkhdf") == 0
+    found = Trajectory.load("out.vtkhdf")
+    assert (found.status, found.frames) == ("converged", 3)
+    assert "collision" in capsys.readouterr().out
+
+
+def test_a_pinned_sheet_in_other_units_and_axes_is_the_same(simulate):
+    for mesh, out in (("sheet.obj", "m"), ("sheet_cm.obj --units cm --up z", "cm")):
+        assert simulate(f"{mesh} --pins 0,6 --frames 3 -o {out}.vtkhdf") == 0
+    metres, centimetres = (Trajectory.load(f"{name}.vtkhdf").positions for name in ("m", "cm"))
+    np.testing.assert_allclose(centimetres, metres, atol=1e-6)
+    assert (metres[-1, [0, 6]] == metres[0, [0, 6]]).all() and metres[-1, :, 1].min() < -0.01
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("sheet.obj --pins left -o a.vtkhdf", "--pins 'left': give 'top', or vertices from 0 to 48 as '0,9'"),
+        ("sheet.obj --pins 49 -o a.vtkhdf", "vertices from 0 to 48"),
+        ("sheet.obj -o a.obj", "a.obj: name a new file that ends in .vtkhdf, in a folder that exists"),
+        ("nowhere.obj -o a.vtkhdf", "nowhere.obj"),
+        ("sheet.obj --frames 0.5 -o a.vtkhdf", "argument --frames: invalid int value"),
+        ("sheet.obj --obstacle ball --obstacle-rest half.obj -o a.vtkhdf", "export both from one mesh"),
+        ("sheet.obj --obstacle sheet.obj -o a.vtkhdf", "sheet.obj: "),
+    ],
+)  # fmt: skip
+def test_bad_input_ends_in_one_line_and_writes_nothing(simulate, capsys, tmp_path, words, message):
+    assert simulate(words) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.splitlines()[-1].startswith("simulate: ")
+    assert not list(tmp_path.glob("a.*"))
+
+
+def test_an_import_of_the_command_leaves_the_function_where_it_is():
+    code = "import reference_sim.simulate as a; from reference_sim import simulate as b; print(a is b, b)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.startswith("True <function simulate at")
