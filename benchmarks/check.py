@@ -22,7 +22,7 @@ from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.options import add_study_options, study_of
-from benchmarks.plan.plan import STATES, Plan
+from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -176,7 +176,7 @@ def plan_of(declared: Declarations, folder: Path, scene_plan: Plan | None) -> Pl
 def outcomes_of(tasks: Sequence[Task], plan: Plan, assets: Assets | None) -> dict[TaskId, Outcome]:
     """Return the outcomes of tasks, all of them done now."""
     run = RunFolder(plan.folder)
-    runner = Runner(tasks, Cache(run, only=STATES))
+    runner = Runner(tasks, Cache(run))
     runner.run(Executor(run, assets, plan.workers))
     return runner.outcomes
 

@@ -21,7 +21,7 @@ from reference_sim.files.atomic_files import new_folder
 PROGRAM = "benchmarks.publish"
 WORK = Path("reports/runs/published")
 TARGET = Path("reports/published")
-AGAIN = ("--only", "failed,stale,missing")  # so a task that lacked memory once is done again
+AGAIN = ("--retry",)  # so a task that lacked memory once is done again
 KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
 EXAMPLES = """examples:
   python -m benchmarks.publish shapes                one of them

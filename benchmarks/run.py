@@ -14,7 +14,7 @@ from pathlib import Path
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import RollOutFileError
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import PROGRAM, make_parser, split, study_of
+from benchmarks.plan.options import PROGRAM, make_parser, study_of
 from benchmarks.plan.plan import Plan
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         plan = make_plan(
             study,
             folder=Path(options.out) if options.out else None,
-            only=split(options.only),
+            retry=options.retry,
             fresh=options.fresh,
             workers=options.workers,
             scheduler=options.scheduler or "",

@@ -1,17 +1,12 @@
 """Microbenchmarks: a solver step, a search of contact, a training step, a frame of a network.
 
 Each class is one of asv: `setup` makes what its function `time_...` then does again and again. Times belong
-to the machine that they were taken on: compare ratios. Without asv, a plain call prints median times:
-
-    python -c "from benchmarks.performance.microbenchmarks import print_times; print_times()"
+to the machine that they were taken on: compare ratios.
 """
 
 from __future__ import annotations
 
 import itertools
-import timeit
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -125,19 +120,3 @@ class NetworkFrame:
     def time_frame(self, network: str, vertices: int) -> None:
         """Compute the next frame."""
         next(self.frames)
-
-
-CLASSES = (SolverStep, ContactSearch, TrainingStep, NetworkFrame)
-
-
-def print_times(classes: Sequence[Any] = CLASSES, repeats: int = 20) -> None:
-    """Print the median time [ms] of each class at each of its parameters."""
-    for kind in classes:
-        for values in itertools.product(*kind.params):
-            benchmark = kind()
-            benchmark.setup(*values)
-            (name,) = (name for name in vars(kind) if name.startswith("time_"))
-            once = getattr(benchmark, name)
-            once(*values)  # compiles
-            seconds = timeit.repeat(lambda: once(*values), number=1, repeat=repeats)  # noqa: B023
-            print(f"{kind.__name__}.{name}{values}: {1e3 * float(np.median(seconds)):.3f} ms", flush=True)

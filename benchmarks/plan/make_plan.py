@@ -16,7 +16,7 @@ from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.choose_cells import ReadStudy, choose_cells
 from benchmarks.plan.motions import split_motions
-from benchmarks.plan.plan import DEFAULT_ONLY, STATES, Plan
+from benchmarks.plan.plan import Plan
 from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.provenance import usable_cores
 from benchmarks.results.row import ResultsError
@@ -33,7 +33,7 @@ def make_plan(
     study: Study,
     *,
     folder: Path | None = None,
-    only: Sequence[str] = (),
+    retry: bool = False,
     fresh: bool = False,
     workers: int | None = None,
     scheduler: str = "",
@@ -45,7 +45,7 @@ def make_plan(
     Args:
         study: what is asked.
         folder: of the run; None: a new one.
-        only: states of what the folder holds in which a task is done again; none for the usual ones.
+        retry: whether tasks that failed there are done again.
         fresh: whether nothing of the folder is reused.
         workers: processes side by side; None: as many as usual.
         scheduler: address of a cluster; empty: this machine.
@@ -63,11 +63,6 @@ def make_plan(
     """
     folder = choose_folder(folder)
     check_machines(study, folder, scheduler)
-    for state in only:
-        if state not in STATES[1:]:
-            raise StudyError(f"--only: unknown state '{state}'; choose from {', '.join(STATES[1:])}")
-    if only and fresh:
-        raise StudyError("--fresh does everything again: leave out --only")
     workers = min(WORKERS, usable_cores()) if workers is None else workers
     if workers < 1:
         raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
@@ -85,7 +80,7 @@ def make_plan(
         seeds=study.seeds,
         device=study.device,
         folder=folder,
-        only=frozenset(only or DEFAULT_ONLY),
+        retry=retry,
         fresh=fresh,
         workers=workers,
         scheduler=scheduler,

@@ -36,8 +36,8 @@ EXAMPLES = """examples:
   python -m benchmarks.run full:garments --garment shirt.obj,units=cm --body mine.npz
 
 a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
-  as it is, the rest is done. A run that was killed is so taken up again. --only failed does again what
-  failed, --fresh everything.
+  as it is, the rest is done. A run that was killed is so taken up again. --retry does again what failed,
+  --fresh everything.
 
 exit status: 0 when every cell ended as ok or as an explained skip (in extremes a failure reported with
   its reason is an accepted outcome); 1 when a cell, a training or a simulation failed: a line says why
@@ -67,9 +67,7 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     add_study_options(parser, tuple(SHORT))
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
-    add("--only", action="append", default=[], metavar="STATE,...",
-        help="tasks of the folder that are repeated: failed, stale or missing (default stale,missing); the "
-        "others are reused")  # fmt: skip
+    add("--retry", action="store_true", help="repeat what failed in the folder, too")
     add("--fresh", action="store_true", help="reuse nothing from the folder")
     add("--workers", type=int, metavar="N",
         help="parallel processes for work that is not timed (default 2, or the number of cores if less); "

@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from benchmarks.assets import Assets
     from benchmarks.validation.case import Case
 
-# Of a task in the folder of a run, and the states in which it is done again unless --only names others.
-STATES = ("finished", "failed", "stale", "missing")
-DEFAULT_ONLY = ("stale", "missing")
-
 
 @dataclass(frozen=True)
 class Network:
@@ -62,8 +58,8 @@ class Network:
 class Plan:
     """Everything to be done.
 
-    inputs: the user's files, as read. only: states of what the folder holds in which a task is
-    done again; fresh: all of it is forgotten first. workers: processes side by side where nothing is timed.
+    inputs: the user's files, as read. retry: whether tasks that have failed are done again; fresh: all that
+    the folder holds is forgotten first. workers: processes side by side where nothing is timed.
     metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. scheduler: address
     of a cluster that does what is not timed; empty: this machine does. trained: folder whose networks take
     the place of trainings; None: networks are trained. study: what was asked, as written. Raises StudyError,
@@ -81,7 +77,7 @@ class Plan:
     device: str = "cpu"
     folder: Path = Path()
     command: str = ""
-    only: frozenset[str] = frozenset(DEFAULT_ONLY)
+    retry: bool = False
     fresh: bool = False
     workers: int = 1
     scheduler: str = ""

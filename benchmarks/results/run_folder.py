@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,38 +22,6 @@ FORMAT = 4  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
 # Entries of run.json that make the scenes what they are: with others, two runs have no number in common.
 OF_SCENES = ("preset", "preset_values", "body", "garment")
-MOST_SECONDS = 1e12  # that a stage may say it took
-
-
-TEXT, NAME, NUMBER = (str, type(None)), str, (int, float)
-_EXPECTED: dict[str, tuple[Any, str]] = {  # entry -> types: {...: of each}, {name: type}, [of each]
-    "metrics": (
-        {...: dict.fromkeys(("title", "definition", "table", "unit"), TEXT)}, "metric -> what it declares"
-    ),
-    "methods": ({...: {"label": TEXT}}, "method -> what it declares"),
-    "scenes": ({...: {}}, "scene -> what it declares"),
-    "cases": ({...: {"scene": TEXT, "metric": TEXT}}, "case -> what it declares"),
-    "digests": ({...: TEXT}, "file -> digest"),
-    "stages": ([{"name": NAME, "seconds": NUMBER}], "a list of names and seconds"),
-    "earlier": ([object], "a list of earlier runs"),
-    "test_looks": ([{"rows": TEXT}], "a list of looks at the test motions"),
-}  # fmt: skip
-
-
-def check_types(path: Path, config: Mapping[str, Any]) -> None:
-    """Raise ResultsError for an entry of run.json that is not of the type that its readers take it for."""
-    for name, (types, expected) in _EXPECTED.items():
-        if config.get(name) is not None and not _fits(config[name], types):
-            raise ResultsError(f"{path}: '{name}' should be {expected}")
-
-
-def _fits(value: Any, types: Any) -> bool:
-    if isinstance(types, list):
-        return isinstance(value, list) and all(_fits(each, types[0]) for each in value)
-    if isinstance(types, dict):
-        types = dict.fromkeys(value, types[...]) if ... in types and isinstance(value, dict) else types
-        return isinstance(value, dict) and all(_fits(value.get(name), types[name]) for name in types)
-    return isinstance(value, types) and (types is not NUMBER or abs(value) < MOST_SECONDS)
 
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
@@ -140,17 +108,13 @@ class RunFolder:
         config = read_json(self.config_path)
         if config.get("format") != FORMAT:
             raise ResultsError(f"{self.config_path}: {OLD}")
-        check_types(self.config_path, config)
         return config
 
     def changed(self, config: dict[str, Any]) -> list[str]:
         """Return the files of the run that are not as it wrote them; those that are gone are not named."""
-        paths = {name: self.path / name for name in config.get("digests") or ()}
-        return [
-            name
-            for name, path in paths.items()
-            if path.is_file() and digest_of_file(path) != config["digests"][name]
-        ]
+        digests = config.get("digests") or {}
+        there = [name for name in digests if (self.path / name).is_file()]
+        return [name for name in there if digest_of_file(self.path / name) != digests[name]]
 
     def write_rows(self, rows: Iterable[Row]) -> None:
         """Write results.csv whole or not at all."""
@@ -246,14 +210,12 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
 
     if not path.is_file():
         return pd.DataFrame()
+    kinds: dict[str, type] = {"scene": str, "method": str, "seed": int}
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            columns, *lines = list(csv.reader(stream)) or [[]]
-        whole = all(len(line) == len(columns) for line in lines)
-        if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL) or not whole:
+        table = pd.read_csv(path, dtype=kinds, float_precision="round_trip")
+        columns = list(table)
+        if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL):
             raise ValueError(f"the columns should be {','.join(CELL)} and energies")
-        table = pd.DataFrame(lines, columns=columns)
-        numbers = {name: [float(cell or "nan") for cell in table[name]] for name in columns[3:]}
-        return table.assign(seed=list(map(int, table["seed"])), **numbers)
-    except (OSError, ValueError, csv.Error) as error:
+        return table.astype(dict.fromkeys(columns[3:], float))
+    except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({' '.join(str(error).split())})") from None

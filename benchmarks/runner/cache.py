@@ -12,12 +12,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from benchmarks.plan.cell import TaskId
-from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.provenance import damaged, digest, digest_of_file, software
 from benchmarks.results.row import ResultsError, read_json
 from benchmarks.results.run_folder import FORMAT, RunFolder
@@ -29,21 +28,17 @@ NOWHERE: Mapping[str, Any] = {}
 
 @dataclasses.dataclass(frozen=True)
 class Cached:
-    """The cache entry of a task.
+    """What is known of a task before it is run.
 
     Attributes:
-        state: one of benchmarks.plan.plan.STATES.
-        why: name of the changed dependency, or of the failure.
-        outcome: that of the entry, also of a stale one; None without one, or where its files are gone.
+        why: why it has to be run, or how it failed.
+        outcome: its outcome; None where it has to be run.
         content: digest of all that other tasks read of it.
-        wanted: whether the task is to be done now.
     """
 
-    state: str
     why: str = ""
     outcome: Outcome | None = None
-    content: str = ""
-    wanted: bool = True
+    content: str = "out of date"
 
 
 def dependencies(task: Task) -> dict[str, str]:
@@ -57,24 +52,30 @@ def digests_of(inputs: Mapping[str, Any]) -> dict[str, str]:
 
 
 class Cache:
-    """Entries of one run's folder. only: states whose tasks are done again; origin: see Outcome."""
+    """Entries of one run's folder. retry: whether failed tasks are done again; origin: see Outcome."""
 
     def __init__(
-        self, folder: RunFolder, *, only: Iterable[str] = DEFAULT_ONLY, origin: Mapping[str, Any] = NOWHERE
+        self, folder: RunFolder, *, retry: bool = False, origin: Mapping[str, Any] = NOWHERE
     ) -> None:
-        self.folder, self.only, self.origin = folder, frozenset(only), dict(origin)
+        self.folder, self.retry, self.origin = folder, retry, origin
 
     def find(self, task: Task, others: Mapping[TaskId, Cached]) -> Cached:
         """Return the entry of a task. others: entries of the tasks that it reads."""
-        state, why, entry = self._state(task, others)
-        outcome = None
-        if state != "missing":
-            files = entry["files"]
-            outcome = Outcome(**entry["outcome"], files=tuple(files), digests=files, origin=entry["origin"])
-            if state == "stale":
-                outcome = dataclasses.replace(outcome, remark=f"kept though {why} changed")
-        content = "" if outcome is None else _content(entry)
-        return Cached(state, why, outcome, content, wanted=state in self.only)
+        path = self.path(task)
+        if not path.is_file():
+            return Cached("missing")
+        entry = read_entry(path)
+        if entry is None or entry["task"] != task.title:
+            return Cached("missing: its entry is damaged or of another version")
+        if damage := damaged(self.folder.path, entry["files"]):
+            return Cached(f"missing: {damage}")
+        now, before = dependencies(task) | _read(task, others), entry["parts"] | entry["needs"]
+        if changed := [name for name in now | before if now.get(name) != before.get(name)]:
+            return Cached("stale: " + ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""))
+        files = entry["files"]
+        outcome = Outcome(**entry["outcome"], files=tuple(files), digests=files, origin=entry["origin"])
+        why = outcome.ending if outcome.failed else ""
+        return Cached(why) if why and self.retry else Cached(why, outcome, _content(entry))
 
     def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Cached]) -> Cached:
         """Write the entry, after the files, and return it."""
@@ -83,9 +84,8 @@ class Cache:
         entry = {
             "format": FORMAT,
             "task": task.title,
-            "inputs": sorted(task.inputs),
             "parts": dependencies(task),
-            "needs": _needs(task, others),
+            "needs": _read(task, others),
             "origin": outcome.origin,
             "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
@@ -93,8 +93,7 @@ class Cache:
         text = _text(entry | {"digest": digest(_text(entry).encode())})
         with replacing(self.path(task)) as temporary:
             temporary.write_text(text, encoding="utf-8")
-        state, why = ("failed", outcome.ending) if outcome.failed else ("finished", "")
-        return Cached(state, why, outcome, _content(entry), wanted=False)
+        return Cached("", outcome, _content(entry))
 
     def forget_all(self) -> None:
         """Remove all entries and checkpoints: everything is missing from now on."""
@@ -105,25 +104,6 @@ class Cache:
     def path(self, task: Task) -> Path:
         """Return cache/<kind>/<name>.json in the run's folder."""
         return self.folder.cache / task.kind / f"{task.name}.json"
-
-    def _state(self, task: Task, others: Mapping[TaskId, Cached]) -> tuple[str, str, dict[str, Any]]:
-        path = self.path(task)
-        if not path.is_file():
-            return "missing", "", {}
-        entry = read_entry(path)
-        if entry is None or entry["task"] != task.title:
-            return "missing", "its entry is damaged or of another version", {}
-        outcome, parts, needs = Outcome(**entry["outcome"]), entry["parts"], entry["needs"]
-        if damage := damaged(self.folder.path, entry["files"]):
-            return "missing", damage, {}
-        now = dependencies(task)
-        changed = [name for name in now if parts.get(name) != now[name]]
-        changed += [name for name in parts if name not in now]
-        read = _needs(task, others)
-        changed += [name for name in read | needs if needs.get(name) != read.get(name)]
-        if changed:
-            return "stale", ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), entry
-        return ("failed", outcome.ending, entry) if outcome.failed else ("finished", "", entry)
 
 
 def read_entry(path: Path) -> dict[str, Any] | None:
@@ -139,17 +119,10 @@ def read_entry(path: Path) -> dict[str, Any] | None:
 _KEPT = ("status", "reason", "failed", "result", "seconds")
 
 
-def _needs(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
-    """Return the content of each task that a task reads.
-
-    Of one that is out of date, or about to be done, it is a text that no entry has; empty without an entry.
-    """
-    contents = {}
-    for id in (*task.needs, *task.reads):
-        other = others.get(id, Cached("missing", wanted=False))
-        outdated = other.wanted or other.state == "stale"
-        contents[" ".join(id)] = "out of date" if outdated else other.content
-    return contents
+def _read(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
+    """Return the content of each task that a task reads; empty where it has no entry."""
+    ids = (*task.needs, *task.reads)
+    return {" ".join(id): others[id].content if id in others else "" for id in ids}
 
 
 def _content(entry: Mapping[str, Any]) -> str:

@@ -1,15 +1,13 @@
 """One cell, in a process of its own: prepare off the clock, run on it, write the raw trajectory.
 
-Metrics come later, from the files. The process loads what its scene and method need and nothing else; the
-modules of ours and the heavy ones that it has loaded are in the result.
+Metrics come later, from the files. The process loads what its scene and method need and nothing else.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from benchmarks.method import Method
@@ -33,58 +31,20 @@ STATUS_OF = {
     "diverged": "diverged",
     "timeout": "timeout",
 }
-OURS = ("reference_sim", "snug", "benchmarks")
-HEAVY = ("torch", "igl", "numba", "scipy", "h5py")  # what a scene may do without
 BATCH = 16  # bodies at once, where a method can
 INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milliseconds a frame
 UNBELIEVABLE = "its time cannot be believed: "
 
 
-@dataclass
-class CellProcess:
-    """State that the tasks of one cell share in their process.
-
-    A method is kept between tasks because preparing it takes far longer than many of its runs.
-
-    Attributes:
-        scene: as built.
-        prepared: a method that `begin_cell` has prepared, until a run takes it.
-        finished: the method of the cell's run, which its batch goes on with.
-    """
-
-    scene: BuiltScene | None = None
-    prepared: Method | None = None
-    finished: Method | None = None
-
-    @classmethod
-    def of(cls, context: Context) -> CellProcess:
-        """Return the state of this process."""
-        return context.memo.setdefault(cls, cls())
-
-
 def scene_of(cell: Cell, context: Context) -> BuiltScene:
     """Return the scene of a cell, built once in a process."""
-    process = CellProcess.of(context)
-    if process.scene is None:
-        process.scene = build_scene(cell.scene, context)
-    return process.scene
-
-
-def begin_cell(cell: Cell, context: Context) -> None:
-    """Prepare a method of the project, which is still until it is run.
-
-    What a user's method leaves at work would count against whoever is timed meanwhile.
-    """
-    if not cell.entry.declared_in:
-        CellProcess.of(context).prepared = prepared_method(cell, context)
+    if "scene" not in context.memo:
+        context.memo["scene"] = build_scene(cell.scene, context)
+    return context.memo["scene"]
 
 
 def prepared_method(cell: Cell, context: Context) -> Method:
     """Return a method that is prepared and has not run."""
-    process = CellProcess.of(context)
-    if (method := process.prepared) is not None:
-        process.prepared = None
-        return method
     method = cell.entry.make(models=context.folder.models_of(cell.scene.garment), seed=cell.seed)
     method.prepare(scene_of(cell, context))
     return method
@@ -126,12 +86,11 @@ def run_cell(cell: Cell, least: float, context: Context, needed: Needed) -> Outc
         needed: not read; files of the settled start and of the network lie in the run's folder.
     """
     try:
-        outcome = compute_cell(cell, least, context)
+        return compute_cell(cell, least, context)
     except Exception as error:
         for name in files_of(cell, context.folder):  # nobody is to look at the frames of a cell that failed
             (context.folder.path / name).unlink(missing_ok=True)
-        outcome = replace(failure(error), result={"peak": peak_memory()})
-    return replace(outcome, result={**outcome.result, "modules": loaded()})
+        return replace(failure(error), result={"peak": peak_memory()})
 
 
 def files_of(cell: Cell, folder: RunFolder) -> tuple[str, ...]:
@@ -178,13 +137,13 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
             raise ValueError(f"quasi_static() {wrong}")
         paths.append(folder.quasi_static_path(*cell.key))
         quasi_static.save(paths[1])
-    CellProcess.of(context).finished = method
+    context.memo["method"] = method
     return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))
 
 
 def time_batch(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
     """Return the time of many bodies at once, by the method that this process has run."""
-    method = CellProcess.of(context).finished or prepared_method(cell, context)
+    method = context.memo.get("method") or prepared_method(cell, context)
     positions, reading = clocked(method.batch(BATCH), of=lambda made: made, least=least)
     seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
     result = {"seconds": seconds, "complaint": reading.complaint}
@@ -278,12 +237,6 @@ def misshapen(positions: np.ndarray, scene: BuiltScene, *, other_mesh: bool = Fa
     if x.dtype.kind == "f" and x.shape[1:] == shape[1:] and len(x) <= shape[0]:
         return ""
     return f"gives positions {x.dtype} {x.shape}: floats {shape} are due, the start included"
-
-
-def loaded() -> list[str]:
-    """Modules of ours, and the heavy packages, that this process has loaded."""
-    ours = {name for name in sys.modules if name.split(".")[0] in OURS}
-    return sorted(ours | {name for name in HEAVY if name in sys.modules})
 
 
 def run_case(case: Case, context: Context, needed: Needed) -> Outcome:

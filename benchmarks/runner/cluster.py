@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 import uuid
+from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
 from contextlib import suppress
 from pathlib import Path
@@ -23,10 +24,10 @@ from typing import TYPE_CHECKING
 
 from benchmarks import provenance
 from benchmarks.assets import Assets
-from benchmarks.provenance import damaged, digest_of_file, software
+from benchmarks.provenance import digest_of_file, software
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.executor import TaskProcess, Told
-from benchmarks.runner.isolated_process import one_line, tell_nobody
+from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.task import Needed, Outcome, RunRefused, RunStopped, Task, failure
 from benchmarks.timing import one_thread
 
@@ -34,17 +35,26 @@ if TYPE_CHECKING:
     from distributed import Future
 
 FIRST = 5.0  # [s] in which a scheduler answers at first
+LOOK = 2.0  # [s] between looks at how many threads there are
+PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
+WATCH = 0.5  # [s] between a worker's looks at whether its task is still wanted
 
 
 def check_scheduler(address: str) -> None:
     """Raise RunRefused unless a scheduler answers; a client of another server would hang."""
     try:
-        import distributed  # noqa: F401
+        from distributed import Security
+        from distributed.core import rpc
     except ImportError:
         raise RunRefused("--scheduler needs dask.distributed: pip install '.[cluster]'") from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
+
+    async def kind_of_server() -> str:
+        async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
+            return str((await server.identity())["type"])
+
     try:
-        kind = asyncio.run(asyncio.wait_for(_kind_of_server(address), FIRST))
+        kind = asyncio.run(asyncio.wait_for(kind_of_server(), FIRST))
     except Exception as error:  # whatever the bytes of another server lead to, a MemoryError too
         kind = one_line(error)
     if kind != "Scheduler":
@@ -52,21 +62,6 @@ def check_scheduler(address: str) -> None:
             f"--scheduler {address}: no scheduler of dask answers there ({kind}); start one by `dask "
             "scheduler` and give the address that it prints, as tcp://HOST:8786"
         )
-
-
-async def _kind_of_server(address: str) -> str:
-    """Return what a server of dask calls itself, as "Scheduler"."""
-    from distributed import Security
-    from distributed.core import rpc
-
-    async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
-        return str((await server.identity())["type"])
-
-
-LOOK = 2.0  # [s] between looks at how many threads there are
-PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
-WATCH = 0.5  # [s] between a worker's looks at whether its task is still wanted
-SEVERAL = 3  # differences of software that are named
 
 
 class Cluster:
@@ -83,7 +78,6 @@ class Cluster:
         self.address, self.folder = address, folder.path.resolve()
         self.assets = self.folder / f".assets-{uuid.uuid4().hex}.part"  # see RunFolder.remove_parts
         self.assets.write_bytes(pickle.dumps(assets))
-        self._workers: dict[str, str] = {}  # batch -> address of the one that did its last task
         self._futures: set[Future] = set()
         self._stopped = False
         self.rest()
@@ -93,29 +87,35 @@ class Cluster:
 
     @property
     def slots(self) -> int:
-        """Number of tasks that are done at once. Without a worker the first one waits for it."""
+        """Number of batches that are done at once. Without a worker the first one waits for it."""
         if time.monotonic() > self._looked + LOOK and self.client.status == "running":
             with suppress(OSError):  # no scheduler: the client is looking for it
                 self._threads = sum(self.client.nthreads().values())
             self._looked = time.monotonic()
         return max(1, self._threads)
 
-    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
-        """Return the task's outcome, those of a batch by one process where its worker lives.
+    def do(self, tasks: Sequence[Task], needed: Needed, told: Told) -> Iterator[Outcome]:
+        """Yield the outcomes of a batch, done by one process where its worker lives.
 
-        Raises RunStopped where the cluster is gone or cannot do it. Progress is told at the end.
+        Raises RunStopped where the cluster is gone or cannot do it. Progress is told at the end of a task.
         """
-        work = dataclasses.replace(task, skip="", begin=None)
-        arguments = self.assets, batch, pickle.dumps((work, needed, software_of(task)))
+        batch, worker = uuid.uuid4().hex, ""
+        for task in tasks:
+            outcome, worker = self._outcome(task, needed, batch, worker)
+            told(task.seconds)
+            yield outcome
+
+    def _outcome(self, task: Task, needed: Needed, batch: str, near: str) -> tuple[Outcome, str]:
+        """Return the outcome of a task and the address of its worker. near: of the one that is preferred."""
+        work = self.assets, batch, pickle.dumps((task, needed, software_of(task)))
         while not self._stopped:
-            near = self._workers.get(batch)
             future = self.client.submit(
-                do_task, *arguments, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
+                do_task, *work, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
                 workers=[near] if near else None, allow_other_workers=bool(near),
             )  # fmt: skip
             self._futures.add(future)
             try:
-                outcome, self._workers[batch] = future.result()
+                return future.result()
             except RunStopped:
                 raise
             except Exception as error:
@@ -124,16 +124,14 @@ class Cluster:
                     raise RunStopped(lost) from None
                 if isinstance(error, CancelledError):  # the scheduler died: another one is asked
                     continue
-                if type(error).__name__ == "KilledWorker":
-                    return Outcome("failed", _died(error), failed=True)
-                raise RunStopped(f"{self.address}: {task.title}: {one_line(error)}") from None
+                if type(error).__name__ != "KilledWorker":
+                    raise RunStopped(f"{self.address}: {task.title}: {one_line(error)}") from None
+                return Outcome(
+                    "failed", f"workers died while they did it: {one_line(error)}", failed=True
+                ), ""
             finally:
                 self._futures.discard(future)
-            if damage := damaged(self.folder, outcome.digests):
-                raise RunStopped(f"{damage}, seen from here, since worker {self._workers[batch]} wrote it")
-            told(task.seconds)
-            return outcome
-        return Outcome("failed", "stopped", failed=True)
+        return Outcome("failed", "stopped", failed=True), near
 
     def stop(self) -> None:
         """Cancel all tasks, from another thread."""
@@ -154,11 +152,6 @@ class Cluster:
         self.assets.unlink(missing_ok=True)
 
 
-def _died(error: BaseException) -> str:
-    deaths, last = getattr(error, "allowed_failures", 0) + 1, getattr(error, "last_worker", None)
-    return f"{deaths} workers died while they did it: the last was {getattr(last, 'address', 'unknown')}"
-
-
 def software_of(task: Task) -> dict[str, str]:
     """Return name -> digest or version of all that computes an outcome, files of a user's method included."""
     method = task.inputs.get("method")
@@ -169,7 +162,7 @@ def software_of(task: Task) -> dict[str, str]:
 
 # --- in a worker -------------------------------------------------------------------------------------------
 
-_processes: dict[int, tuple[Path, TaskProcess]] = {}  # of each thread: the assets that it has, and it
+_processes: dict[int, tuple[Path, str, TaskProcess]] = {}  # of each thread: assets, the last batch, and it
 
 
 def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
@@ -184,20 +177,20 @@ def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
 
     worker = get_worker()
     key = worker.get_current_task()
-    try:
-        task, needed, expected = pickle.loads(work)
-        problem = _unfit(assets, software_of(task), expected)
-    except Exception as error:
-        problem = one_line(error)
-    if problem:
-        raise RunStopped(f"worker {worker.address}: {problem}")
-    process = _process_of(assets)
+    if not assets.is_file():
+        unseen = f"it does not see the run's folder {assets.parent}: by --out give one that all machines see"
+        raise RunStopped(f"worker {worker.address}: {unseen}")
+    task, needed, software = pickle.loads(work)
+    if changed := sorted(name for name, _ in software.items() ^ software_of(task).items()):
+        other = f"its software is another ({changed[0]}); install the same there as here"
+        raise RunStopped(f"worker {worker.address}: {other}")
+    process = _process_of(assets, batch)
     with ThreadPoolExecutor(1) as thread:
-        future = thread.submit(process.do, task, needed, batch, tell_nobody)
+        future = thread.submit(process.do, task, needed)
         while not wait([future], WATCH).done:
             state = worker.state.tasks.get(key)
             if state is None or state.state == "cancelled":  # by the command, or as it died
-                process.process.stop()
+                process.stop()
     try:
         outcome = future.result()
         digests = {name: digest_of_file(assets.parent / name) for name in outcome.files}
@@ -207,38 +200,26 @@ def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
     return dataclasses.replace(outcome, digests=digests, origin={"hardware": hardware}), worker.address
 
 
-def _process_of(assets: Path) -> TaskProcess:
+def _process_of(assets: Path, batch: str) -> TaskProcess:
     """Return the process of this thread for tasks of the run that has these assets."""
     # A nanny makes its worker a daemon, which may have no processes. Ours end with it by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     one_thread()
     thread = threading.get_ident()
-    known, process = _processes.get(thread, (None, None))
+    known, before, process = _processes.get(thread, (None, "", None))
     if process is None or known != assets:
         if process is not None:
-            process.process.close()
+            process.close()
         process = TaskProcess(RunFolder(assets.parent), pickle.loads(assets.read_bytes()))
-        _processes[thread] = assets, process
+    elif before != batch:
+        process.forget()
+    _processes[thread] = assets, batch, process
     return process
-
-
-def _unfit(assets: Path, here: dict[str, str], expected: dict[str, str]) -> str:
-    """Return in one line why this worker can do no task, empty where it can. Packages are named first."""
-    if not assets.is_file():
-        return (
-            f"it does not see the folder {assets.parent} of the run: by --out give one that all machines see"
-        )
-    changed = [name for name in here | expected if here.get(name) != expected.get(name)]
-    changed.sort(key=lambda name: (not name.startswith("package "), name))
-    named = [f"{name}: {here.get(name)} there, {expected.get(name)} here" for name in changed[:SEVERAL]]
-    more = f" and {len(changed) - SEVERAL} more" if len(changed) > SEVERAL else ""
-    what = f"its software is another ({', '.join(named)}{more}); install the same there as here"
-    return what if changed else ""
 
 
 def end_processes(folder: Path) -> None:
     """Kill all processes of a run's folder."""
-    for thread, (assets, process) in list(_processes.items()):
+    for thread, (assets, _, process) in list(_processes.items()):
         if assets.parent == folder:
-            process.process.stop()
+            process.stop()
             _processes.pop(thread, None)

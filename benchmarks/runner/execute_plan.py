@@ -5,31 +5,33 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.external.roll_out_files import MODULE, RollOutFileError
-from benchmarks.plan.plan import STATES, Plan, runs
-from benchmarks.results.row import DECLARED, Row
+from benchmarks.plan.plan import Plan, runs
+from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cache import Cache, Cached
+from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.isolated_process import one_line
-from benchmarks.runner.loop import LEFT_OUT, Runner
-from benchmarks.runner.rows import MOST_NAMED, SPREAD, first_of, rows_of
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog, now
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import Outcome, RunRefused, RunStopped
+from benchmarks.runner.task import RunRefused, RunStopped
 
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
 
 
-def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str = "") -> str:
-    """Return the answer, the text of page one if there is one, and one line of counts and times."""
+MOST_FAILURES = 8  # that the end of a run names; its files have all
+
+
+def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
+    """Return one line of counts and times."""
     last = []
     for suite in dict.fromkeys(row.suite for row in rows):
         statuses = Counter(row.status for row in rows if row.suite == suite)
@@ -37,44 +39,8 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]], answer: str =
     times: Counter[str] = Counter()
     for stage in stages:
         times[stage["name"]] += stage["seconds"]
-    longest = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in times.most_common(MOST_NAMED))
-    last += [f"time: {times.total():.0f} s ({longest})"] if times else []
-    return "\n".join(filter(None, [answer, "; ".join(last)]))
-
-
-def remarks(rows: Iterable[Row], reused: int, outdated: Mapping[str, str]) -> list[str]:
-    """Return remarks for whoever reads the numbers, a line each. outdated: task -> what has changed since."""
-    rows, lines = list(rows), []
-    if reused:
-        lines.append(f"{reused} results taken from earlier runs in this folder")
-    lines += named([f"{label}: {remark}" for label, remark in outdated.items()], "outdated in run.json")
-    spreads = {f"{row.scene} x {row.method}": row.value or 0.0 for row in rows if row.metric == "cost/spread"}
-    wide = {cell: percent for cell, percent in spreads.items() if percent > 100.0 * SPREAD}
-    if wide:
-        cells = [f"{cell} ({wide[cell]:.0f} %)" for cell in sorted(wide, key=lambda cell: -wide[cell])]
-        lines.append(f"repeats more than {100.0 * SPREAD:.0f} % apart: {first_of(cells)}")
-    declared = dict.fromkeys(row.method for row in rows if row.declared)
-    if declared:
-        lines.append(f"run time {DECLARED}: {', '.join(declared)}")
-    pretrained = {row.method: row.pretrained for row in rows if row.pretrained}
-    if pretrained:
-        differences = {remark.partition("; ")[2] for remark in pretrained.values()}
-        same = differences.pop() if len(differences) == 1 else "the reasons of their rows say what differs"
-        lines.append(f"pretrained, not trained here: {', '.join(pretrained)}; {same}")
-    return lines
-
-
-def named(lines: Sequence[str], where: str, most: int = MOST_NAMED) -> list[str]:
-    """Return the first lines, and one that says how many more there are.
-
-    >>> named(["a", "b", "c", "d", "e"], "in results.csv")
-    ['a', 'b', 'c', 'and 2 more in results.csv']
-    """
-    more = len(lines) - most
-    return [*lines[:most], *([f"and {more} more {where}"] if more > 0 else [])]
-
-
-MOST_FAILURES = 8  # that the end of a run names; its files have all
+    longest = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in times.most_common(3))
+    return "; ".join([*last, f"time: {times.total():.0f} s ({longest})"])
 
 
 def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) -> int:
@@ -103,16 +69,17 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     log.note_outcomes(runner)
     log.note("finished", now())
     answer = make_report(log) if report else ""
-    print(summary(log.rows, log.stages, answer or ""), flush=True)
+    print(*filter(None, (answer, summary(log.rows, log.stages))), sep="\n", flush=True)
     failed = [row for row in log.rows if not accepted(row)]
-    ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
     broken = [f"{label}: {reason}" for label, reason in runner.broken().items()]
-    for line in (
-        *named(list(ends), "failed in results.csv", MOST_FAILURES),
-        *named(broken, "failed in run.json", MOST_FAILURES),
-        *remarks(log.rows, len(runner.reused), runner.outdated()),
-    ):
-        print(line, file=sys.stderr)
+    ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
+    lines = [*ends, *broken]
+    if len(lines) > MOST_FAILURES:
+        more = f"and {len(lines) - MOST_FAILURES} more in results.csv and run.json"
+        lines = [*lines[:MOST_FAILURES], more]
+    if runner.reused:
+        lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
+    print(*lines, sep="\n", end="\n" if lines else "", file=sys.stderr)
     if looks := log.config["test_looks"]:
         print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
     if report and answer is not None:
@@ -215,52 +182,38 @@ def held(folder: Path) -> Iterator[None]:
 
 def describe(plan: Plan) -> str:
     """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
-    only = STATES if plan.fresh else plan.only
-    runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), only=only))
-    lines, wanted, cached = _head(plan), list[Cached](), 0
-    stage = ""
-    for task, entry, outcome in runner.preview():
+    folder = RunFolder(plan.folder / "none" if plan.fresh else plan.folder)
+    lines, stage = _head(plan), ""
+    counts: Counter[str] = Counter()
+    for task, found in Runner(tasks_of(plan), Cache(folder, retry=plan.retry)).preview():
         if task.stage != stage:
             stage = task.stage
             lines.append(stage)
-        lines.append(f"  {task.title}: {_verdict(entry, outcome)}")
-        if outcome is None:
-            wanted.append(entry)
-        cached += outcome is not None and outcome is entry.outcome
-    known = [entry.outcome.seconds for entry in wanted if entry.outcome and entry.outcome.seconds]
-    times = f", about {sum(known):.0f} s for the {len(known)} whose time is known" if known else ""
-    return "\n".join([*lines, f"{len(wanted)} tasks to run{times}; {cached} cached"])
+        if found.outcome is None:
+            state, line = "run", f"run ({found.why})"
+        elif found.content:
+            state, line = "cached", f"cached ({found.why})" if found.why else "cached"
+        else:
+            state, line = "skip", f"skip ({found.outcome.reason})"
+        lines.append(f"  {task.title}: {line}")
+        counts[state] += 1
+    return "\n".join([*lines, f"{counts['run']} tasks to run; {counts['cached']} cached"])
 
 
 def _head(plan: Plan) -> list[str]:
-    skipped = sum(not runs(cell) for cell in plan.cells)
-    lines = [
+    garment, skipped = plan.inputs.garment, sum(not runs(cell) for cell in plan.cells)
+    sizes = (
+        f"{name} of {garment.path}"
+        if garment and name == garment.name
+        else f"{name} of about {plan.preset.garment_vertices} vertices"
+        for name in plan.garments
+    )
+    return [
         f"preset {plan.preset.name}: {plan.preset.description}",
         f"folder {plan.folder}",
         f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
         f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
         *([f"body {plan.inputs.body.path}"] if plan.inputs.body else []),
-        *map(partial(_size, plan), plan.garments),
+        *sizes,
+        f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",
     ]
-    learning = {net.garment for net in plan.networks if net.training and net.training.simulated}
-    for garment in dict.fromkeys(network.garment for network in plan.networks):
-        how = "simulated for networks that learn from it" if garment in learning else "not simulated"
-        how = f"networks of {plan.trained}" if plan.trained else how
-        lines.append(f"training motions {', '.join(plan.motions.train)} ({how})")
-    return [*lines, f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases"]
-
-
-def _size(plan: Plan, garment: str) -> str:
-    if (user_garment := plan.inputs.garment) and garment == user_garment.name:
-        return f"{garment} of {user_garment.path}"
-    return f"{garment} of about {plan.preset.garment_vertices} vertices"
-
-
-def _verdict(entry: Cached, outcome: Outcome | None) -> str:
-    why = f" ({entry.state}{': ' * bool(entry.why)}{entry.why})"
-    if outcome is None:
-        took = f", {entry.outcome.seconds:.1f} s last time" if entry.outcome and entry.outcome.seconds else ""
-        return f"run{why}{took}"
-    if outcome is entry.outcome:
-        return "cached" + (why if entry.state != "finished" else "")
-    return f"left out{why}" if outcome.reason == LEFT_OUT else f"skip ({outcome.reason})"

@@ -10,17 +10,15 @@ import os
 import queue
 import threading
 import time
-import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from benchmarks.assets import Assets
-from benchmarks.provenance import damaged
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.isolated_process import IsolatedProcess, WorkerDied, tell, tell_nobody
-from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task, failure
+from benchmarks.runner.task import Context, Needed, Outcome, Task, failure
 from benchmarks.timing import give_back
 
 if TYPE_CHECKING:
@@ -38,7 +36,6 @@ Done = tuple[Task, Outcome]
 # --- in the process ----------------------------------------------------------------------------------------
 
 _context: Context
-_verified: set[tuple[str, str]] = set()  # files that this process has compared with their digests
 
 
 def begin_tasks(folder: RunFolder, assets: Assets | None) -> None:
@@ -49,25 +46,14 @@ def begin_tasks(folder: RunFolder, assets: Assets | None) -> None:
 
 
 def forget() -> None:
-    """Empty the memo of this process and give back its memory.
-
-    A batch that left nothing there is no reason to look through all objects for garbage.
-    """
-    if _context.memo:
+    """Empty the memo of this process and give back its memory."""
+    if _context.memo:  # else there is no reason to look through all objects for garbage
         _context.memo.clear()
         give_back()
 
 
-def begin_task(begin: Callable[[Context], None], needed: Needed) -> None:
-    """Prepare a timed task before its turn."""
-    _verify(needed)
-    with suppress(Exception):  # it is raised again, and told, when it is the task's turn
-        begin(_context)
-
-
 def perform(run: Callable[[Context, Needed], Outcome], needed: Needed, expected: float) -> Outcome:
     """Return the outcome of a task, done in this process. expected: its duration [s], told as progress."""
-    _verify(needed)
     shares = [0.0]
 
     def tell_share(share: float) -> None:
@@ -83,58 +69,38 @@ def perform(run: Callable[[Context, Needed], Outcome], needed: Needed, expected:
     return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
 
 
-def _verify(needed: Needed) -> None:
-    """Raise RunStopped where a file is not as it was written: the next run makes it anew."""
-    for outcome in needed.values():
-        if damage := damaged(_context.folder.path, dict(outcome.digests.items() - _verified)):
-            raise RunStopped(f"{damage} since this run wrote it")
-        _verified.update(outcome.digests.items())
-
-
 # --- around the process ------------------------------------------------------------------------------------
 
 
-def call(
-    process: IsolatedProcess,
-    function: Callable[..., Any],
-    *arguments: Any,
-    seconds: float | None,
-    told: Told = tell_nobody,
-) -> Any:
-    """Call function(*arguments) in a process, which is ended at the deadline; a failure is an outcome."""
-    clock = time.perf_counter()
-    try:
-        return process.call(function, *arguments, seconds=seconds, told=told)
-    except Exception as error:
-        return dataclasses.replace(failure(error), seconds=time.perf_counter() - clock)
-
-
-class TaskProcess:
-    """A process that does one untimed task after another, another process after one that was killed."""
+class TaskProcess(IsolatedProcess):
+    """A process that does one task after another, another process after one that was killed."""
 
     def __init__(self, folder: RunFolder, assets: Assets | None) -> None:
-        self.process, self.folder = IsolatedProcess(begin_tasks, folder, assets), folder
-        self._batch = ""
-        self._warm: set[Any] = set()
+        super().__init__(begin_tasks, folder, assets)
+        self._warm: set[str] = set()  # code whose kernels are compiled
 
-    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
-        """Return the task's outcome; what it leaves in the memo is there for the next of its batch."""
-        if batch != self._batch and self.process.alive:
-            with suppress(WorkerDied):
-                self.process.call(forget, seconds=None)
-        self._batch = batch
-        if not self.process.alive:
-            self._warm.clear()
-        if task.warm_up is not None and task.code[0] not in self._warm:
-            if trouble := call(self.process, task.warm_up, seconds=COMPILING):
-                return trouble
-            self._warm.add(task.code[0])
-        outcome = call(
-            self.process, perform, task.run, needed, task.seconds, seconds=task.deadline, told=told
-        )
+    def do(self, task: Task, needed: Needed, told: Told = tell_nobody) -> Outcome:
+        """Return the task's outcome. What it leaves in the memo is there for the next one."""
+        clock = time.perf_counter()
+        try:
+            if not self.alive:
+                self._warm.clear()
+            if task.warm_up is not None and task.code[0] not in self._warm:
+                self.call(task.warm_up, seconds=COMPILING)
+                self._warm.add(task.code[0])
+            work = perform, task.run, needed, task.seconds
+            outcome = self.call(*work, seconds=task.deadline, told=told)
+        except Exception as error:
+            return dataclasses.replace(failure(error), seconds=time.perf_counter() - clock)
         if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
-            self.process.close()
+            self.close()
         return outcome
+
+    def forget(self) -> None:
+        """Empty the memo."""
+        if self.alive:
+            with suppress(WorkerDied):
+                self.call(forget, seconds=None)
 
 
 class BackEnd(Protocol):
@@ -142,16 +108,16 @@ class BackEnd(Protocol):
 
     @property
     def slots(self) -> int:
-        """Number of tasks that are done at once."""
+        """Number of batches that are done at once."""
 
-    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
-        """Return the outcome of a task, however it ends; each thread does one after another.
+    def do(self, tasks: Sequence[Task], needed: Needed, told: Told) -> Iterator[Outcome]:
+        """Yield the outcome of each task of a batch, however it ends; called by several threads.
 
         What a task leaves in the memo is there for its batch alone.
         """
 
     def stop(self) -> None:
-        """End what is at work, from another thread: each `do` comes back."""
+        """End what is at work, from another thread."""
 
     def rest(self) -> None:
         """End all processes, none of which is at work; others begin where they are needed."""
@@ -165,24 +131,31 @@ class LocalProcesses:
 
     def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:
         self._begin, self.slots = (folder, assets), slots
-        self._processes: dict[int, TaskProcess] = {}  # of each thread
+        self._all: list[TaskProcess] = []
+        self._idle: list[TaskProcess] = []
 
-    def do(self, task: Task, needed: Needed, batch: str, told: Told) -> Outcome:
-        """Return the outcome of a task, done by the process of this thread."""
-        thread = threading.get_ident()
-        if thread not in self._processes:
-            self._processes[thread] = TaskProcess(*self._begin)
-        return self._processes[thread].do(task, needed, batch, told)
+    def do(self, tasks: Sequence[Task], needed: Needed, told: Told) -> Iterator[Outcome]:
+        """Yield the outcomes of a batch, done by one process."""
+        if self._idle:
+            process = self._idle.pop()
+        else:
+            process = TaskProcess(*self._begin)
+            self._all.append(process)
+        for task in tasks:
+            yield process.do(task, needed, told)
+        process.forget()
+        self._idle.append(process)
 
     def stop(self) -> None:
         """Kill all processes."""
-        for process in list(self._processes.values()):
-            process.process.stop()
+        for process in self._all:
+            process.stop()
 
     def rest(self) -> None:
         """End all processes."""
-        while self._processes:
-            self._processes.popitem()[1].process.close()
+        while self._all:
+            self._all.pop().close()
+        self._idle.clear()
 
     close = rest
 
@@ -197,10 +170,9 @@ class Executor:
     def __init__(
         self, folder: RunFolder, assets: Assets | None, workers: int, back_end: BackEnd | None = None
     ) -> None:
-        self.folder, self.assets, self.workers = folder, assets, workers
+        self.folder, self.assets = folder, assets
         self.back_end = back_end or LocalProcesses(folder, assets, workers)
-        self._named: dict[str, IsolatedProcess] = {}
-        self._troubles: dict[str, Outcome] = {}  # process -> how it died before its task's turn
+        self._named: dict[str, TaskProcess] = {}
 
     @property
     def side_by_side(self) -> int:
@@ -216,24 +188,21 @@ class Executor:
         events: queue.SimpleQueue[Done | float] = queue.SimpleQueue()
         stopped = threading.Event()
 
-        def do(batch: Batch) -> None:
-            tasks, needed = batch
-            key = uuid.uuid4().hex
-            for task in tasks:
-                outcome = self.back_end.do(task, dict(needed), key, events.put)
+        def do(tasks: Sequence[Task], needed: Needed) -> None:
+            for outcome, task in zip(self.back_end.do(tasks, needed, events.put), tasks):
                 if stopped.is_set():  # the process was killed at it
                     return
                 events.put((task, outcome))
 
         at_work: set[Future[None]] = set()
-        with ThreadPoolExecutor(MOST) as threads:  # one waits for each worker
+        with ThreadPoolExecutor(MOST) as threads:
             try:
                 while True:
                     for future in [future for future in at_work if future.done()]:
                         future.result()
                         at_work.remove(future)
                     while len(at_work) < self.back_end.slots and (batch := ready()):
-                        at_work.add(threads.submit(do, batch))
+                        at_work.add(threads.submit(do, *batch))
                     try:
                         event = events.get(timeout=POLL if at_work else 0.0)
                     except queue.Empty:
@@ -256,40 +225,12 @@ class Executor:
             finally:
                 self.back_end.rest()
 
-    def begin(self, tasks: Sequence[tuple[Task, Needed]]) -> None:
-        """Prepare timed tasks side by side, each in the process that it names.
-
-        One that dies of it has that outcome at its turn.
-        """
-        with ThreadPoolExecutor(self.workers) as threads:
-            begun = {
-                task.process: threads.submit(
-                    call, self._process(task), begin_task, task.begin, needed, seconds=task.deadline
-                )
-                for task, needed in tasks
-                if task.begin is not None
-            }
-            try:
-                self._troubles |= {name: died for name, future in begun.items() if (died := future.result())}
-            except BaseException:
-                while left := {n: f for n, f in begun.items() if not (f.cancel() or f.done())}:
-                    for name in left:
-                        self._named[name].stop()
-                    wait(left.values(), timeout=POLL)
-                raise
-
     def alone(self, task: Task, needed: Needed) -> Outcome:
-        """Return the outcome of a timed task, done with nothing at work beside it."""
-        if trouble := self._troubles.pop(task.process, None):
-            return trouble
-        return call(self._process(task), perform, task.run, needed, task.seconds, seconds=task.deadline)
-
-    def _process(self, task: Task) -> IsolatedProcess:
-        """Return the process that a timed task names."""
+        """Return the outcome of a timed task, done in the process that it names, with nothing beside it."""
         if task.process not in self._named:
             assets = self.assets.only(task.motion) if self.assets and task.motion else None
-            self._named[task.process] = IsolatedProcess(begin_tasks, self.folder, assets)
-        return self._named[task.process]
+            self._named[task.process] = TaskProcess(self.folder, assets)
+        return self._named[task.process].do(task, needed)
 
     def release(self, process: str) -> None:
         """End the process of this name, which no other task wants."""

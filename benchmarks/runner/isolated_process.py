@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.method import WorkerDied
 
 if TYPE_CHECKING:
-    from multiprocessing.context import ForkServerContext, SpawnContext
+    from multiprocessing.context import BaseContext
 
 
 def one_line(error: BaseException) -> str:
@@ -45,24 +45,18 @@ LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "bench
 LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")
 
 
-def new_processes() -> SpawnContext | ForkServerContext:
+def start_loading(*also: str) -> BaseContext:
     """Return the context that worker processes come from: none of them has anything of this one.
 
-    On Linux a server forks them that has loaded LOADED_BY_ALL, and nothing more, once: a process is there in
-    a quarter of the time. Elsewhere libraries may not outlive a fork, and each process loads its own.
+    On Linux a server forks them. It loads LOADED_BY_ALL and these modules once, while this process does
+    something else. Elsewhere libraries may not outlive a fork, and each process loads its own.
     """
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(list(LOADED_BY_ALL))
+    context.set_forkserver_preload([*LOADED_BY_ALL, *also])
+    forkserver.ensure_running()
     return context
-
-
-def start_loading(*also: str) -> None:
-    """Begin to load what all workers need, and these modules, while this process does something else."""
-    if sys.platform == "linux":
-        multiprocessing.get_context("forkserver").set_forkserver_preload([*LOADED_BY_ALL, *also])
-        forkserver.ensure_running()
 
 
 class IsolatedProcess:
@@ -73,9 +67,8 @@ class IsolatedProcess:
 
     def __init__(self, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
         self._begin = (begin, arguments)
-        self._context = new_processes()
+        self._context: Any = start_loading()
         self._process: Any = None
-        self._pipe: Any = None
 
     @property
     def alive(self) -> bool:
@@ -119,16 +112,11 @@ class IsolatedProcess:
         raise answer
 
     def _start(self) -> None:
-        near, far = self._context.Pipe()
+        self._pipe, far = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(far, *self._begin), daemon=True)
-        try:
+        with far:
             process.start()
-        except BaseException:  # there is no process then, and no other side to wait for
-            near.close()
-            raise
-        finally:
-            far.close()
-        self._pipe, self._process = near, process
+        self._process = process
 
     def close(self) -> None:
         """Let the worker end by itself, for it has nothing to do; then end all that it has started."""
@@ -160,10 +148,7 @@ def how_it_ended(code: int) -> tuple[str, str]:
     """
     if code >= 0:
         return f"the process ended with status {code}", "failed"
-    try:
-        name = signal.Signals(-code).name
-    except ValueError:
-        name = f"signal {-code}"
+    name = signal.Signals(-code).name
     if name == "SIGKILL":
         return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"
     return f"the process was ended by {name}", "failed"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.metric import Estimate, Measurements, RollOut, SceneRollOuts, measurements_in
+from benchmarks.metric import Estimate, RollOut, SceneRollOuts, measurements_in
 from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.results.protocol import spread
@@ -115,24 +115,16 @@ def measured(
                 values |= compared(roll_out, measurements.compare)
             metrics |= {find_metric(name, outside).name: number(name, v) for name, v in values.items()}
             curves |= measurements.series(roll_out) if measurements.series else {}
-            ended = judgement(measurements, roll_out, values) or ended
+            said = measurements.judge(roll_out, values) if measurements.judge else None
+            if said and (not isinstance(said, tuple) or len(said) != 2 or said[0] not in STATUSES):
+                statuses = ", ".join(STATUSES)
+                raise ValueError(
+                    f"judge() gives {said!r}: expected None, or a status ({statuses}) and a reason"
+                )
+            ended = said or ended
         except Exception as error:
-            if measurements.name in outside:
-                raise RuntimeError(f"{measurements.name}: {one_line(error)}") from error
-            raise
+            raise RuntimeError(f"{measurements.name}: {one_line(error)}") from error
     return metrics, curves, ended
-
-
-def judgement(
-    measurements: Measurements, roll_out: RollOut, values: dict[str, float | Estimate]
-) -> tuple[str, str] | None:
-    """Return status and reason by judge(), None where there is none. Raises ValueError."""
-    ended = measurements.judge(roll_out, values) if measurements.judge else None
-    if ended is None or (isinstance(ended, tuple) and len(ended) == 2 and ended[0] in STATUSES):
-        return ended
-    raise ValueError(
-        f"judge() gives {ended!r}: expected None, or a status ({', '.join(STATUSES)}) and a reason"
-    )
 
 
 def number(metric: str, value: Any) -> float | Estimate:

@@ -52,8 +52,8 @@ class NetworkTraining:
         clips: tasks that simulate mixed clips.
         device: cpu or cuda, for every part of a step.
         inputs: name -> digest of each input.
-        software: name -> digest or version of source, packages, data, and as `simulations` of the code and
-            inputs of what simulates.
+        key: digest of inputs, code and packages. With equal simulations, a training of the same key that was
+            killed goes on from its last checkpoint, and ends as it would have.
     """
 
     training: str
@@ -68,16 +68,7 @@ class NetworkTraining:
     clips: tuple[TaskId, ...] = ()
     device: str
     inputs: Mapping[str, str]
-    software: Mapping[str, str]
-
-    @property
-    def key(self) -> str:
-        """Digest of inputs and software.
-
-        With equal simulations, a training of the same key that was killed goes on from its last checkpoint,
-        and ends as it would have.
-        """
-        return digest({**self.inputs, **self.software})
+    key: str
 
     @property
     def reads(self) -> tuple[TaskId, ...]:
@@ -171,7 +162,6 @@ def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> d
         "versions": provenance.versions(),
         "digest": job.key,
         "inputs": dict(job.inputs),
-        "software": dict(job.software),
     }
 
 
@@ -212,43 +202,40 @@ def facts_of(model: TrainedModel) -> dict[str, Any]:
 
 NAME = "pretrained"  # in the result of a task: name of the file that its network is of
 MACHINE = "machine"  # the input of a task that says where it runs
-PACKAGE = "package "  # how the name of a package begins among the parts of a task
 MAKE = "benchmarks.run -o DIR trains it, --trained DIR takes it"
-PRESET = "quick"  # of the package's networks
-
-Parts = Mapping[str, str]  # name -> digest or version
 
 
-@dataclass(frozen=True, kw_only=True)
-class PretrainedNetwork:
-    """A trained network in a file, in the place of its training.
+def pretrained_network(job: NetworkTraining, folder: Path) -> tuple[Path | None, str]:
+    """Return the file of a network in a folder of such files, or of the run that trained it.
 
-    Attributes:
-        job: that training.
-        source: the file; None without one.
-        refusal: why the file is not taken, or why there is none.
-        differing: names of what a training here depends on and that the file was trained with in another
-            version; none where a training here gives the same bits.
+    Where there is none, or one of another training, why it cannot be taken.
     """
+    name = network_name(job.training, job.garment, job.seed)
+    places = (folder / f"{name}{SUFFIX}", job.path(RunFolder(folder)))
+    path = next((path for path in places if path.is_file()), None)
+    if path is None:
+        return None, f"no pretrained network {name}: {MAKE}"
+    try:
+        inputs = read_header(path)["origin"]["inputs"]
+        names = inputs.keys() | job.inputs.keys()
+    except TensorFileError as error:
+        return path, str(error)
+    except (KeyError, TypeError, AttributeError):
+        return path, f"{path}: says nothing of its training: {MAKE}"
+    others = sorted(n for n in names if n != MACHINE and inputs.get(n) != job.inputs.get(n))
+    return path, f"{path}: a network of another training ({', '.join(others)}): {MAKE}" if others else ""
 
-    job: NetworkTraining
-    source: Path | None
-    refusal: str = ""
-    differing: tuple[str, ...] = ()
 
-
-def take(pretrained: PretrainedNetwork, context: Context, needed: Needed) -> Outcome:
-    """Copy the file, once it is known to be whole. The outcome names the machine that trained it."""
+def take(job: NetworkTraining, source: Path, context: Context, needed: Needed) -> Outcome:
+    """Copy a network, once it is known to be whole. The outcome names the machine that trained it."""
     from snug.networks.trained_model import TrainedModel
 
-    assert pretrained.source is not None
-    model, path = TrainedModel.load(pretrained.source), pretrained.job.path(context.folder)
+    model, path = TrainedModel.load(source), job.path(context.folder)
     path.parent.mkdir(parents=True, exist_ok=True)
     model.save(path)
     facts = {
-        NAME: pretrained.source.stem,
+        NAME: source.stem,
         "trained_at": model.origin["commit"],
-        "differing": list(pretrained.differing),
         "data_seconds": model.origin["data_seconds"],
     }
     return Outcome(
@@ -258,77 +245,13 @@ def take(pretrained: PretrainedNetwork, context: Context, needed: Needed) -> Out
     )
 
 
-def pretrained_network(job: NetworkTraining, folder: Path) -> PretrainedNetwork:
-    """Return the network of a training in a folder of such files, or of the run that trained it."""
-    name = network_name(job.training, job.garment, job.seed)
-    places = (folder / f"{name}{SUFFIX}", job.path(RunFolder(folder)))
-    source = next((path for path in places if path.is_file()), None)
-    if source is None:
-        return PretrainedNetwork(job=job, source=None, refusal=f"no pretrained network {name}: {MAKE}")
-    differing, refusal = compare(source, job)
-    return PretrainedNetwork(job=job, source=source, refusal=refusal, differing=differing)
-
-
-def compare(path: Path, job: NetworkTraining) -> tuple[tuple[str, ...], str]:
-    """Return how the training in a file differs from one here, and why it cannot take its place, or empty."""
-    try:
-        origin = read_header(path).get("origin")
-    except TensorFileError as error:
-        return (), str(error)
-    inputs, software = (_mapping(_mapping(origin).get(part)) for part in ("inputs", "software"))
-    if not inputs:
-        return (), f"{path}: says nothing of its training: {MAKE}"
-    changed = different(inputs, job.inputs)
-    machine = tuple(name for name in changed if name == MACHINE)
-    if others := [name for name in changed if name != MACHINE]:
-        return (), f"{path}: a network of another training ({', '.join(others)}): {MAKE}"
-    return (*machine, *different(software, job.software)), ""
-
-
-def different(one: Parts, other: Parts) -> tuple[str, ...]:
-    """Return the names, sorted, of what two trainings do not share.
-
-    >>> different({"a": "1", "b": "2"}, {"a": "1", "c": "2"})
-    ('b', 'c')
-    """
-    return tuple(sorted(name for name in one.keys() | other.keys() if one.get(name) != other.get(name)))
-
-
-def _mapping(value: object) -> dict[str, Any]:
-    return dict(value) if isinstance(value, dict) else {}
-
-
-def without_machine(parts: Parts) -> dict[str, str]:
-    """Return the parts of a task without the machine and the versions of packages."""
-    return {name: part for name, part in parts.items() if name != MACHINE and not name.startswith(PACKAGE)}
-
-
 def put_into_package(run: str | Path, package: Path = FOLDER) -> list[str]:
-    """Put the networks that a run has trained into the package; return their names.
-
-    Args:
-        run: folder of a run of preset quick with the package's body, garments and motions.
-        package: where they are put, in place of those of the same names.
-
-    Raises:
-        ValueError: the run is of another preset, or of other data.
-    """
-    from snug.motion.library import TRAIN
-    from snug.networks.trained_model import TrainedModel
-
-    folder, names = RunFolder(run), []
-    config = folder.read_config()
-    expected = {"preset": PRESET, "body": "of the package", "garment": "tailored", "pretrained": None}
-    for name, value in expected.items():
-        if config.get(name) != value:
-            raise ValueError(f"{run}: its {name} is {config.get(name)}; the package has networks of {value}")
-    for path in sorted(folder.models.rglob("*.safetensors")):
-        model = TrainedModel.load(path)
-        if model.origin["motions"] != list(TRAIN):
-            raise ValueError(f"{path}: learned from other motions than the library's")
-        if not model.steps:  # untrained
-            continue
-        names.append(network_name(model.origin["network"], model.origin["garment"], model.seed))
+    """Put the networks that a run has trained into the package; return their names."""
+    names = []
+    for path in sorted(RunFolder(run).models.rglob("*.safetensors")):
+        header = read_header(path)
+        origin = header["origin"]
+        names.append(network_name(origin["network"], origin["garment"], header["seed"]))
         with replacing(package / f"{names[-1]}{SUFFIX}") as unfinished:
             shutil.copyfile(path, unfinished)
     return names

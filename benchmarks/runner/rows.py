@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 MS = 1e3
 SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
-MOST_NAMED = 3  # cells, tasks, stages or differences that a line names
 
 Outcomes = Mapping[TaskId, Outcome]
 
@@ -42,15 +41,14 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
     measured = outcomes.get(cell.metrics_id)
     if outcome.files and measured is None:
         return  # interrupted before it was measured
-    trained, taught_by = network_tasks(cell, tasks)
+    trained, ids = network_tasks(cell, tasks)
     network = outcomes.get(trained, Outcome()) if trained else Outcome()
+    taught_by = [outcomes[id] for id in ids if id in outcomes]
     metrics: dict[str, Any] = {}  # a number, or the parts of an Estimate
-    status, reason = outcome.status, "; ".join(filter(None, (outcome.reason, outcome.remark)))
+    status, reason = outcome.status, outcome.reason
     if outcome.files:
         assert measured is not None
-        if measured.status == "skipped":
-            status, reason = "skipped", f"{outcome.remark}; no metrics of it are there".lstrip("; ")
-        elif measured.failed:
+        if measured.failed:
             status, reason = "failed", f"metrics: {measured.reason}"
         else:
             if status == "ok":
@@ -63,12 +61,12 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
             elif (declared_ms := cell.entry.declared_ms or outcome.result.get("declared_ms")) is not None:
                 metrics["cost/frame"] = declared_ms
             if cell.scene.timed:
-                metrics |= model_costs(network, taught_by, outcomes)
+                metrics |= model_costs(network, taught_by)
             reason = "; ".join(filter(None, (reason or not_learned(network), taken(network))))
     batch = outcomes.get(cell.batch_id, Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
-    machines = machines_of(trained, taught_by, outcomes)
+    machines = machines_of(network, taught_by)
     for suite in cell.suites:
         rows = _rows(
             cell, suite, outcome, status=status, reason=reason, metrics=metrics, outside=plan.metrics,
@@ -177,7 +175,7 @@ def network_tasks(cell: Cell, tasks: Mapping[TaskId, Task]) -> tuple[TaskId | No
     return trained, tasks[trained].reads if trained else ()
 
 
-def model_costs(network: Outcome, taught_by: tuple[TaskId, ...], outcomes: Outcomes) -> dict[str, float]:
+def model_costs(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, float]:
     """Return cost/data, cost/setup, cost/memory and cost/train* of a trained network."""
     if not network.result:
         return {}
@@ -185,27 +183,20 @@ def model_costs(network: Outcome, taught_by: tuple[TaskId, ...], outcomes: Outco
         "cost/setup": "setup_seconds", "cost/train": "seconds", "cost/memory": "megabytes",
         "cost/train_steps": "steps", "cost/train_frames": "frames",
     }  # fmt: skip
-    costs = {metric: network.result[name] for metric, name in names.items()}
-    if NAME in network.result:
-        return {"cost/data": network.result["data_seconds"]} | costs
-    return {"cost/data": sum(outcomes[id].seconds for id in taught_by if id in outcomes)} | costs
+    data = network.result.get("data_seconds", sum(outcome.seconds for outcome in taught_by))
+    return {"cost/data": data} | {metric: network.result[name] for metric, name in names.items()}
 
 
-def machines_of(trained: TaskId | None, taught_by: tuple[TaskId, ...], outcomes: Outcomes) -> dict[str, str]:
+def machines_of(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, str]:
     """Return metric -> hardware that measured its seconds, of tasks other than the cell."""
-    if trained is None:
-        return {}
-    if trained in outcomes and NAME in outcomes[trained].result:
-        taught_by = (trained,)
-    metrics = {"cost/data": taught_by, "cost/setup": (trained,), "cost/train": (trained,)}
-    origins = {
-        metric: [outcomes[id].origin for id in ids if id in outcomes] for metric, ids in metrics.items()
+    if NAME in network.result:
+        taught_by = [network]
+    metrics = {"cost/data": taught_by, "cost/setup": [network], "cost/train": [network]}
+    lines = {
+        metric: dict.fromkeys(outcome.origin["hardware"] for outcome in outcomes if outcome.origin)
+        for metric, outcomes in metrics.items()
     }
-    return {
-        metric: " and ".join(dict.fromkeys(origin["hardware"] for origin in of_metric if origin))
-        for metric, of_metric in origins.items()
-        if any(of_metric)
-    }
+    return {metric: " and ".join(hardware) for metric, hardware in lines.items() if hardware}
 
 
 def not_learned(network: Outcome) -> str:
@@ -216,36 +207,24 @@ def not_learned(network: Outcome) -> str:
 
 
 def taken(network: Outcome) -> str:
-    """Return a remark where the cell's network is of a file, with what a training here would differ in."""
-    if NAME not in network.result:
-        return ""
-    differing = network.result["differing"]
-    same = "a training here gives the same bits"
-    if differing:
-        same = f"a training here differs in {first_of(differing)}"
-    return f"{PRETRAINED} {network.result[NAME]} of {network.result['trained_at']}; {same}"
-
-
-def first_of(names: Sequence[str]) -> str:
-    """Return the first names in one text, and how many more there are."""
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    """Return a remark where the cell's network is of a file."""
+    facts = network.result
+    return f"{PRETRAINED} {facts[NAME]} of {facts['trained_at']}" if NAME in facts else ""
 
 
 def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
-    """Yield the row of a case, also of one that died or hung; one that --only leaves out has none.
+    """Yield the row of a case, also of one that died or hung.
 
     A hang and a crash are failures of the solver: only one that ends by itself may call it a timeout.
     """
     outcome = outcomes.get(("case", case.name))
-    if outcome is None or outcome.status == "skipped":
+    if outcome is None:
         return
     result = outcome.result
     row = Row(**result) if result else case.row(status="failed", reason=outcome.reason)
-    reason = "; ".join(filter(None, (row.reason, outcome.remark)))
     unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
     origin = _origin(outcome, protocol_of_case(row.scene, row.metric))
-    yield dataclasses.replace(row, **origin, reason=reason, unit=unit)
+    yield dataclasses.replace(row, **origin, unit=unit)
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:

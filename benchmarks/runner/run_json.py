@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from benchmarks.assets import Assets
 
 KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
-OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks", "cells", "outdated")
+OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks", "cells")
 
 
 class RunLog:
@@ -43,7 +43,7 @@ class RunLog:
             "commit": provenance.commit(), "preset": plan.preset.name, "protocol": NUMBER,
             "hardware": hardware,
         }  # fmt: skip
-        self.cache = Cache(self.folder, only=plan.only, origin=self.origin)
+        self.cache = Cache(self.folder, retry=plan.retry, origin=self.origin)
         self.rows: list[Row] = []
         self.stages: list[dict[str, Any]] = []
         before = self.folder.read_config() if self.folder.config_path.is_file() else {}
@@ -132,7 +132,7 @@ class RunLog:
                 of_kind.setdefault(task.stage, {})[task.label] = facts
         outcomes = [runner.outcomes["cell", cell.name] for cell in self.plan.cells if runs(cell)]
         cells = {"run": len(outcomes), "failed": sum(outcome.failed for outcome in outcomes)}
-        self.config |= {"tasks": of_kind, "cells": cells, "outdated": runner.outdated()}
+        self.config |= {"tasks": of_kind, "cells": cells}
         for outcome in runner.outcomes.values():
             self.config["digests"] |= outcome.digests
         self.folder.write_config(self.config)

@@ -20,9 +20,8 @@ from benchmarks.plan.cell import Cell, TaskId, flat
 from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.provenance import digest, digest_of_file, find_module, software
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cache import dependencies, digests_of
+from benchmarks.runner.cache import digests_of
 from benchmarks.runner.cells import (
-    begin_cell,
     files_of,
     repeat_cell,
     run_case,
@@ -45,7 +44,6 @@ from benchmarks.runner.networks import (
     pretrained_network,
     take,
     train,
-    without_machine,
 )
 from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
@@ -58,11 +56,8 @@ if TYPE_CHECKING:
 
 SIMULATOR = "reference_sim"
 DRESSING = ("snug/data", "snug/body", "snug/motion", "snug/garments", "benchmarks/assets.py")
-MIXING = (
-    "snug/training/augmentation.py",
-    "snug/recipe.py",
-    "snug/named_recipes.py",
-)  # that are mixed from motions, to be simulated
+# What mixes clips from motions, to be simulated.
+MIXING = ("snug/training/augmentation.py", "snug/recipe.py", "snug/named_recipes.py")
 NETWORKS = ("snug", "benchmarks/assets.py")
 SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py")
 RUNS = (
@@ -70,75 +65,13 @@ RUNS = (
     "benchmarks/runner/isolated_process.py", "benchmarks/runner/cells.py",
 )  # fmt: skip
 SOLVERS = ("benchmarks/methods/simulation.py", "benchmarks/methods/sweeps.py")
-METRICS = ("benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "snug")
-CASES = (
-    "benchmarks/runner/cells.py",
-    "benchmarks/validation",
-    "benchmarks/assets.py",
-    *SOLVERS,
-    *METRICS,
-    *RUNS,
-)
+METRICS = (
+    "benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "benchmarks/runner/measurements.py",
+    "snug",
+)  # fmt: skip
+CASES = ("benchmarks/validation", "benchmarks/assets.py", *SOLVERS, *METRICS, *RUNS)
 TRAINING = ("benchmarks/runner/networks.py", SIMULATOR, *NETWORKS)
 USERS_OWN = ("benchmarks/methods", *METRICS, *RUNS)  # what a user's file may import
-
-
-class TaskInputs:
-    """Inputs of the tasks of one plan: by machine, body, garment, motion, scene and method."""
-
-    def __init__(self, plan: Plan) -> None:
-        self.plan, self.preset = plan, plan.preset
-
-    def machine(self, device: str = "cpu") -> dict[str, Any]:
-        """Return the machine, as times of another are not reused. device: of a training; else cpu."""
-        facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
-        names = ("processor", "python", "accelerator")  # one thread works, however many cores there are
-        return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
-
-    @cached_property
-    def _hardware(self) -> dict[str, Any]:
-        return provenance.hardware(self.plan.device)
-
-    def of_scene(self, scene: Scene, *code: str) -> dict[str, Any]:
-        """Return inputs and code of a task that builds the scene; its metrics are no part of them."""
-        declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
-        del declaration["metrics"], declaration["counterpart"]
-        inputs = self.machine() | {"scene": declaration}
-        code = (*code, *RUNS, *code_behind(scene))
-        if not scene.dressed:
-            return {"inputs": inputs, "code": code}
-        inputs |= self.of_body(scene.garment) | {"motion": self.motion(scene.motion)}
-        if scene.motion not in self.plan.motions.train:  # those have a length of their own
-            inputs["frames"] = self.preset.frames
-        if scene.part == "clip":
-            inputs["clip_frames"] = self.preset.clip_frames
-        return {"inputs": inputs, "code": (*code, *DRESSING)}
-
-    def of_body(self, garment: str) -> dict[str, Any]:
-        """Return the inputs that the assets are made from."""
-        names = ("garment_vertices", "train_frames")
-        sizes = {name: getattr(self.preset, name) for name in names} | {"garment": garment}
-        digests: dict[str, str] = {}
-        if user_body := self.plan.inputs.body:
-            digests["body"] = user_body.digest
-        if (user_garment := self.plan.inputs.garment) and garment == user_garment.name:
-            digests["own garment"] = user_garment.digest
-        return {"assets": sizes} | digests
-
-    def motion(self, name: str) -> str:
-        """Return the name of a motion, with the digest of its content where it is of a file.
-
-        The code that makes an embedded one counts by itself.
-        """
-        files = self.plan.inputs.motions
-        return f"{name} {digest(files[name])}" if name in files else name
-
-    def simulated_by(self, entry: MethodEntry, of_scene: dict[str, Any]) -> dict[str, Any]:
-        """Return inputs and code of a task that builds the scene, with those of the method."""
-        return {
-            "inputs": of_scene["inputs"] | {"method": declared(entry)},
-            "code": (*of_scene["code"], *code_behind(entry)),
-        }
 
 
 def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
@@ -174,7 +107,7 @@ SIMULATION = 7.0  # [s] expected of a cell's simulation to convergence
 SHORT = 0.05  # of these, for a network or a simulation that is stopped early
 TRAINED = "training"  # the stage of networks that no file has
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
-TASKS = "benchmarks/runner"
+TRUTH = "benchmarks/runner/ground_truth.py"
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -186,9 +119,8 @@ class Schedule:
     """The tasks of one plan."""
 
     def __init__(self, plan: Plan) -> None:
-        self.plan, self.preset, self.inputs = plan, plan.preset, TaskInputs(plan)
+        self.plan, self.preset = plan, plan.preset
         self.folder = RunFolder(plan.folder)
-        self._trainings: dict[Network, NetworkTraining] = {}
 
     def tasks(self) -> Iterator[Task]:
         """Yield the tasks in the order in which they are done."""
@@ -206,7 +138,8 @@ class Schedule:
             for first in range(0, len(timed), AT_ONCE):
                 yield from self.cells(timed[first : first + AT_ONCE])
         yield from (self.cell(cell) for cell in plan.cells if not cell.timed)
-        yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and self._has_reference(s))
+        solved = {cell.scene.name for cell in plan.cells if cell.entry.role == "reference" and runs(cell)}
+        yield from (self.quasi_static(s) for s in plan.scenes if s.dynamic and s.name in solved)
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
         yield from map(self.case, plan.cases)
 
@@ -219,7 +152,7 @@ class Schedule:
             run=partial(settle_start, scene), files=files_of_start(scene, self.folder),
             needs=(start_of(self._settled_in(scene)),) if scene.start_of else (),
             seconds=FRAME * self.preset.settle_frames,
-            **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
+            **self._of_scene(scene, TRUTH),
         )  # fmt: skip
 
     def ground_truth(self, network: Network) -> list[Task]:
@@ -240,7 +173,7 @@ class Schedule:
             kind="data", name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry),
             stage="ground truth", silent=True, run=partial(simulate_motion, scene, entry),
             seconds=FRAME * (self.preset.settle_frames + self._frames(motion)),
-            **self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py")),
+            **self._simulated_by(entry, scene),
         )  # fmt: skip
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
@@ -248,8 +181,8 @@ class Schedule:
         entry = find_method(simulated.method)
         clips = f"{garment}/mixed-{len(motions)}"
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
-        of_scene = self.inputs.simulated_by(entry, self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"))
-        mixed_of = {name: self.inputs.motion(name) for name in motions}
+        of_scene = self._simulated_by(entry, scene)
+        mixed_of = {name: self._motion(name) for name in motions}
         mixed = MixedClips(scene=scene, entry=entry, motions=motions, clips=clips, part=part)
         return Task(
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
@@ -271,12 +204,11 @@ class Schedule:
             "files": (self.folder.relative(job.path(self.folder)),),
         }  # fmt: skip
         if self.plan.trained is not None and job.chosen is not None:
-            pretrained = pretrained_network(job, self.plan.trained)
-            if pretrained.source is not None or not network.users_training:
-                content = digest_of_file(pretrained.source) if pretrained.source else ""
+            source, refusal = pretrained_network(job, self.plan.trained)
+            if source or not network.users_training:
                 return Task(
-                    stage="pretrained networks", run=partial(take, pretrained), skip=pretrained.refusal,
-                    inputs={"file": content, "differing": pretrained.differing},
+                    stage="pretrained networks", run=partial(take, job, source or Path()), skip=refusal,
+                    inputs={"file": digest_of_file(source) if source else ""},
                     code=("benchmarks/runner/networks.py", "snug/networks"), **fields,
                 )  # fmt: skip
         return Task(
@@ -286,32 +218,28 @@ class Schedule:
 
     def training(self, network: Network) -> NetworkTraining:
         """Return how a network is trained."""
-        if network in self._trainings:
-            return self._trainings[network]
         motions, held_out = self._learned(network)
         truth = self.ground_truth(network)
         ids = [task.id for task in truth if task.kind == "data"]
+        inputs = digests_of(self._inputs_of(network))
         code = software(*TRAINING, *users_code(network.declared_in))
-        if truth:
-            code["simulations"] = digest([[t.title, without_machine(dependencies(t))] for t in truth])
-        self._trainings[network] = NetworkTraining(
+        return NetworkTraining(
             training=network.name, chosen=network.training, home=network.declared_in, seed=network.seed,
             garment=network.garment, steps=self._steps(network), motions=motions, held_out=held_out,
             simulated=dict(zip((*motions, *held_out), ids)), device=self.plan.device,
             clips=tuple(task.id for task in truth if task.kind == "clips"),
-            inputs=digests_of(self._inputs_of(network)), software=code,
+            inputs=inputs, key=digest(inputs | code),
         )  # fmt: skip
-        return self._trainings[network]
 
     def _inputs_of(self, network: Network) -> dict[str, Any]:
         """Return the inputs of a training."""
         motions, held_out = self._learned(network)
-        return self.inputs.machine(self.plan.device) | self.inputs.of_body(network.garment) | {
+        return self._machine(self.plan.device) | self._of_body(network.garment) | {
             "training": [network.name, network.training],
             "seed": network.seed,
             "steps": self._steps(network),
-            "motions": {name: self.inputs.motion(name) for name in motions},
-            "held out": {name: self.inputs.motion(name) for name in held_out},
+            "motions": {name: self._motion(name) for name in motions},
+            "held out": {name: self._motion(name) for name in held_out},
         }  # fmt: skip
 
     def _steps(self, network: Network) -> int:
@@ -343,7 +271,7 @@ class Schedule:
 
     def cell(self, cell: Cell) -> Task:
         """Return the task that runs a cell: alone where it is timed."""
-        of_scene = self.inputs.of_scene(cell.scene, *code_behind(cell.entry))
+        of_scene = self._of_scene(cell.scene, *code_behind(cell.entry))
         inputs, entry = of_scene["inputs"] | {"method": declared(cell.entry)}, cell.entry
         if cell.timed:
             inputs["least"] = self._least(cell)
@@ -357,7 +285,7 @@ class Schedule:
             "inputs": inputs, "code": of_scene["code"], "needs": needs,
         }  # fmt: skip
         if cell.timed:
-            return self._timed(cell, cell.task_id, run_cell, begin=partial(begin_cell, cell), **fields)
+            return self._timed(cell, cell.task_id, run_cell, **fields)
         return Task(
             kind="cell", name=cell.name, label=cell.label, stage="cells that are not timed",
             run=partial(run_cell, cell, self._least(cell)), batch=cell.scene.name,
@@ -368,16 +296,12 @@ class Schedule:
     def _timed(self, cell: Cell, id: TaskId, run: Callable[..., Outcome], **fields: Any) -> Task:
         """Return the run of a timed cell, or a task that follows it in its process."""
         least = self._least(cell)
-        usual: dict[str, Any] = {
-            "inputs": {"least": least},
-            "code": RUNS,
-            "needs": (cell.task_id,),
-            "seconds": 2.0,
-        }
+        usual = {"inputs": {"least": least}, "code": RUNS, "needs": (cell.task_id,), "seconds": 2.0}
+        more: dict[str, Any] = usual | fields
         return Task(
             kind=id[0], name=id[1], label=cell.label, stage="cells", run=partial(run, cell, least),
             process=cell.name, motion=cell.scene.motion if cell.scene.dressed else "",
-            deadline=self.preset.cell_seconds, **usual | fields,
+            deadline=self.preset.cell_seconds, **more,
         )  # fmt: skip
 
     def _least(self, cell: Cell) -> float:
@@ -392,7 +316,7 @@ class Schedule:
             kind="quasi-static", name=flat(scene.name), label=scene.name, stage="quasi-static answers",
             silent=True, run=partial(simulate_quasi_static, scene), needs=(start_of(scene),),
             seconds=FRAME * self._frames(scene.motion),
-            **self.inputs.of_scene(scene, f"{TASKS}/ground_truth.py"),
+            **self._of_scene(scene, TRUTH),
         )  # fmt: skip
 
     def metrics(self, cell: Cell) -> Task:
@@ -412,8 +336,8 @@ class Schedule:
             same = (c for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, counterpart.task_id)
-        of_scene = self.inputs.of_scene(
-            scene, f"{TASKS}/measurements.py", *METRICS, *users_code(*plan.metrics)
+        of_scene = self._of_scene(
+            scene, "benchmarks/runner/measurements.py", *METRICS, *users_code(*plan.metrics)
         )
         inputs = {
             "suites": sorted(cell.suites),
@@ -443,9 +367,60 @@ class Schedule:
         return Task(
             kind="case", name=case.name, label=case.name, stage="validation", run=partial(run_case, case),
             warm_up=case.warm_up, deadline=case.seconds, process=case.process, seconds=0.2,
-            inputs=self.inputs.machine() | {"declared": declared(case)},
+            inputs=self._machine() | {"declared": declared(case)},
             code=(find_module(case.module), *CASES),
         )  # fmt: skip
+
+    # --- inputs ---------------------------------------------------------------------------------------------
+
+    def _machine(self, device: str = "cpu") -> dict[str, Any]:
+        """Return the machine, as times of another are not reused. device: of a training; else cpu."""
+        facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
+        names = ("processor", "python", "accelerator")  # one thread works, however many cores there are
+        return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
+
+    @cached_property
+    def _hardware(self) -> dict[str, Any]:
+        return provenance.hardware(self.plan.device)
+
+    def _of_scene(self, scene: Scene, *code: str) -> dict[str, Any]:
+        """Return inputs and code of a task that builds the scene; its metrics are no part of them."""
+        declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
+        del declaration["metrics"], declaration["counterpart"]
+        inputs = self._machine() | {"scene": declaration}
+        code = (*code, *RUNS, *code_behind(scene))
+        if not scene.dressed:
+            return {"inputs": inputs, "code": code}
+        inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
+        if scene.motion not in self.plan.motions.train:  # those have a length of their own
+            inputs["frames"] = self.preset.frames
+        if scene.part == "clip":
+            inputs["clip_frames"] = self.preset.clip_frames
+        return {"inputs": inputs, "code": (*code, *DRESSING)}
+
+    def _of_body(self, garment: str) -> dict[str, Any]:
+        """Return the inputs that the assets are made from."""
+        names = ("garment_vertices", "train_frames")
+        sizes = {name: getattr(self.preset, name) for name in names} | {"garment": garment}
+        inputs: dict[str, Any] = {"assets": sizes}
+        if user_body := self.plan.inputs.body:
+            inputs["body"] = user_body.digest
+        if (user_garment := self.plan.inputs.garment) and garment == user_garment.name:
+            inputs["own garment"] = user_garment.digest
+        return inputs
+
+    def _motion(self, name: str) -> str:
+        """Return the name of a motion, with the digest of its content where it is of a file.
+
+        The code that makes an embedded one counts by itself.
+        """
+        files = self.plan.inputs.motions
+        return f"{name} {digest(files[name])}" if name in files else name
+
+    def _simulated_by(self, entry: MethodEntry, scene: Scene) -> dict[str, Any]:
+        """Return inputs and code of a task that simulates a scene by a method, to learn from."""
+        of_scene = self._of_scene(scene, TRUTH, *code_behind(entry))
+        return of_scene | {"inputs": of_scene["inputs"] | {"method": declared(entry)}}
 
     # --- facts of the plan ---------------------------------------------------------------------------------
 
@@ -466,11 +441,6 @@ class Schedule:
         """Return the scene whose settled garment another one starts from."""
         planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)
         return planned or find_scene(scene.start_of, self.plan.motions.first_garment).at(self.preset)
-
-    def _has_reference(self, scene: Scene) -> bool:
-        """Return whether the plan simulates a scene by the reference solver."""
-        of_scene = (cell for cell in self.plan.cells if cell.scene == scene)
-        return any(cell.entry.role == "reference" and runs(cell) for cell in of_scene)
 
 
 def start_of(scene: Scene) -> TaskId:

@@ -31,7 +31,6 @@ class Outcome:
         digests: name -> digest of these files, once the outcome is kept.
         seconds: wall time [s].
         origin: commit, preset and hardware of it, once the outcome is kept.
-        remark: what has changed since, where an outdated outcome is kept all the same.
     """
 
     status: str = "ok"
@@ -42,7 +41,6 @@ class Outcome:
     digests: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
     origin: Mapping[str, Any] = field(default_factory=dict)
-    remark: str = ""
 
     @property
     def ending(self) -> str:
@@ -51,8 +49,8 @@ class Outcome:
 
     @property
     def usable(self) -> bool:
-        """True if other tasks may build upon it: it has not failed and is up to date."""
-        return not (self.failed or self.remark or self.status == "skipped")
+        """True if other tasks may build upon it."""
+        return not self.failed and self.status != "skipped"
 
 
 @dataclass
@@ -72,7 +70,7 @@ class Context:
     memo: dict[Any, Any] = field(default_factory=dict)
 
 
-Needed = Mapping[TaskId, Outcome]  # outcomes, up to date and successful, of what a task needs or reads
+Needed = Mapping[TaskId, Outcome]  # usable outcomes of what a task needs or reads
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,7 +95,6 @@ class Task:
         process: a timed task runs alone on the machine, in the process of this name; others, without a
             name, run side by side in any process.
         motion: of the assets, all that the process of a timed task needs; empty: it needs no assets.
-        begin: prepares a timed task before its turn, beside others. `run` raises again what this raises.
         warm_up: prepares a process for its first task of this code; the deadline does not count.
         deadline: [s] after which its process is ended.
         silent: whether no row of the results speaks of it: a failure is then said apart.
@@ -118,7 +115,6 @@ class Task:
     batch: str = ""
     process: str = ""
     motion: str = ""
-    begin: Callable[[Context], None] | None = None
     warm_up: Callable[[], None] | None = None
     deadline: float | None = None
     silent: bool = False

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import study_of
-from benchmarks.plan.plan import DEFAULT_ONLY, Network, Plan
+from benchmarks.plan.plan import Network, Plan
 from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -47,7 +47,7 @@ def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
     schedule, network = Schedule(plan), Network(LEARNER, 0, garment)
     with held(run.path):
         run.remove_parts()
-        runner = Runner(schedule.ground_truth(network), Cache(run, only=(*DEFAULT_ONLY, "failed")))
+        runner = Runner(schedule.ground_truth(network), Cache(run, retry=True))
         runner.run(Executor(run, assets, plan.workers))
         files: dict[str, str] = {}
         for motion, id in schedule.training(network).simulated.items():

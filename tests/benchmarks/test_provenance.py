@@ -26,25 +26,21 @@ FILES = {
 }
 
 
+def write(root: Path, path: str, text: str) -> None:
+    """Write a file anew, and let nothing be known of those before."""
+    (root / path).parent.mkdir(parents=True, exist_ok=True)
+    (root / path).write_text(text)
+    provenance._content.cache_clear()
+    provenance._read.cache_clear()
+
+
 @pytest.fixture
 def project(tmp_path, monkeypatch):
-    """A small project; gives a function that writes a file of it anew."""
-
-    def write(path: str, text: str) -> None:
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_text(text)
-        forget()
-
+    """The folder of a small project."""
     monkeypatch.setattr(provenance, "ROOT", tmp_path)
     for path, text in FILES.items():
-        write(path, text)
-    yield write
-    forget()
-
-
-def forget() -> None:
-    for name in ("_content", "_read"):
-        getattr(provenance, name).cache_clear()
+        write(tmp_path, path, text)
+    return tmp_path
 
 
 # --- the project's own code --------------------------------------------------------------------------------
@@ -58,11 +54,7 @@ def forget() -> None:
         ("snug/data/body.npz", "other weights", True),
         ("snug/body/__init__.pyi", "from .b import f\n", True),
         ("snug/body/__init__.pyi", "from .a import f\n", False),
-        (
-            "snug/network.py",
-            FILES["snug/network.py"].replace("Words", "Other words") + "\n# a remark\n",
-            False,
-        ),
+        ("snug/network.py", FILES["snug/network.py"].replace("Words", "More words") + "\n# more\n", False),
         ("reference_sim/cloth.py", "import numpy\nx = 1\n", False),
         *((path, "another", False) for path in (list(FILES)[1], list(FILES)[3], *list(FILES)[5:7])),
     ],
@@ -71,21 +63,15 @@ def test_statements_and_data_of_a_folder_count_and_words_commands_and_networks_d
     project, path, text, counts
 ):
     before = software("snug")
-    project(path, text)
+    write(project, path, text)
     assert (software("snug") != before) is counts
 
 
-def test_packages_are_those_that_the_code_imports_installed_or_not(project):
-    parts = software("snug")
-    assert set(parts) == {"snug", "package torch", "package nowhere"}
+def test_packages_that_the_code_imports_count_and_a_place_within_another_is_no_part(project):
+    parts = software("snug/data", "snug", "reference_sim/cloth.py")
+    packages = {f"package {name}" for name in ("numpy", "scipy", "torch", "nowhere")}
+    assert set(parts) == {"snug", "reference_sim/cloth.py"} | packages
     assert parts["package nowhere"] == "absent" and parts["package torch"].startswith("torch ")
-
-
-def test_a_place_within_another_is_no_part_and_one_that_is_not_there_is_refused(project):
-    assert set(software("snug/data", "snug", "reference_sim/cloth.py")) == {
-        "snug", "reference_sim/cloth.py", "package numpy", "package scipy", "package torch",
-        "package nowhere",
-    }  # fmt: skip
     with pytest.raises(DeclarationError, match=r"snug/nothing: no such folder or file"):
         software("snug/nothing")
 
@@ -103,23 +89,17 @@ NOT_BESIDE = {"other/place/module.py": "", "mine.txt": "", ".hidden/a.py": "", "
 @pytest.fixture
 def home(tmp_path):
     for name, text in (BESIDE | NOT_BESIDE).items():
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-    forget()
+        write(tmp_path, name, text)
     return tmp_path / "mine.py"
 
 
 @pytest.mark.parametrize("name", [*BESIDE, *NOT_BESIDE])
 def test_a_users_file_counts_with_the_modules_beside_it(home, name):
     before = software(str(home))
-    (home.parent / name).write_text("CHANGED = True\n" + (BESIDE | NOT_BESIDE)[name])
-    forget()
+    assert set(before) == {str(home), "package absent_package", "package numpy"}
+    write(home.parent, name, "CHANGED = True\n" + (BESIDE | NOT_BESIDE)[name])
     after = software(str(home))
-    changed = [part for part in before if after.get(part) != before[part]]
-    assert changed == ([str(home)] if name in BESIDE else [])
-    packages = {name: part for name, part in before.items() if name != str(home)}
-    assert set(packages) == {"package absent_package", "package numpy"}
+    assert [part for part in before if after.get(part) != before[part]] == [str(home)] * (name in BESIDE)
 
 
 def test_what_a_users_file_imports_from_beside_it_is_told_from_packages(home):
@@ -128,22 +108,17 @@ def test_what_a_users_file_imports_from_beside_it_is_told_from_packages(home):
     }  # fmt: skip
 
 
-def test_a_file_in_a_package_counts_with_the_package_and_one_installed_without_what_lies_beside(
-    home, monkeypatch
+@pytest.mark.parametrize("installed", [False, True])
+def test_a_file_in_a_package_counts_with_it_and_one_installed_without_what_lies_beside(
+    home, monkeypatch, installed
 ):
+    monkeypatch.setattr(provenance, "_distributions", lambda: {"deep": ["deep"]} if installed else {})
     solver = str(home.parent / "deep" / "inner" / "solver.py")
     before = software(solver)
-    (home.parent / "helper.py").write_text("CHANGED = True\n")
-    forget()
-    assert software(solver) != before
-    monkeypatch.setattr(provenance, "_distributions", lambda: {"deep": ["deep"]})
-    forget()
+    write(home.parent, "helper.py", "CHANGED = True\n")
+    assert (software(solver) == before) is installed
     before = software(solver)
-    (home.parent / "helper.py").write_text("CHANGED = False\n")
-    forget()
-    assert software(solver) == before
-    (home.parent / "deep" / "__init__.py").write_text("CHANGED = True\n")
-    forget()
+    write(home.parent, "deep/__init__.py", "CHANGED = True\n")
     assert software(solver) != before
 
 
@@ -156,15 +131,12 @@ CARRYING = (
     "benchmarks/training.py", "snug/trained", *provenance.NO_RESULT,
 )  # fmt: skip
 TASKS = {
-    "simulation": ("benchmarks/runner/ground_truth.py", *schedule.RUNS, *schedule.SOLVERS,
-                   *schedule.NETWORKS),
+    "simulation": (schedule.TRUTH, *schedule.RUNS, *schedule.SOLVERS, *schedule.NETWORKS),
     "network": ("benchmarks/methods", *schedule.RUNS, *schedule.SOLVERS, *schedule.NETWORKS),
     "training": schedule.TRAINING,
-    "metrics": ("benchmarks/runner/measurements.py", *schedule.METRICS, *schedule.RUNS,
-                *schedule.DRESSING),
+    "metrics": (*schedule.METRICS, *schedule.RUNS, *schedule.DRESSING),
     "case": schedule.CASES,
-}  # fmt: skip
-SETTLED = ("benchmarks/runner/ground_truth.py", *schedule.RUNS, *schedule.DRESSING)
+}
 
 
 def file_behind(name: str) -> str:
@@ -175,14 +147,10 @@ def file_behind(name: str) -> str:
         return find_module(name.rpartition(".")[0])
 
 
-@pytest.mark.parametrize("place", provenance.NO_RESULT)
-def test_what_decides_no_result_is_there(place):
-    assert (provenance.ROOT / place).exists()
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_what_a_task_declares_holds_all_that_it_imports(task):
     root = provenance.ROOT
+    assert all((root / place).exists() for place in provenance.NO_RESULT)
     declared = {file.relative_to(root).as_posix() for place in TASKS[task] for file in _files_of(place)}
     missing = set()
     for path in sorted(name for name in declared if name.endswith(".py")):
@@ -197,12 +165,10 @@ def test_what_a_task_declares_holds_all_that_it_imports(task):
 @pytest.mark.parametrize(
     ("path", "stale"),
     [
-        ("reference_sim/minimise/newton.py", {*TASKS, "settled"}),
-        ("snug/body/skinning.py", {*TASKS, "settled"}),
-        ("snug/training/train_network.py", {*TASKS}),
+        ("reference_sim/minimise/newton.py", set(TASKS)),
+        ("snug/training/train_network.py", set(TASKS)),
         ("benchmarks/metrics/curvature.py", {"metrics", "case"}),
-        ("benchmarks/scenes/sheets.py", {*TASKS, "settled"} - {"training"}),
-        ("benchmarks/run.py", set()),
+        ("benchmarks/scenes/sheets.py", set(TASKS) - {"training"}),
         ("benchmarks/plan/make_plan.py", set()),
         ("benchmarks/runner/schedule.py", set()),
         ("snug/train.py", set()),
@@ -210,8 +176,7 @@ def test_what_a_task_declares_holds_all_that_it_imports(task):
     ],
 )
 def test_a_change_makes_stale_what_it_may_move(path, stale):
-    places = TASKS | {"settled": SETTLED}
-    files = {task: {f for place in code for f in _files_of(place)} for task, code in places.items()}
+    files = {task: {f for place in code for f in _files_of(place)} for task, code in TASKS.items()}
     assert {task for task in files if provenance.ROOT / path in files[task]} == stale
 
 

@@ -32,8 +32,7 @@ from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
 from snug.named_recipes import RECIPES
 from snug.training.physics_loss import static_terms
-from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, small_scene
-from tests.benchmarks.runner.test_cell_tasks import plan_of
+from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, plan_of, small_scene
 
 SIZES = {"frames": 16, "settle_frames": 4, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01

@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.plan.plan import DEFAULT_ONLY
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -162,7 +161,7 @@ def executor(folder: RunFolder, address: str = "") -> Executor:
 def finish(folder: Path, address: str = "", **fields) -> Runner:
     """The chain, run or reused; what has failed is tried again."""
     RunFolder(folder).remove_parts()
-    cache = Cache(RunFolder(folder), only=(*DEFAULT_ONLY, "failed"), origin={"commit": "c", "hardware": "h"})
+    cache = Cache(RunFolder(folder), retry=True, origin={"commit": "c", "hardware": "h"})
     runner = Runner(chain(**fields), cache)
     runner.run(executor(RunFolder(folder), address))
     return runner

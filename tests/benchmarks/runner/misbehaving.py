@@ -100,17 +100,3 @@ class Misbehaving(Method):
 
 def make(*, models: Path, seed: int, how: str) -> Misbehaving:
     return Misbehaving(how)
-
-
-def interrupt_at(method: str, monkeypatch) -> None:
-    """Whoever runs cells is interrupted from the keyboard when that method's turn has come."""
-    from tests.benchmarks.runner.tasks_by_hand import InProcess  # loads what no process of a cell needs
-
-    alone = InProcess.alone
-
-    def interrupted(self, task, needed):
-        if f" x {method}" in task.label:
-            raise KeyboardInterrupt
-        return alone(self, task, needed)
-
-    monkeypatch.setattr(InProcess, "alone", interrupted)

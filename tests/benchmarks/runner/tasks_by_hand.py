@@ -1,22 +1,32 @@
-"""Tasks and scenes as a test wants them, without a plan."""
+"""Plans, tasks and scenes as a test wants them, and an executor that does everything in this process."""
 
 from __future__ import annotations
 
 import dataclasses
-import time
-from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.assets import Assets
+from benchmarks.methods import find_method
 from benchmarks.methods.declared_networks import TRAININGS
+from benchmarks.plan.cell import Cell
+from benchmarks.plan.plan import Plan
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.executor import Executor
+from benchmarks.runner.loop import Runner
 from benchmarks.runner.networks import NetworkTraining
-from benchmarks.runner.task import Context, failure
+from benchmarks.runner.schedule import tasks_of
+from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
+
+TINY = dataclasses.replace(
+    find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1, least_seconds=0.01
+)
 
 
 def small_scene(name: str, *, cells: int = 6, frames: int = 10) -> BuiltScene:
@@ -47,7 +57,7 @@ def training(name: str, *motions: str, steps: int, key: str = "0", device: str =
     """The training of a network of the T-shirt."""
     return NetworkTraining(
         training=name, seed=0, garment="tshirt", steps=steps,
-        chosen=TRAININGS.get(name), motions=motions, device=device, inputs={"key": key}, software={},
+        chosen=TRAININGS.get(name), motions=motions, device=device, inputs={"key": key}, key=key,
         simulated={m: ("data", m) for m in motions if name in TRAININGS and TRAININGS[name].simulated},
     )  # fmt: skip
 
@@ -55,6 +65,41 @@ def training(name: str, *motions: str, steps: int, key: str = "0", device: str =
 def context(folder, assets: Assets | None = None, **fields) -> Context:
     """Return the context of a process in which a task runs."""
     return Context(RunFolder(folder), assets, **fields)
+
+
+def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
+    """A plan of these methods in one scene. how: what those do that are no simulation, see misbehaving."""
+    preset = changes.get("preset", TINY)
+    wrong = {
+        "module": "tests.benchmarks.runner.misbehaving", "options": {"how": how}, "batched": True,
+        "gives_first_frame": True,
+    }  # fmt: skip
+    declared = next(declared for declared in SCENES if declared.name == scene).at(preset)
+    entries = [
+        dataclasses.replace(find_method(name), **wrong if how and name != "simulation" else {})
+        for name in names
+    ]
+    values = {
+        "preset": preset, "suites": ("speed",), "cases": (), "seeds": (0,), "device": "cpu",
+        "cells": tuple(Cell(declared, entry, 0, ("speed",)) for entry in entries),
+        "folder": folder, "command": "",
+    }  # fmt: skip
+    return Plan(**(values | changes))
+
+
+def finish(plan: Plan, *stages: str, processes: bool = False) -> Runner:
+    """All tasks of these stages, run or reused: here, or in processes of their own."""
+    tasks = [task for task in tasks_of(plan) if task.stage in (stages or ("cells",))]
+    folder = RunFolder(plan.folder)
+    runner = Runner(tasks, Cache(folder, retry=plan.retry))
+    runner.run(Executor(folder, None, 1) if processes else InProcess(folder))
+    return runner
+
+
+def outcome_of(plan: Plan, number: int = 0, *, processes: bool = False) -> Outcome:
+    """Run one cell to the end of its process and return its outcome."""
+    one = dataclasses.replace(plan, cells=plan.cells[number : number + 1])
+    return finish(one, processes=processes).outcomes["cell", plan.cells[number].name]
 
 
 class Bar:
@@ -86,17 +131,10 @@ class InProcess:
                 yield task, self.outcome(task, context, needed)
 
     def outcome(self, task, context, needed):
-        clock = time.perf_counter()
         try:
-            outcome = task.run(context, needed)
+            return dataclasses.replace(task.run(context, needed), seconds=0.01)
         except Exception as error:
-            outcome = failure(error)
-        return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
-
-    def begin(self, tasks):
-        for task, _ in tasks:
-            with suppress(Exception):
-                task.begin and task.begin(self._named.setdefault(task.process, self.context()))
+            return failure(error)
 
     def alone(self, task, needed):
         return self.outcome(task, self._named.setdefault(task.process, self.context()), needed)

@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
+import os
+import random
+import signal
 import socketserver
+import subprocess
 import sys
 import threading
+import time
+from contextlib import nullcontext, suppress
 
-import numpy as np
 import pytest
 
 from benchmarks import run
 from benchmarks.plan.make_plan import check_machines
 from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner import cluster as runner_side
 from benchmarks.runner import cluster as scheduler
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.task import RunRefused, RunStopped
 from snug.networks.tensor_file import read_tensors
 from tests.benchmarks.plan.planned import study_with
 from tests.benchmarks.runner.cluster_by_hand import (
+    Dask,
+    alive,
     cluster,
     files,
     finish,
+    lines,
+    start_runner,
     together,
+    until,
     write,
 )
 
 distributed = pytest.importorskip("distributed")
+KILLS = int(os.environ.get("KILLS", "20"))  # of the processes here, and as many of the cluster
 
 
 @pytest.fixture(scope="module")
@@ -37,16 +47,21 @@ def two(tmp_path_factory):
         yield started
 
 
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory) -> dict[str, str]:
+    """The files of all tasks, done by processes here."""
+    folder = tmp_path_factory.mktemp("expected")
+    finish(folder)
+    return files(folder)
+
+
 # --- what comes back ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
-def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path):
-    here = tmp_path / "here"
-    here.mkdir()
-    finish(here)
+def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, expected):
     runner = finish(folder.path, two.address)
-    assert len(files(here)) == 12 and files(folder.path) == files(here)
+    assert len(expected) == 12 and files(folder.path) == expected
     origins = [outcome.origin for outcome in runner.outcomes.values()]
     assert {o["commit"] for o in origins} == {"c"} and "h" not in {o["hardware"] for o in origins}
     assert len(finish(folder.path, two.address).reused) == 12
@@ -54,22 +69,13 @@ def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, tmp_path
 
 @pytest.mark.slow
 def test_failures_are_values_and_a_batch_stays_together(two, folder):
-    large = 2_000_005  # numbers
-    batch = [write("one"), write("bad", how="raise"), write("large", count=large)]
-    others = [[write(name)] for name in "abc"]  # two of these in one process
-    # Nothing beside the batch: a worker that is given another task between two of the batch forgets it.
-    outcomes = together(folder, two.address, batch)
-    outcomes |= together(folder, two.address, *others)
+    outcomes = together(folder, two.address, [write("one"), write("bad", how="raise"), write("other")])
+    outcomes |= together(folder, two.address, *([write(name)] for name in "abc"))  # two in one process
     outcomes |= together(folder, two.address, [write("dies", how="die")])
-    assert outcomes["large"].result["memo"] == ["one", "large"]
+    assert outcomes["other"].result["memo"] == ["one", "other"]
     assert all(outcomes[name].result["memo"] == [name] for name in "abc")
     assert outcomes["bad"].reason == "ValueError: broken on purpose"
     assert outcomes["dies"].status == "out-of-memory" and "SIGKILL" in outcomes["dies"].reason
-    expected = np.random.default_rng(0).random(large)
-    np.testing.assert_array_equal(np.load(folder.path / "numbers" / "large.npy"), expected)
-    task = write("from large", needs=(("numbers", "large"),), count=large)
-    together(folder, two.address, [task], needed={("numbers", "large"): outcomes["large"]})
-    np.testing.assert_array_equal(np.load(folder.path / "numbers" / "from large.npy"), 2.0 * expected)
 
 
 @pytest.mark.slow
@@ -78,21 +84,20 @@ def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
     monkeypatch.setattr(execution, "make_report", lambda log: "")
     options = ["smoke:garments", "--set", "split=validation"]
     options += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
-    here, cluster_folder = RunFolder(tmp_path / "here"), RunFolder(tmp_path / "there")
-    assert run.main([*options, "-o", str(here.path)]) == 0
+
+    def kept(name: str, *more: str) -> tuple[dict, dict]:
+        """Run; return all numbers but costs, and the weights of the network."""
+        folder = RunFolder(tmp_path / name)
+        assert run.main([*options, "-o", str(folder.path), *more]) == 0
+        rows = [row for row in folder.read_rows() if not row.metric.startswith("cost/")]
+        weights = read_tensors(folder.models / "supervised-seed0.safetensors")[0]
+        return (
+            {(row.scene, row.method, row.metric): (row.value, row.uncertainty, row.status) for row in rows},
+            {name: tensor.numpy().tobytes() for name, tensor in weights.items()},
+        )
+
     with cluster(tmp_path, 2) as started:
-        assert run.main([*options, "-o", str(cluster_folder.path), "--scheduler", started.address]) == 0
-    assert kept(here) == kept(cluster_folder)
-
-
-def kept(folder: RunFolder) -> tuple[dict, dict]:
-    """All numbers but costs, and the weights of the network."""
-    rows = [row for row in folder.read_rows() if not row.metric.startswith("cost/")]
-    weights = read_tensors(folder.models / "supervised-seed0.safetensors")[0]
-    return (
-        {(row.scene, row.method, row.metric): (row.value, row.uncertainty, row.status) for row in rows},
-        {name: tensor.numpy().tobytes() for name, tensor in weights.items()},
-    )
+        assert kept("there", "--scheduler", started.address) == kept("here")
 
 
 # --- what is refused ---------------------------------------------------------------------------------------
@@ -100,40 +105,22 @@ def kept(folder: RunFolder) -> tuple[dict, dict]:
 
 @pytest.mark.slow
 def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_line(two, folder, monkeypatch):
-    software_of = runner_side.software_of
-    other = {"package numpy": "numpy 1.0", "benchmarks/runner/executor.py": "0"}
+    software_of = scheduler.software_of
     with monkeypatch.context() as patch:
-        patch.setattr(runner_side, "software_of", lambda task: software_of(task) | other)
-        with pytest.raises(RunStopped, match="install the same there as here") as stopped:
+        patch.setattr(scheduler, "software_of", lambda task: software_of(task) | {"package numpy": "1.0"})
+        other = r"^worker tcp:.*\(package numpy\); install the same there as here"
+        with pytest.raises(RunStopped, match=other):
             together(folder, two.address, [write("one")])
-    assert str(stopped.value).startswith("worker tcp:") and "benchmarks/runner/executor.py" in str(
-        stopped.value
-    )
-    assert "package numpy: numpy 2" in str(stopped.value) and "numpy 1.0 here" in str(stopped.value)
-    do = runner_side.Cluster.do
+    do = scheduler.Cluster.do
 
     def without_folder(self, *arguments):
         self.assets.unlink()
         return do(self, *arguments)
 
-    monkeypatch.setattr(runner_side.Cluster, "do", without_folder)
-    with pytest.raises(RunStopped, match=r"worker tcp:.*does not see the folder .*--out"):
+    monkeypatch.setattr(scheduler.Cluster, "do", without_folder)
+    with pytest.raises(RunStopped, match=r"worker tcp:.*does not see the run's folder .*--out"):
         together(folder, two.address, [write("one")])
     assert list(folder.path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_what_comes_damaged_is_not_kept(two, folder, monkeypatch):
-    take = distributed.Future.result
-
-    def damaged(self):
-        answer = take(self)
-        (folder.path / "numbers" / "one.npy").write_bytes(b"damaged")
-        return answer
-
-    monkeypatch.setattr(distributed.Future, "result", damaged)
-    with pytest.raises(RunStopped, match=r"one\.npy is damaged, seen from here"):
-        together(folder, two.address, [write("one")])
 
 
 @pytest.mark.parametrize(
@@ -190,3 +177,90 @@ def test_what_a_cluster_cannot_do_is_refused(field, value, tmp_path, monkeypatch
     monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
     with pytest.raises(StudyError, match=f"--{field}.*leave out --scheduler"):
         check_machines(study_with(**{field: value}), tmp_path, "tcp://127.0.0.1:1")
+
+
+# --- kills -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nanny", [False, True])
+def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path, nanny):
+    with cluster(tmp_path, 0 if nanny else 4) as dask_cluster:
+        if nanny:  # which starts a worker again
+            dask_cluster.add("--nanny")
+        batch = [write("deadly", how="die with the worker"), write("after")]
+        outcomes = together(folder, dask_cluster.address, batch, [write("beside")])
+    assert outcomes["deadly"].failed and "workers died while they did it" in outcomes["deadly"].reason
+    assert outcomes["after"].status == outcomes["beside"].status == "ok"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("killed", [False, True])
+def test_what_an_interrupted_or_killed_runner_had_begun_is_ended(folder, tmp_path, killed):
+    mark = tmp_path / "mark"
+    with cluster(tmp_path, 2) as two:
+        runner = start_runner(folder.path, two.address, seconds=60.0, mark=mark)
+        until(lambda: len(lines(mark)) == 2)
+        runner.send_signal(signal.SIGKILL if killed else signal.SIGINT)
+        runner.wait(30)
+        until(lambda: not any(alive(task) for _, task in lines(mark)), 10.0)
+        assert killed or not list(folder.path.rglob(".*"))
+        assert together(folder, two.address, [write("after")])["after"].status == "ok"
+
+
+@pytest.mark.slow
+def test_with_a_worker_killed_and_the_scheduler_restarted_the_files_are_the_same(folder, tmp_path, expected):
+    with cluster(tmp_path, 2) as two:
+        mark = tmp_path / "mark"
+        runner = start_runner(folder.path, two.address, seconds=1.0, mark=mark)
+        until(lambda: len(lines(mark)) >= 3)
+        os.kill(lines(mark)[-1][0], signal.SIGKILL)
+        two.add()
+        until(lambda: len(list(folder.path.rglob("*.json"))) >= 5)
+        two.restart_scheduler()
+        two.add()
+        two.add()
+        assert runner.wait(180) == 0
+    assert files(folder.path) == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 2])
+def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
+    """The runner, or a worker; here a task's process. What was finished is done no second time."""
+    chance, kills, mark = random.Random(7), 0, tmp_path / "mark"
+    with cluster(tmp_path, workers) if workers else nullcontext() as dask_cluster:
+        address = dask_cluster.address if dask_cluster else ""
+        while kills < KILLS:
+            runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
+            while kills < KILLS and runner.poll() is None:
+                begun = len(lines(mark))
+                until(lambda: len(lines(mark)) > begun or runner.poll() is not None)  # noqa: B023
+                time.sleep(chance.uniform(0.0, 0.6))
+                if runner.poll() is not None:
+                    break
+                kept = {path: path.read_bytes() for path in folder.path.glob("cache/**/*.json")}
+                kill_one(chance, dask_cluster, runner, lines(mark)[-1][1])
+                kills += 1
+                assert {path: path.read_bytes() for path in kept} == kept
+            runner.wait(120)
+            if files(folder.path) == expected:  # begin again: there are kills left
+                for path in folder.path.rglob("*.json"):
+                    path.unlink()
+        finish(folder.path, address)
+    assert files(folder.path) == expected
+    until(lambda: not any(alive(task) for _, task in lines(mark)), 15.0)
+
+
+def kill_one(chance: random.Random, dask_cluster: Dask | None, runner: subprocess.Popen, task: int) -> None:
+    if chance.random() < 0.5:
+        runner.kill()
+        runner.wait()
+    elif dask_cluster is None:
+        with suppress(ProcessLookupError):  # it has just ended with the chain
+            os.kill(task, signal.SIGKILL)
+    else:
+        victim = dask_cluster.workers.pop(chance.randrange(len(dask_cluster.workers)))
+        victim.kill()
+        victim.wait()
+        dask_cluster.add()

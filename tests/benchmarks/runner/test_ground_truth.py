@@ -26,8 +26,14 @@ from snug.motion.library import TRAIN
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import DEFAULT
 from snug.training.augmentation import CLIP_FRAMES, augment, make_shared_clips
-from tests.benchmarks.runner.tasks_by_hand import InProcess, assets_of, context, dressed_scene, training
-from tests.benchmarks.runner.test_cell_tasks import plan_of
+from tests.benchmarks.runner.tasks_by_hand import (
+    InProcess,
+    assets_of,
+    context,
+    dressed_scene,
+    plan_of,
+    training,
+)
 from tests.snug.training.dressing import swaying, tube_dress
 
 MOTION = swaying(90)

@@ -14,7 +14,7 @@ from reports.finished_run import make_run
 from reports.pdf import lay_out_table
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.tables import make_tables, table
-from tests.benchmarks.runner.test_cell_tasks import plan_of
+from tests.benchmarks.runner.tasks_by_hand import plan_of
 from tests.reports.report_folder import SCENES, row, run_of
 
 

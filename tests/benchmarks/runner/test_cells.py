@@ -1,0 +1,267 @@
+"""Cells: what goes wrong is an outcome, what is finished is reused, and repeats take turns."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks.methods.outside import program
+from benchmarks.plan.cell import Cell
+from benchmarks.plan.plan import Plan
+from benchmarks.results.row import Row
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.execute_plan import describe
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import clock_costs, rows_of
+from benchmarks.runner.schedule import tasks_of
+from benchmarks.runner.task import Outcome
+from benchmarks.scenes import find_scene
+from tests.benchmarks.runner.misbehaving import HANGING_CHILD
+from tests.benchmarks.runner.tasks_by_hand import TINY, InProcess, finish, outcome_of, plan_of
+
+
+def why(plan: Plan, kind: str = "cell", number: int = 0) -> str:
+    """Return why a cell, or what follows it, has to be run; "finished" where it has not."""
+    runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), retry=plan.retry))
+    found = {task.id: found for task, found in runner.preview()}[kind, plan.cells[number].name]
+    return found.why or "finished"
+
+
+def rows(runner: Runner, plan: Plan) -> dict[str, Row]:
+    """Return metric -> row."""
+    return {row.metric: row for row in rows_of(plan, runner.tasks, runner.outcomes)}
+
+
+# --- what goes wrong ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("how", "status", "word"),
+    [
+        ("raise", "failed", "RuntimeError: broken on purpose"),
+        ("segfault", "failed", "SIGSEGV"),
+        ("killed", "out-of-memory", "SIGKILL"),
+        ("hungry", "out-of-memory", "no room"),
+        ("early", "failed", "its time cannot be believed"),
+        ("unheld", "failed", "OSError: no room left"),
+        ("late", "failed", "run() gives positions float64 (5, 16, 3): floats (4, 16, 3) are due"),
+        ("narrow", "failed", "run() gives positions float64 (4, 15, 3): floats (4, 16, 3) are due"),
+        ("astray", "failed", "quasi_static() gives positions float64 (4, 2, 3)"),
+        pytest.param("hang", "timeout", "no answer within 4 s", marks=pytest.mark.slow),
+    ],
+)
+def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path):
+    plan = plan_of(tmp_path, "newton-1", how=how)
+    if how == "hang":
+        plan = dataclasses.replace(plan, preset=dataclasses.replace(TINY, cell_seconds=4.0))
+    runner = finish(plan, "cells", "metrics", processes=True)  # other threads of the tests falsify its times
+    outcome = runner.outcomes["cell", plan.cells[0].name]
+    assert outcome.status == status and word in outcome.reason and outcome.failed and not outcome.files
+    (row,) = rows(runner, plan).values()
+    assert (row.status, row.value) == (status, None) and not list(tmp_path.rglob("*.vtkhdf"))
+    assert why(plan) == outcome.ending
+    deadline = time.monotonic() + 5.0  # what was killed with the process may take a moment to go
+    while of_session(os.getsid(0), HANGING_CHILD):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def of_session(session: int, word: str = "") -> list[int]:
+    """Processes of a session that have this word in their command line and are no zombies."""
+    processes = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, _, its_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
+            line = (path / "cmdline").read_text()
+        except OSError:
+            continue  # it has just ended
+        if int(its_session) == session and state != "Z" and word in line:
+            processes.append(int(path.name))
+    return processes
+
+
+LEAVING = """
+import subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+open(sys.argv[3], "w").write(str(child.pid))
+time.sleep(60)
+"""
+LOOKING = """
+import pathlib, sys
+stat = pathlib.Path("/proc", open(sys.argv[3]).read(), "stat")
+sys.exit("it runs on" if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] != "Z" else "gone")
+"""
+
+
+@pytest.mark.slow
+def test_what_a_program_has_started_ends_with_it_before_the_next_cell(tmp_path):
+    cells = []
+    for name, text, seconds in (("leaving", LEAVING, 3.0), ("looking", LOOKING, 60.0)):
+        script = tmp_path / f"{name}.py"
+        script.write_text(text)
+        command = f"{sys.executable} -I {script} {{scene}} {{out}} {tmp_path / 'pid'}"
+        cells.append(Cell(find_scene("free_fall").at(TINY), program(name, command, seconds=seconds), 0, ()))
+    plan = plan_of(tmp_path / "run", cells=tuple(cells))
+    runner = finish(plan, "cells that are not timed", processes=True)
+    first, second = (runner.outcomes["cell", cell.name] for cell in cells)
+    assert first.status == "timeout" and second.reason.endswith("gone")
+
+
+@pytest.mark.slow
+def test_memory_is_that_of_the_run_alone_and_many_at_once_are_watched_too(tmp_path):
+    plan = plan_of(tmp_path / "greedy", "newton-1", how="greedy")
+    runner = finish(plan, processes=True)
+    name = plan.cells[0].name
+    greedy = runner.outcomes["cell", name]
+    assert greedy.status == "ok" and greedy.result["peak"] < 300.0
+    assert runner.outcomes["batch", name].result["seconds"] > 0.0
+    plan = plan_of(tmp_path / "crowded", "newton-1", how="crowded")
+    (row,) = rows(finish(plan, "cells", "metrics"), plan).values()
+    assert row.status == "failed" and "many at once" in row.reason and row.value is None
+    assert "cannot be believed" in row.reason
+
+
+@pytest.mark.parametrize(
+    ("how", "fragments"), [("crammed", ("out-of-memory", "SIGKILL")), ("torn", ("failed", "no two bodies"))]
+)
+def test_what_a_cell_has_run_stands_where_many_go_wrong(how, fragments, tmp_path):
+    plan = plan_of(tmp_path, "newton-1", how=how)
+    runner = finish(plan, "cells", "metrics", processes=how == "crammed")
+    outcome = runner.outcomes["cell", plan.cells[0].name]
+    assert (outcome.status, outcome.failed) == ("ok", False)
+    first = rows(runner, plan)
+    assert first["cost/frame"].status == "ok" and "cost/batch" not in first
+    reason = first["cost/frame"].reason
+    assert f"many at once: {fragments[0]}" in reason and fragments[1] in reason
+    assert RunFolder(tmp_path).trajectory_path("free_fall", "newton-1").is_file()
+    again = finish(plan, "cells", "metrics")
+    assert rows(again, plan).keys() == first.keys()
+    assert again.outcomes["cell", plan.cells[0].name].result == outcome.result
+
+
+# --- what a cell says of itself, and what is kept ----------------------------------------------------------
+
+
+def test_a_cell_says_how_long_it_took_and_how_much_memory(tmp_path):
+    plan = plan_of(tmp_path, "simulation", scene="hanging_sheet")
+    outcome = outcome_of(plan, processes=True)
+    result = outcome.result
+    assert (outcome.status, len(outcome.files), result["frames"]) == ("ok", 1, 3)
+    assert 0.0 < result["seconds"] < 10.0 and 50.0 < result["peak"] < 1000.0
+    assert result["terms"] == "strain+bending+gravity+inertia"
+    costs, remark = clock_costs(plan.cells[0], 1, {("cell", plan.cells[0].name): outcome})
+    frames = {"cost/frame_p50", "cost/frame_p95", "cost/frame_worst"}
+    assert set(costs) == {"cost/frame", "cost/whole", "cost/peak"} | frames and remark == ""
+    assert costs["cost/frame"] == costs["cost/whole"] == pytest.approx(1e3 * result["seconds"] / 3)
+    assert costs["cost/frame_p50"] <= costs["cost/frame_p95"] <= costs["cost/frame_worst"]
+    assert result["runs"] > 1 or result["seconds"] > TINY.least_seconds
+
+
+def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path):
+    plan = plan_of(tmp_path, "simulation")
+    first, again = outcome_of(plan), finish(plan)
+    assert again.outcomes["cell", plan.cells[0].name] == first
+    assert again.reused == [f"cell {plan.cells[0].label}"] and why(plan) == "finished"
+    finer = plan_of(tmp_path, "simulation", preset=dataclasses.replace(TINY, sheet_cells=4))
+    assert why(finer) == "stale: scene"
+    others = dataclasses.replace(TINY, garment_vertices=99, gap_samples=9)
+    assert why(plan_of(tmp_path, "simulation", preset=others)) == "finished"
+    RunFolder(tmp_path).trajectory_path("free_fall", "simulation").unlink()
+    assert why(plan) == "missing: trajectories/free_fall/simulation.vtkhdf is gone"
+
+
+def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path):
+    plan = plan_of(tmp_path, "simulation", "newton-1", "newton-4")
+    folder = RunFolder(tmp_path)
+
+    def measured_after(number: int) -> list[str]:
+        """Return the methods whose metrics are still up to date once a cell has run again."""
+        finish(plan, "cells", "metrics")
+        folder.trajectory_path("free_fall", plan.cells[number].method).unlink(missing_ok=True)
+        folder.quasi_static_path("free_fall", plan.cells[number].method).touch()
+        outcome_of(plan, number)
+        assert not folder.quasi_static_path("free_fall", plan.cells[number].method).exists()
+        return [c.method for k, c in enumerate(plan.cells) if why(plan, "metrics", k) == "finished"]
+
+    assert measured_after(1) == ["simulation", "newton-4"]
+    assert measured_after(0) == []  # the others are compared with it
+    outcome_of(plan_of(tmp_path, "simulation", "newton-1", how="raise"), 1)
+    assert not folder.trajectory_path("free_fall", "newton-1").exists()
+
+
+def test_a_dry_run_tells_what_is_there(tmp_path):
+    plan = plan_of(tmp_path / "run", "simulation", "newton-1", "skinning")
+    assert "4 tasks to run; 0 cached" in describe(plan) and not plan.folder.exists()
+    outcome_of(plan)
+    description = describe(plan)
+    for line in (
+        "cell free_fall x simulation: cached\n", "metrics free_fall x simulation: run (missing)",
+        "cell free_fall x newton-1: run (missing)", "cell free_fall x skinning: skip (",
+        "3 tasks to run; 1 cached",
+    ):  # fmt: skip
+        assert line in description
+    longer = dataclasses.replace(TINY, sheet_frames=5)
+    stale = describe(plan_of(plan.folder, "simulation", "newton-1", preset=longer))
+    assert "cell free_fall x simulation: run (stale: scene)" in stale
+    assert "4 tasks to run" in describe(dataclasses.replace(plan, fresh=True))
+
+
+# --- repeats -----------------------------------------------------------------------------------------------
+
+
+def watch(monkeypatch, calls: list, *names: str) -> None:
+    """Write down what is asked of the executor: the name, and the task or process."""
+    for name in names:
+        inner = getattr(InProcess, name)
+
+        def watched(self, first, *rest, name=name, inner=inner):
+            calls.append((name, first))
+            return inner(self, first, *rest)
+
+        monkeypatch.setattr(InProcess, name, watched)
+
+
+def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
+    preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
+    plan = plan_of(tmp_path, "simulation", "newton-1", "newton-4", preset=preset, how="still")
+    calls: list = []
+    watch(monkeypatch, calls, "alone")
+    runner = finish(plan)
+    repeats = [task.label.split(" x ")[1] for _, task in calls if task.kind == "repeat"]
+    assert repeats == ["newton-1", "newton-4", "simulation", "newton-4", "simulation", "newton-1"]
+    cell = plan.cells[0]
+    ids = [cell.task_id, cell.repeat_id(1), cell.repeat_id(2)]
+    seconds = [runner.outcomes[id].result["seconds"] for id in ids]
+    costs, _ = clock_costs(cell, 3, runner.outcomes)
+    assert costs["cost/frame"] == pytest.approx(1e3 * sorted(seconds)[1] / 3)
+    assert costs["cost/spread"] > 0.0
+    calls.clear()
+    again = finish(plan)
+    assert calls == [] and clock_costs(cell, 3, again.outcomes)[0] == costs
+
+
+def test_a_process_ends_when_none_of_its_cells_repeats_will_come(tmp_path, monkeypatch):
+    preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=0.0)
+    plan = plan_of(tmp_path, "simulation", "newton-1", preset=preset)
+    calls: list = []
+    watch(monkeypatch, calls, "alone", "release")
+    finish(plan)
+    one, other = (cell.name for cell in plan.cells)
+    order = [(name, getattr(first, "process", first)) for name, first in calls[:4]]
+    assert order == [("alone", one), ("release", one), ("alone", other), ("release", other)]
+
+
+def test_a_repeat_that_fails_is_said_on_the_rows(tmp_path):
+    plan = plan_of(tmp_path, "newton-1", preset=dataclasses.replace(TINY, repeats=2, repeat_seconds=60.0))
+    runner = finish(plan, "cells", "metrics")
+    crowd = Outcome("failed", "more than one thread", result={"seconds": 0.1})
+    runner.outcomes[plan.cells[0].repeat_id(1)] = crowd
+    table = rows(runner, plan)
+    assert {row.reason for row in table.values()} == {"repeat 1: failed: more than one thread"}
+    assert {row.status for row in table.values()} == {"ok"} and "cost/spread" not in table

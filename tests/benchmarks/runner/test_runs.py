@@ -1,0 +1,323 @@
+"""A run's folder: one run at a time, whole after an interrupt or a kill; and cases, each once."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks import run
+from benchmarks.methods import find_method
+from benchmarks.plan.cell import Cell
+from benchmarks.plan.motions import Motions
+from benchmarks.plan.plan import Network
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner import execute_plan as execution
+from benchmarks.runner.cache import Cache, dependencies
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.rows import rows_of
+from benchmarks.runner.run_json import RunLog
+from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.runner.task import Outcome
+from benchmarks.scenes import of_garment
+from benchmarks.validation.case import Case
+from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS
+from tests.benchmarks.runner.tasks_by_hand import TINY, InProcess, finish, plan_of, run_in_this_process
+from tests.benchmarks.runner.test_cells import of_session
+from tests.benchmarks.runner.test_tasks import task
+
+ROOT = Path(__file__).resolve().parents[3]
+WORDS = ["smoke:speed", "--scenes", "free_fall"]
+
+
+@pytest.fixture(autouse=True)
+def without_report(monkeypatch):
+    monkeypatch.setattr(execution, "make_report", lambda log: "")
+    run_in_this_process(monkeypatch)
+
+
+def words_of(folder: Path, methods: str) -> list[str]:
+    return [*WORDS, "-o", str(folder), "--methods", methods]
+
+
+def start(program: list[str]) -> subprocess.Popen:
+    """Start Python in a session of its own."""
+    return subprocess.Popen(
+        [sys.executable, *program], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}, start_new_session=True,
+    )  # fmt: skip
+
+
+def kill(process: subprocess.Popen) -> None:
+    """Kill a process and wait until all that it has started has ended, too."""
+    process.kill()
+    process.communicate()
+    deadline = time.monotonic() + 60
+    while of_session(process.pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+# --- one run at a time -------------------------------------------------------------------------------------
+
+
+def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    options, answers = words_of(tmp_path / "run", "simulation"), []
+
+    def execute(plan, assets, *, report):
+        if not answers:
+            answers.append(None)
+            answers.append(run.main(options))
+        return 0
+
+    monkeypatch.setattr(execution, "execute", execute)
+    assert run.main(options) == 0 and answers == [None, 2]
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "another run" in error and str(tmp_path / "run") in error
+    assert run.main(options) == 0  # the first has ended
+    assert not (tmp_path / "run").exists()  # nothing was written there
+
+
+def test_a_folder_of_an_earlier_version_is_refused_in_one_line(tmp_path, refused):
+    (tmp_path / "run.json").write_text('{"command": "python -m benchmarks.run", "finished": null}')
+    assert "new folder" in refused("earlier version", run.main, words_of(tmp_path, "simulation"))
+
+
+def test_what_a_killed_run_was_writing_is_removed_and_a_fresh_one_goes_on_from_no_training(tmp_path):
+    scene, models = tmp_path / "trajectories" / "free_fall", tmp_path / "models" / "tunic"
+    for folder in (scene, models):
+        folder.mkdir(parents=True)
+    for name in ("simulation.vtkhdf", "newton-1.vtkhdf.part", ".body.77.part.npy"):
+        (scene / name).write_bytes(b"half")
+    stopped = models / ".snug-seed0.checkpoint.safetensors"
+    stopped.write_bytes(b"half")
+    plan = plan_of(tmp_path)
+    RunLog(plan)
+    assert [path.name for path in scene.iterdir()] == ["simulation.vtkhdf"] and stopped.is_file()
+    RunLog(dataclasses.replace(plan, fresh=True))
+    assert not stopped.exists()
+
+
+# --- interrupts and kills ----------------------------------------------------------------------------------
+
+
+def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path, monkeypatch, capsys):
+    options = words_of(tmp_path, "simulation,newton-4")
+    assert run.main(options) == 0
+    before = RunFolder(tmp_path).read_rows()
+    (tmp_path / "cache" / "metrics" / "free_fall" / "newton-4.json").unlink()
+    alone = InProcess.alone
+
+    def interrupted(self, task, needed):
+        if " x newton-1" in task.label:
+            raise KeyboardInterrupt
+        return alone(self, task, needed)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(InProcess, "alone", interrupted)
+        assert run.main(words_of(tmp_path, "simulation,newton-1,newton-4")) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert RunFolder(tmp_path).read_config()["interrupted"] is True
+    assert not [path for path in tmp_path.rglob("*") if ".part" in path.name]
+    assert RunFolder(tmp_path).read_rows() == [row for row in before if row.method == "simulation"]
+    assert run.main(options) == 0 and RunFolder(tmp_path).read_rows() == before
+
+    def interrupt(self, executor, log):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Runner, "run", interrupt)  # before anything is known
+    assert run.main([*options, "--fresh"]) == 130
+    assert before and RunFolder(tmp_path).read_rows() == before
+
+
+def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
+    scene = of_garment("tshirt").scene("kick").at(TINY)
+    cell = Cell(scene, find_method("supervised"), 0, ("garments",))
+    motions = Motions(train=("walk", "run"), test=("kick",))
+    plan = plan_of(tmp_path, motions=motions, cells=(cell,))
+    cache, entries = Cache(RunFolder(tmp_path)), {}
+    by_id = {t.id: t for t in tasks_of(plan)}
+    lost = Outcome("diverged", "far away", failed=True)
+    killed = Outcome("failed", "killed", failed=True)
+    network = Schedule(plan).network(Network("supervised", 0, "tshirt")).id
+    for id, outcome in (
+        (("start", "tshirt-kick"), Outcome()), (("data", "tshirt-walk/simulation"), Outcome()),
+        (("data", "tshirt-run/simulation"), lost), (network, Outcome()), (("cell", cell.name), killed),
+    ):  # fmt: skip
+        entries[id] = cache.keep(by_id[id], outcome, entries)
+    runner = Runner(tasks_of(plan), Cache(RunFolder(tmp_path), retry=True))
+    (row,) = rows_of(plan, runner.tasks, runner.known())
+    assert (row.method, row.status, row.reason) == ("supervised", "failed", "killed")
+    assert runner.outcomes["data", "tshirt-run/simulation"].reason == "far away"
+
+
+def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", "raise")])
+    assert execution.execute(plan_of(tmp_path)) == 1
+    assert "network lame: failed: ValueError: broken on purpose" in capsys.readouterr().err
+
+
+HANGING = """
+import sys, time
+from pathlib import Path
+from benchmarks.runner.execute_plan import held
+from benchmarks.runner.isolated_process import IsolatedProcess
+with held(Path(sys.argv[1])):
+    process = IsolatedProcess()
+    process.call(print, "begun", seconds=60)
+    process.call(time.sleep, 60, seconds=60)
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_run_holds_its_folder_no_longer_and_its_processes_end(tmp_path, monkeypatch):
+    process = start(["-c", HANGING, str(tmp_path)])
+    assert process.stdout is not None and process.stdout.readline() == b"begun\n"
+    monkeypatch.setattr(execution, "execute", lambda plan, assets, **_: 0)
+    assert run.main(words_of(tmp_path, "simulation")) == 2
+    kill(process)
+    assert run.main(words_of(tmp_path, "simulation")) == 0
+
+
+@pytest.mark.slow
+def test_a_killed_run_loses_the_running_cell_alone(tmp_path):
+    out = tmp_path / "run"
+    options = words_of(out, "simulation,newton-1,newton-4")
+    process = start(["-m", "benchmarks.run", *options])
+    entry = out / "cache" / "cell" / "free_fall" / "simulation.json"
+    deadline = time.monotonic() + 60
+    while not entry.is_file():
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    kill(process)
+    before = entry.read_bytes()
+    assert run.main(options) == 0
+    assert entry.read_bytes() == before
+    first = RunFolder(out).read_rows()
+    assert {row.method for row in first} == {"simulation", "newton-1", "newton-4"}
+    assert run.main(options) == 0
+    assert RunFolder(out).read_rows() == first
+    config = RunFolder(out).read_config()
+    assert len(config["earlier"]) == 2 and config["clock"]["threads"] == 1
+    assert not [path for path in out.rglob("*") if "part" in path.name]
+
+
+# --- kept files --------------------------------------------------------------------------------------------
+
+
+WORN = "trajectories/tshirt-sudden_stop"
+DRESSED = ["smoke:garments", "--scenes", "tshirt/sudden_stop"]
+DRESSED += ["--methods", "simulation,skinning,supervised,snug"]
+
+
+def run_dressed(folder: Path) -> dict:
+    """Run the command into `folder` and return its rows without costs and measured times."""
+    assert run.main([*DRESSED, "-o", str(folder)]) == 0
+    rows = RunFolder(folder).read_rows()
+    kept = [row for row in rows if not row.metric.startswith("cost/") and row.unit not in ("s", "ms", "MB")]
+    return {(r.method, r.metric, r.seed): (r.value, r.status, r.reason, r.uncertainty) for r in kept}
+
+
+@pytest.fixture(scope="module")
+def dressed(tmp_path_factory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("dressed")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(execution, "make_report", lambda log: "")
+        return folder, run_dressed(folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        f"{WORN}/settled.npy", f"{WORN}/body.npy", f"{WORN}/body.vtkhdf", f"{WORN}/rest_areas.npy",
+        f"{WORN}/simulation.vtkhdf", f"{WORN}/quasi-static.vtkhdf", f"{WORN}/snug.npz",
+        f"{WORN}/snug-quasi-static.vtkhdf", "trajectories/tshirt-07_01/simulation.vtkhdf",
+        "models/supervised-seed0.safetensors",
+    ],
+)  # fmt: skip
+def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dressed, tmp_path, name):
+    folder = shutil.copytree(dressed[0], tmp_path / "run")
+    digests = RunFolder(folder).read_config()["digests"]
+    data = bytearray((folder / name).read_bytes())
+    data[len(data) // 2] ^= 16
+    (folder / name).write_bytes(data)
+    assert RunFolder(folder).changed({"digests": digests}) == [name]
+    assert run_dressed(folder) == dressed[1]
+    config = RunFolder(folder).read_config()
+    assert set(config["digests"]) == set(digests) and RunFolder(folder).changed(config) == []
+
+
+# --- cases -------------------------------------------------------------------------------------------------
+
+
+def warmth() -> float:
+    """Return how often the process was warmed up."""
+    return float(os.environ.get("WARM", "0"))
+
+
+def warm_up() -> None:
+    os.environ["WARM"] = str(warmth() + 1)
+
+
+def hang() -> None:
+    signal.pause()
+
+
+def wrong() -> None:
+    raise RuntimeError("lost")
+
+
+def case(function: str, seconds: float = 60.0, **declared) -> Case:
+    return Case(
+        name=function, suite="extremes", description="", module=__name__, function=function, seconds=seconds,
+        metric="outcome", **declared,
+    )  # fmt: skip
+
+
+def rows_of_cases(folder, *cases: Case, processes: bool = False):
+    plan = plan_of(folder, cases=cases)
+    runner = finish(plan, "validation", processes=processes)
+    return rows_of(plan, runner.tasks, runner.outcomes), runner
+
+
+def test_what_did_not_come_back_is_a_failed_row_and_the_next_case_is_run(tmp_path):
+    cases = case("hang", 0.5, expected=0.0), *(case(name) for name in ("warmth", "wrong", "absent"))
+    (hung, next_one, *others), _ = rows_of_cases(tmp_path, *cases, processes=True)
+    assert (hung.status, hung.value, hung.expected) == ("failed", None, 0.0)
+    assert "no answer within 0.5 s" in hung.reason
+    assert (next_one.status, next_one.value) == ("ok", 1.0)  # a new process is warmed up anew
+    assert [(row.status, row.value) for row in others] == [("failed", None)] * 2
+    for row, message in zip(others, ("RuntimeError: lost", "AttributeError"), strict=True):
+        assert message in row.reason
+
+
+def test_a_case_is_computed_once_and_again_when_it_declares_something_else(tmp_path):
+    known = next(c for c in KNOWN_ANSWERS if c.smoke and c.tolerance is not None)
+    first, runner = rows_of_cases(tmp_path, known)
+    assert runner.reused == []
+    again, runner = rows_of_cases(tmp_path, known)
+    assert again == first and runner.reused == [f"case {known.name}"]
+    off = dataclasses.replace(known, expected=(known.expected or 0.0) + 1e6, tolerance=1e-9)
+    (failed,), runner = rows_of_cases(tmp_path, off)
+    assert failed.status == "failed" and runner.reused == []
+    again, runner = rows_of_cases(tmp_path, off)
+    assert [(r.status, r.reason) for r in again] == [("failed", failed.reason)] and len(runner.reused) == 1
+    assert f"case {known.name}: cached (failed: " in execution.describe(plan_of(tmp_path, cases=(off,)))
+
+
+def test_every_case_has_an_identity_of_its_own_and_depends_on_no_report(tmp_path):
+    tasks = tasks_of(plan_of(tmp_path, cases=CASES))
+    assert len({task.id for task in tasks}) == len(tasks) == len(CASES)
+    (stress,) = tasks_of(plan_of(tmp_path, cases=STRESS_TESTS[:1]))
+    places = set(dependencies(stress))
+    assert {"benchmarks/validation", "reference_sim"} <= places
+    assert not any(place.startswith(("reports", "benchmarks/plan")) for place in places)

@@ -1,0 +1,289 @@
+"""Tasks and what may happen to them: fail, hang, be killed, be damaged; and what the next run does then."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.cache import Cache
+from benchmarks.runner.executor import Executor, TaskProcess
+from benchmarks.runner.isolated_process import LOADED_BY_ALL
+from benchmarks.runner.loop import Runner, _batches
+from benchmarks.runner.schedule import tasks_of
+from benchmarks.runner.task import Context, Outcome, RunStopped, Task, failure
+from tests.benchmarks.plan.planned import planned
+from tests.benchmarks.runner.tasks_by_hand import Bar, InProcess
+from tests.project.own_memory import needs_proc, own_memory
+
+HELD: list[bytearray] = []  # of a process
+
+
+def fail(how: str) -> None:
+    """Let the process that does a task go wrong."""
+    if how == "raise":
+        raise ValueError("broken on\npurpose")
+    if how == "die":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if how == "exit":
+        os._exit(7)
+    if how == "hang":
+        signal.pause()
+    if how == "interrupt":
+        raise KeyboardInterrupt
+    if how == "stop":
+        raise RunStopped("the disk is full")
+    if how == "fill":
+        pieces: list = [bytearray(50_000) for _ in range(3000)]  # each too small to be mapped by itself
+        HELD.append(bytearray(50_000))  # while it is there the heap does not shrink by itself
+        pieces.append(pieces)  # freed only by who looks for circles
+
+
+def write(name: str, how: str, context: Context, needed) -> Outcome:
+    """Write a file of the words of what is needed, unless `how` says what to do instead."""
+    fail(how)
+    context.tell(0.5)
+    context.memo.setdefault("done", []).append(name)
+    path = context.folder.path / f"{name}.txt"
+    path.write_text("".join(outcome.result["word"] for outcome in needed.values()) or "first")
+    result = {"word": name, "memo": list(context.memo["done"]), "kB": own_memory() if HELD else 0}
+    files = ("nowhere.txt",) if how == "nowhere" else (path.name,)
+    return Outcome(result=result | ({"x": np.float32(1)} if how == "float32" else {}), files=files)
+
+
+def no_room() -> None:
+    raise MemoryError("no room to compile")
+
+
+def task(name: str, how: str = "", **ties) -> Task:
+    """A task, by default without a row; how: what goes wrong, which is no part of what it is known by."""
+    return Task(
+        kind="network", name=name, label=name, stage="writing", run=partial(write, name, how), silent=True,
+        inputs={"value": 0}, code=("benchmarks/results",), warm_up=no_room if how == "cold" else None,
+        deadline=0.5 if how == "hang" else None, **ties,
+    )  # fmt: skip
+
+
+def ids(*names: str) -> tuple[tuple[str, str], ...]:
+    return tuple(("network", name) for name in names)
+
+
+def finish(folder: Path, *tasks: Task, **options) -> Runner:
+    runner = Runner(tasks, Cache(RunFolder(folder), **options))
+    runner.run(Executor(RunFolder(folder), None, 1))
+    return runner
+
+
+def statuses(runner: Runner) -> dict[str, str]:
+    return {name: outcome.status for (_, name), outcome in runner.outcomes.items()}
+
+
+# --- events ------------------------------------------------------------------------------------------------
+
+EVENTS = [
+    ("raise", "failed", "ValueError: broken on purpose"),
+    ("die", "out-of-memory", "SIGKILL: the system was out of memory"),
+    ("exit", "failed", "the process ended with status 7"),
+    ("hang", "timeout", "no answer within 0.5 s"),
+    ("interrupt", "failed", "KeyboardInterrupt"),
+    ("cold", "out-of-memory", "MemoryError: no room to compile"),
+    ("float32", "failed", "float32"),
+    ("nowhere", "failed", "nowhere.txt"),
+]
+
+
+@pytest.mark.parametrize("process", ["", "its own"])
+@pytest.mark.parametrize(("how", "status", "words"), EVENTS)
+def test_a_failure_is_kept_blocks_what_needs_it_and_is_done_again_when_asked(
+    how, status, words, process, tmp_path
+):
+    def tasks(how: str = "") -> list[Task]:
+        return [
+            task("bad", how, process=process), task("needs", needs=ids("bad"), process=process),
+            task("reads", reads=ids("bad")), task("other", process=process),
+        ]  # fmt: skip
+
+    first = finish(tmp_path, *tasks(how))
+    assert statuses(first) == {"bad": status, "needs": "failed", "reads": "ok", "other": "ok"}
+    bad, needs = (first.outcomes["network", name] for name in ("bad", "needs"))
+    assert bad.failed and words in bad.reason and "\n" not in bad.reason
+    assert needs.reason == f"cannot be run: network bad: {status}: {bad.reason}"
+    assert (tmp_path / "reads.txt").read_text() == "first"
+    assert dict(first.broken()) == {"network bad": bad.ending, "network needs": needs.ending}
+
+    second = finish(tmp_path, *tasks())  # it would succeed now
+    assert statuses(second) == statuses(first)
+    assert sorted(second.reused) == ["network bad", "network other", "network reads"]
+
+    third = finish(tmp_path, *tasks(), retry=True)
+    assert set(statuses(third).values()) == {"ok"} and third.reused == ["network other"]
+    assert (tmp_path / "needs.txt").read_text() == (tmp_path / "reads.txt").read_text() == "bad"
+
+
+def test_torch_says_in_a_plain_error_that_there_is_no_room():
+    message = "[enforce fail at alloc_cpu.cpp:117] err == 0. DefaultCPUAllocator: can't allocate memory"
+    assert failure(RuntimeError(message)).status == "out-of-memory"
+    assert failure(RuntimeError("no such memory")).status == "failed"
+
+
+def test_a_dry_run_decides_as_the_run_does(tmp_path):
+    """A dry run foresees every decision of the run except those that follow from a failure."""
+
+    def planned_and_done(how: str, **options) -> tuple[set[str], set[str]]:
+        tasks = (
+            task("first", how), task("second", needs=ids("first")), task("third", reads=ids("first")),
+            task("fourth"),
+        )  # fmt: skip
+        preview = Runner(tasks, Cache(RunFolder(tmp_path), **options)).preview()
+        planned = {task.name for task, found in preview if found.outcome is None}
+        runner = finish(tmp_path, *tasks, **options)
+        return planned, {id[1] for id in runner.cached} - {title.split()[1] for title in runner.reused}
+
+    everything = {"first", "second", "third", "fourth"}
+    assert planned_and_done("raise") == (everything, everything - {"second"})
+    assert planned_and_done("raise") == (set(), set())
+    (tmp_path / "fourth.txt").unlink()
+    assert planned_and_done("raise") == ({"fourth"}, {"fourth"})
+    assert planned_and_done("", retry=True) == (everything - {"fourth"},) * 2
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "why"),
+    [
+        ("first.txt", "damaged", "missing: first.txt is damaged"),
+        ("first.txt", None, "missing: first.txt is gone"),
+        ("cache/network/first.json", "{", "missing: its entry is damaged or of another version"),
+        ("cache/network/first.json", '{"format": 1}', "missing: its entry is damaged or of another version"),
+    ],
+)
+def test_what_is_damaged_is_done_again_alone_where_it_comes_back_as_it_was(tmp_path, name, text, why):
+    tasks = task("first"), task("second", needs=ids("first")), task("third")
+    finish(tmp_path, *tasks)
+    assert len(finish(tmp_path, *tasks).reused) == 3
+    (tmp_path / name).unlink() if text is None else (tmp_path / name).write_text(text)
+    assert Cache(RunFolder(tmp_path)).find(tasks[0], {}).why == why
+    runner = finish(tmp_path, *tasks)
+    assert (tmp_path / "first.txt").read_text() == "first"
+    assert sorted(runner.reused) == ["network second", "network third"]
+
+
+# --- order -------------------------------------------------------------------------------------------------
+
+
+class TwoAtOnce(InProcess):
+    """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
+
+    side_by_side = 2
+
+    def __init__(self, folder: RunFolder) -> None:
+        super().__init__(folder)
+        self.at_work: list[list[str]] = []
+
+    def together(self, ready, bar):
+        begun = []
+        while True:
+            while len(begun) < 2 and (batch := ready()):
+                begun.append(batch)
+            if not begun:
+                return
+            self.at_work.append([task.name for tasks, _ in begun for task in tasks])
+            tasks, needed = begun.pop(0)
+            for task in tasks:
+                yield task, task.run(self.context(), needed)
+
+    def alone(self, task, needed):
+        self.at_work.append([task.name])
+        return super().alone(task, needed)
+
+
+def test_a_task_begins_when_its_needs_are_there_and_nothing_is_beside_a_timed_task(tmp_path):
+    tasks = (
+        task("short"), task("long", seconds=5.0), task("next", needs=ids("short", "long")),
+        task("timed", needs=ids("next"), process="own"),
+        task("after", needs=ids("timed")), task("one", needs=ids("short"), batch="both"),
+        task("two", needs=ids("long"), batch="both"), task("three", needs=ids("next")),
+    )  # fmt: skip
+    folder = RunFolder(tmp_path)
+    runner, executor = Runner(tasks, Cache(folder)), TwoAtOnce(folder)
+    runner.run(executor)
+    assert executor.at_work == [
+        ["long", "short"], ["short"], ["one", "two", "next"], ["next"], ["three"], ["timed"], ["after"],
+    ]  # fmt: skip
+    assert set(statuses(runner).values()) == {"ok"}
+
+
+def test_the_longest_training_begins_first(tmp_path):
+    plan = planned("full:garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path))
+    trainings = [task for task in tasks_of(plan) if task.kind == "network"]
+    names = [batch[0].label.split()[0] for batch in _batches(trainings)]
+    assert names == ["ncs", "snug", "pbns", "handles-20"]
+
+
+# --- processes ---------------------------------------------------------------------------------------------
+
+
+def together(folder: Path, *batches: list[Task]) -> tuple[dict[str, Outcome], Bar]:
+    left, bar = [(batch, {}) for batch in reversed(batches)], Bar()
+    done = Executor(RunFolder(folder), None, 1).together(lambda: left.pop() if left else None, bar)
+    return {task.name: outcome for task, outcome in done}, bar
+
+
+def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
+    batch = [task("one"), task("two"), task("bad", "raise"), task("four")]
+    outcomes, bar = together(tmp_path, batch, [task("three")])
+    memos = {name: outcome.result.get("memo") for name, outcome in outcomes.items()}
+    assert memos == {
+        "one": ["one"], "two": ["one", "two"], "bad": None, "four": ["one", "two", "four"],
+        "three": ["three"],
+    }  # fmt: skip
+    assert bar.n == pytest.approx(5.0)  # seconds that were expected
+
+
+def test_what_was_finished_is_kept_where_the_run_stops(tmp_path):
+    batches = [([task("one"), task("stops", "stop"), task("after")], {})]
+    executor, kept = Executor(RunFolder(tmp_path), None, 1), []
+    with pytest.raises(RunStopped, match="the disk is full"):
+        for done, _ in executor.together(lambda: batches.pop() if batches else None, Bar()):
+            kept.append(done.name)
+    assert kept == ["one"]
+
+
+@pytest.mark.slow
+@needs_proc
+def test_free_memory_of_a_batch_is_given_back(tmp_path):
+    outcomes, _ = together(tmp_path, [task("one", "fill"), task("two")], [task("three")])
+    during, after = (outcomes[name].result["kB"] for name in ("two", "three"))
+    assert during - after > 100_000
+
+
+def test_a_named_process_is_kept_until_it_is_released(tmp_path):
+    executor = Executor(RunFolder(tmp_path), None, 1)
+    first, second = (task(name, process="own") for name in ("first", "second"))
+    try:
+        assert executor.alone(first, {}).result["memo"] == ["first"]
+        assert executor.alone(second, {}).result["memo"] == ["first", "second"]
+        executor.release("own")
+        assert executor.alone(second, {}).result["memo"] == ["second"]
+    finally:
+        executor.close()
+
+
+def test_a_process_that_cannot_start_is_a_failure_each_time(tmp_path):
+    process = TaskProcess(RunFolder(tmp_path), lambda: None)  # cannot be sent to it
+    outcomes = [process.do(task("one"), {}) for _ in range(2)]
+    assert all(outcome.failed and "lambda" in outcome.reason for outcome in outcomes)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere each process loads its own")
+def test_a_process_begins_with_what_all_need_and_nothing_that_a_scene_may_do_without(tmp_path):
+    process = TaskProcess(RunFolder(tmp_path), None)
+    there = {name for name in process.call(eval, "[*__import__('sys').modules]", seconds=60)}
+    process.close()
+    assert there.issuperset({"h5py", "numba", "scipy", *LOADED_BY_ALL})
+    assert not [name for name in there if name.startswith(("snug", "torch", "igl"))]
