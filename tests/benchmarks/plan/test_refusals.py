@@ -58,7 +58,6 @@ WORDS = [
     ("--out broken.npz", "is a file"),
     ("--out full", "holds no run"),
     ("--out torn", "torn/run.json: not readable"),
-    ("--only failed", "--retry"),
     ("--workers 0", "1 or more"),
     ("--frobnicate", "--frobnicate"),
     ("--methods gone.py", "gone.py: no such file"),
