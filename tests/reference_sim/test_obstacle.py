@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reference_sim import MeshError, Obstacle
+from reference_sim import Obstacle
 from tests.reference_sim.meshes import box, random_rotation, sphere
 
 RADIUS = 0.3
@@ -63,15 +63,6 @@ def test_normals_point_outwards_on_the_surface_itself():
         assert np.einsum("si,si->s", normals, moved).min() > 0.98
 
 
-def test_planes_at_edges_and_corners_of_a_box():
-    obstacle = Obstacle(*box((0, 0, 0), (1, 1, 1)))
-    points = np.array([(0.5, 1.3, 0.4), (1.3, 1.4, 0.5), (1.2, 1.2, 1.1), (0.5, 0.9, 0.4)])
-    planes = obstacle.planes(points, 0)
-    assert planes.points == pytest.approx(np.array([(0.5, 1, 0.4), (1, 1, 0.5), (1, 1, 1), (0.5, 1, 0.4)]))
-    away = np.array([(0, 1, 0), (0.6, 0.8, 0), (2 / 3, 2 / 3, 1 / 3), (0, 1, 0)])
-    assert planes.normals == pytest.approx(away, abs=1e-12)
-
-
 def test_signed_distance_of_a_sphere_and_of_a_box():
     obstacle = Obstacle(SPHERE, FACES)
     points, distance = around(400, 3, -0.14, 0.5)
@@ -87,13 +78,6 @@ def test_signed_distance_of_a_sphere_and_of_a_box():
     assert (inside > 0).sum() > 5
     signed = Obstacle(*box((0, 0, 0), (0.2, 0.25, 0.28))).signed_distance(points, 0)
     assert signed == pytest.approx(exact, abs=1e-14)
-
-
-def bent(vertices: np.ndarray) -> np.ndarray:
-    """A bar bent by half a turn, so that its two ends come near each other."""
-    angle = np.pi * vertices[:, 0]
-    radius = 0.35 + vertices[:, 1]
-    return np.column_stack([radius * np.sin(angle), radius * np.cos(angle), vertices[:, 2]])
 
 
 def bar() -> tuple[np.ndarray, np.ndarray]:
@@ -147,25 +131,6 @@ def test_beside_the_border_of_its_faces_a_sample_meets_a_ball():
         assert (expected < 0) == (along**2 + (depth - 0.05) ** 2 < 0.05**2)
 
 
-def test_no_sample_outside_a_dressed_body_is_in_contact():
-    """Samples of a cuff on a bent bar, displaced at random by some centimetres along it and off it."""
-    rest, faces = bar()
-    obstacle = Obstacle(bent(rest), faces, rest_positions=rest, region=0.1)
-    generator = np.random.default_rng(11)
-    cuff = rest[np.abs(rest[:, 0]) < 0.15]
-    homes = cuff[generator.integers(len(cuff), size=4000)]
-    points = bent(homes + generator.normal(0, [0.12, 0.02, 0.02], homes.shape))
-    planes = obstacle.planes(points, 0, homes)
-    height = np.einsum("si,si->s", planes.normals, points - planes.points)
-    distance = obstacle.signed_distance(points, 0)
-    assert (height < 0.004).sum() > 500
-    assert (height[distance > 0.015] > 0.004).all()
-    # And whoever is inside, nearest to a face that it may meet, is in contact by the exact depth.
-    within_face = (distance < 0) & (np.linalg.norm(points - planes.points, axis=1) < np.abs(distance) + 1e-9)
-    assert within_face.sum() > 300
-    assert height[within_face] == pytest.approx(distance[within_face], abs=1e-9)
-
-
 def test_as_many_samples_from_elsewhere_meet_their_own_faces():
     rest, faces = bar()
     obstacle = Obstacle(rest, faces, rest_positions=rest, region=0.15)
@@ -198,10 +163,3 @@ def test_carried_is_exact_for_a_rigid_motion():
     points, _ = around(200, 6, -0.1, 0.3)
     # Round-off of barycentric places and frames, at 1 m from the origin.
     assert obstacle.transported(points, 1) == pytest.approx(points @ turn.T + shift, abs=1e-12)
-
-
-def test_a_mesh_that_is_no_body_is_refused_with_a_reason():
-    with pytest.raises(MeshError, match="not closed: edge"):
-        Obstacle(SPHERE, FACES[:-1])
-    with pytest.raises(MeshError, match="rest_positions"):
-        Obstacle(SPHERE, FACES, rest_positions=SPHERE[:-1])

@@ -22,6 +22,9 @@ from reference_sim.energies import (
     Gravity,
     StretchStVK,
 )
+from reference_sim.minimise.newton import Newton
+from reference_sim.time_loop import simulate_with
+from reference_sim.time_step import TimeStepper
 from tests.reference_sim.meshes import box, grid
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
@@ -183,7 +186,7 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame():
             {"start": np.where(np.arange(49)[:, None] < 5, SHEET, np.nan)},
             "start of vertex 5 is [nan nan nan]",
         ),
-        ({"velocity": SHEET[:, :2]}, "velocity has shape (49, 2): expected (49, 3)"),
+        ({"pin_positions": lambda _: np.zeros(3)}, "pin_positions(1) gives (3,): finite positions (0, 3)"),
         ({"dt": 0.0}, "dt = 0.0: must be a finite number of seconds above 0"),
         ({"dt": 1e300}, "dt / substeps = 1e+300 s: give 1e-07 to 10000 s"),
         ({"tolerance": np.nan}, "tolerance = nan: give a finite number above 0"),
@@ -194,3 +197,46 @@ def test_what_cannot_be_simulated_is_refused(options, message):
     cloth = Cloth(SHEET, FACES)
     with pytest.raises(ValueError, match=re.escape(message)):
         simulate(cloth, terms_of(cloth), **({"frames": 2} | options))
+
+
+# Sub-steps
+
+
+def test_frames_of_sub_steps_are_every_nth_frame_of_small_steps_and_sum_their_work():
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    terms = terms_of(cloth)
+    coarse = simulate(cloth, terms, dt=0.06, frames=4, substeps=3)
+    fine = simulate(cloth, terms, dt=0.02, frames=10)
+    assert coarse.status == fine.status == "converged"
+    np.testing.assert_allclose(coarse.positions, fine.positions[::3], atol=1e-12)
+    np.testing.assert_allclose(coarse.times, fine.times[::3], rtol=1e-14)
+    for name in ("iterations", "factorisations"):
+        sums = fine.frame_fields[name][1:].reshape(3, 3).sum(axis=1)
+        np.testing.assert_array_equal(coarse.frame_fields[name][1:], sums)
+
+
+def test_pins_arrive_exactly():
+    cloth = Cloth(SHEET, FACES, pins=[0, 6])
+    places = np.random.default_rng(0).normal(scale=0.01, size=(4, 2, 3)) + SHEET[[0, 6]]
+    places[0] = SHEET[[0, 6]]
+    moved = simulate(
+        cloth, [StretchStVK(cloth)], frames=4, substeps=3, pin_positions=lambda k: places[k], max_iterations=3
+    )
+    np.testing.assert_array_equal(moved.positions[:, [0, 6]], places)
+
+
+def test_a_minimiser_that_cannot_start_again_is_made_anew_for_the_next_run():
+    class Learning:
+        def __init__(self, potential, **options):
+            self.steps, self.newton = 0, Newton(potential, max_iterations=1)
+
+        def minimise(self, x0):
+            self.steps += 1
+            return self.newton.minimise(x0 + 1e-3 * self.steps)
+
+    cloth = Cloth(SHEET, FACES)
+    stepper = TimeStepper(cloth, [StretchStVK(cloth), Gravity(cloth)], dt=0.02, method=Learning)
+    first = simulate_with(stepper, frames=4).positions
+    assert not np.array_equal(simulate_with(stepper, frames=4).positions, first)
+    stepper.start_again()
+    assert np.array_equal(simulate_with(stepper, frames=4).positions, first)

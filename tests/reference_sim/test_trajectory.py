@@ -47,11 +47,9 @@ def assert_same(loaded: Trajectory, expected: Trajectory) -> None:
 def test_what_is_saved_is_loaded_to_the_last_bit(tmp_path, frames):
     wave(frames).save(tmp_path / "wave.vtkhdf")
     assert_same(Trajectory.load(tmp_path / "wave.vtkhdf"), wave(frames))
-    wave(frames).save(str(tmp_path / "again.vtkhdf"))  # a path may be a string
-    assert_same(Trajectory.load(str(tmp_path / "again.vtkhdf")), wave(frames))
     wave(2).save(tmp_path / "wave.vtkhdf")  # replaces a file whole
     assert Trajectory.load(tmp_path / "wave.vtkhdf").dt == pytest.approx(1 / 30)
-    assert np.isnan(wave(1).dt) and len(list(tmp_path.iterdir())) == 2
+    assert np.isnan(wave(1).dt) and len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_trajectory_of_no_frames_is_saved_too(tmp_path):
@@ -67,15 +65,11 @@ def test_what_is_no_trajectory_is_named_with_its_path(tmp_path):
     with pytest.raises(TrajectoryError, match=r"absent\.vtkhdf: no such trajectory file"):
         Trajectory.load(tmp_path / "absent.vtkhdf")
     (tmp_path / "text.vtkhdf").write_text("not HDF5")
-    with pytest.raises(TrajectoryError, match=r"text\.vtkhdf: not a VTKHDF trajectory"):
-        Trajectory.load(tmp_path / "text.vtkhdf")
     with h5py.File(tmp_path / "other.vtkhdf", "w") as file:
         file["numbers"] = [1, 2, 3]
-    with pytest.raises(TrajectoryError, match=r"other\.vtkhdf: not a VTKHDF trajectory"):
-        Trajectory.load(tmp_path / "other.vtkhdf")
-    with pytest.raises(TrajectoryError, match=r": not a VTKHDF trajectory"):
-        Trajectory.load(tmp_path)
-    assert issubclass(TrajectoryError, ValueError)
+    for name in ("text", "other"):
+        with pytest.raises(TrajectoryError, match=rf"{name}\.vtkhdf: not a VTKHDF trajectory"):
+            Trajectory.load(tmp_path / f"{name}.vtkhdf")
 
 
 def vtk_frames(path) -> tuple[list[float], list[np.ndarray], list[np.ndarray]]:

@@ -1,5 +1,10 @@
 """Six small scenes whose energies, term by term and frame by frame, are kept in energies.csv.
 
+    python -m tests.reference_sim.energies.regression_scenes
+
+writes the table anew. A change in it is a change of physics or of the minimum that the solver finds: look at
+every line of the difference, and say in the commit why it had to be.
+
 Every term of the simulator is in one of them. Each is solved to a tolerance at which the energies are known
 to nine digits, and is short enough that round-off does not grow into another wrinkle.
 """
@@ -142,3 +147,16 @@ def scales(energies: Energies) -> dict[tuple[str, str], float]:
     for (scene, _, term), value in energies.items():
         sizes[scene, term] = max(sizes.get((scene, term), 0.0), abs(value))
     return sizes
+
+
+def main() -> None:
+    """Write energies.csv anew."""
+    with STORE.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for name in SCENES:
+            writer.writerows([*key, repr(value)] for key, value in computed(name).items())
+
+
+if __name__ == "__main__":
+    main()

@@ -47,15 +47,6 @@ def test_a_hinge_passes_through_half_a_turn(phi, rest):
     assert close(blocks_of(energy, x), Energy.hessian_blocks(energy, x), 1e-10)
 
 
-def test_a_hinge_folded_flat_is_finite_and_the_same_in_both_forms():
-    energy = one_hinge(0.0)
-    x = hinge_at(0.0) * [1, 0, 1] + [[0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0.7, 0]]  # both wings on one side
-    value, gradient = energy.value_and_gradient(x)
-    expected_value, expected = Energy.value_and_gradient(energy, x)
-    assert value == pytest.approx(np.pi**2, rel=1e-14) and value == pytest.approx(expected_value, rel=1e-14)
-    assert np.abs(expected).max() > 1.0 and close(gradient, expected, 1e-12)
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [

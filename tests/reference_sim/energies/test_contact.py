@@ -20,10 +20,9 @@ from reference_sim.energies import (
     Gravity,
     Inertia,
     Step,
-    StretchSpring,
     StretchStVK,
 )
-from tests.reference_sim.meshes import box, grid, random_rotation
+from tests.reference_sim.meshes import box, grid
 
 TABLE = box((-1, -1, -1), (2, 0, 2))  # its top is the plane y = 0
 SHEET, FACES = grid(6, 6, width=0.3, depth=0.3)
@@ -53,35 +52,13 @@ def test_the_papers_stiffness_per_vertex_depends_on_the_mass_of_the_vertex():
     assert result.positions[:, 1] == pytest.approx(2e-3 - depth, abs=1e-11)
 
 
-def test_contact_does_not_depend_on_where_the_scene_stands():
-    """The same sheet, table and state, turned and moved: energies agree and forces turn along."""
-    cloth = Cloth(SHEET, FACES)
-    turn, shift = random_rotation(4), np.array([1.0, -2.0, 0.5])
-    x = SHEET + np.random.default_rng(0).normal(0, 0.002, SHEET.shape)
-    values = []
-    for R, t in ((np.eye(3), np.zeros(3)), (turn, shift)):
-        contact = ContactPenalty(cloth)
-        obstacle = Obstacle(TABLE[0] @ R.T + t, TABLE[1])
-        guess = x @ R.T + t
-        contact.prepare(Step(guess, 0 * guess, guess, 1 / 30, obstacle, 0))
-        value, gradient = contact.value_and_gradient(guess)
-        values.append((value, gradient @ R))
-    assert values[0][0] > 1e-5
-    assert values[1][0] == pytest.approx(values[0][0], rel=1e-9)
-    assert np.abs(values[1][1] - values[0][1]).max() < 1e-9 * np.abs(values[0][1]).max()
-
-
 @pytest.mark.parametrize(
     "make",
     [
         lambda cloth: ContactPenalty(cloth, margin=float("nan")),
-        lambda cloth: ContactPenalty(cloth, stiffness=-1.0),
         lambda cloth: ContactPenalty(cloth, per_sample_stiffness=float("inf")),
-        lambda cloth: ContactFriction(ContactPenalty(cloth), coefficient=-0.5),
         lambda cloth: ContactFriction(ContactPenalty(cloth), speed=0.0),
-        lambda cloth: StretchSpring(cloth, stiffness=-15.0),
         lambda cloth: AreaBarrier(cloth, threshold=float("nan")),
-        lambda cloth: AreaBarrier(cloth, threshold=0.0),
         lambda cloth: Inertia(cloth, float("inf")),
     ],
 )
@@ -90,7 +67,7 @@ def test_numbers_that_would_push_or_do_nothing_are_refused(make):
         make(Cloth(*grid(3, 3, width=0.1, depth=0.1)))
 
 
-@pytest.mark.parametrize("parent", [StretchStVK, StretchSpring, ContactPenalty])
+@pytest.mark.parametrize("parent", [StretchStVK, ContactPenalty])
 def test_another_definition_states_where_its_derivatives_come_from(parent):
     x, faces = grid(3, 3, width=0.1, depth=0.1)
     cloth, bent = Cloth(x, faces), x + 0.01 * np.sin(40 * x[:, [1, 2, 0]])

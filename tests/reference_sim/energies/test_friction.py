@@ -110,28 +110,3 @@ def test_friction_without_the_step_before_is_refused():
         friction.value_and_gradient(x[0])
     prepare(1)  # a first step needs none
     assert friction.value_and_gradient(x[0])[0] > 0
-
-
-def test_friction_beside_a_contact_that_is_not_its_own_is_refused():
-    scene = on_a_belt()
-    simulate(scene.cloth, scene.energies, obstacle=scene.obstacle, start=scene.start, frames=2)
-    stranger = ContactPenalty(scene.cloth)
-    terms = [*scene.energies[:2], stranger, scene.energies[3]]
-    with pytest.raises(ValueError, match="its own ContactPenalty before it"):
-        simulate(scene.cloth, terms, obstacle=scene.obstacle, start=scene.start, frames=2)
-
-
-def test_friction_of_a_step_that_is_frozen_again_is_the_same_and_of_another_past_is_refused():
-    scene = on_a_belt()
-    plain = simulated(scene)
-    given = {"dt": scene.dt, "frames": scene.frames, "obstacle": scene.obstacle, "start": scene.start}
-    again = simulate(scene.cloth, scene.energies, refreeze=1, **given)
-    # A slope is one plane: searched again it is the same, and so is the friction on it.
-    assert again.status == "converged" and np.abs(again.positions - plain.positions).max() < 1e-6
-    potential = Potential(copied_terms(scene))
-    x = plain.positions
-    freeze_step(scene, potential, x, 5)
-    step = Step(x[4] + 1e-3, 0 * x[4], x[5], scene.dt, scene.obstacle, 5)
-    potential.prepare(step)
-    with pytest.raises(ValueError, match="does not know its normal force"):
-        potential.value(x[5])

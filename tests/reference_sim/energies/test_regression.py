@@ -25,7 +25,7 @@ def test_the_energies_are_those_that_were_kept(scene, kept):
         far = abs(value - kept[scene, frame, term])
         assert far <= TOLERANCE * sizes[scene, term], (
             f"{scene}, frame {frame}: {term} {kept[scene, frame, term]!r} -> {value!r} J; if that is meant: "
-            "python -m tests.reference_sim.energies.regenerate_energies"
+            "python -m tests.reference_sim.energies.regression_scenes"
         )
 
 

@@ -162,19 +162,12 @@ def evil(marker: object) -> dict[str, bytes]:
     return {
         "os.system": pickle.dumps(Calls(os.system, shell)),
         "eval": pickle.dumps(Calls(eval, python)),
-        "python 2": b'c__builtin__\neval\n(S"' + python.encode() + b'"\ntR.',
-        "inst": b"(S'" + shell.encode() + b"'\nios\nsystem\n.",
         "obj": b"(cos\nsystem\nS'" + shell.encode() + b"'\no.",
         "nested name": b"\x80\x04" + name("numpy") + name("ndarray.__class__") + b"\x93" + call,
-        "by an allowed module": b"\x80\x04" + name("numpy") + name("f2py.os.system") + b"\x93" + call,
-        "getattr": b"\x80\x04c__builtin__\ngetattr\ncnumpy\nndarray\n" + name("__class__") + b"\x86R.",
         "reconstructor": b"ccopy_reg\n_reconstructor\n(cos\nsystem\nc__builtin__\nobject\nNtR.",
-        "extension": b"\x80\x04\x82\x01.",
-        "persistent": b"\x80\x04Pos.system\n.",
         "object array": b"\x80\x04" + array + b"(K\x01K\x01\x85cnumpy\ndtype\n" + name("O8")
         + b"\x89\x88\x87R\x89](cos\nsystem\netb.",
         "pickle in a pickle": pickle.dumps(Calls(pickle.loads, pickle.dumps(Calls(os.system, shell)))),
-        "numpy.load": pickle.dumps(Calls(np.load, str(marker), None, True)),
         "slots of a class": b"\x80\x04cchumpy.ch\nCh\nN}(" + name("array") + b"cos\nsystem\nu\x86b.",
     }  # fmt: skip
 
@@ -182,11 +175,8 @@ def evil(marker: object) -> dict[str, bytes]:
 ARRAY = pickle.dumps({"a": np.arange(6.0).reshape(2, 3)}, 4)
 BROKEN = {
     "cut off": ARRAY[:-40],
-    "shape too large": ARRAY.replace(b"K\x02K\x03", b"K\x02K\x04"),
-    "bytes without end": b"\x80\x04\x8e" + struct.pack("<Q", 2**40) + b".",
     "objects": pickle.dumps({"a": np.array([{}], dtype=object)}),
     "fields": pickle.dumps({"a": np.zeros(2, dtype=[("a", "f4")])}),
-    "rows of several lengths": pickle.dumps({"a": [[1, 2], [3]]}),
     "no dict": pickle.dumps(np.arange(6.0)),
     "no array": pickle.dumps({"b": 1, "a": None}),
     "empty": b"", "byte": b"\x80", "zip": b"PK\x03\x04",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from reference_sim.geometry.closest_point import FaceSearch
-from reference_sim.geometry.leaf_bounds import LANES, closest_on_triangle
+from reference_sim.geometry.leaf_bounds import closest_on_triangle
 from reference_sim.kernels.kernel_cache import njit
 from tests.reference_sim.meshes import grid, sphere
 
@@ -155,16 +155,3 @@ def test_only_faces_near_the_place_at_rest_are_met(name, region):
     closest = tree.nearest(points, samples=tree.listed(home, region)).faces
     assert (closest == expected).all()
     assert name == "soup 7" or (closest != tree.nearest(points).faces).any()
-
-
-@pytest.mark.parametrize("count", [1, LANES - 1, LANES, LANES + 1])
-def test_company_changes_nothing(count):
-    """Samples are searched in groups: each gets what it would alone, with hints or without, in any order."""
-    positions, faces = mesh("sphere")
-    tree, points = tree_of(positions, faces), samples(positions, faces)
-    home, hints = points[::-1], np.where(np.arange(len(points)) % 3, np.arange(len(points)) % len(faces), -1)
-    whole = tree.nearest(points, samples=tree.listed(home, 0.8))
-    chosen = np.random.default_rng(8).permutation(len(points))[:count]
-    for some in (None, hints[chosen]):
-        closest = tree.nearest(points[chosen], samples=tree.listed(home[chosen], 0.8), hints=some)
-        assert (closest.faces == whole.faces[chosen]).all() and (closest.points == whole.points[chosen]).all()

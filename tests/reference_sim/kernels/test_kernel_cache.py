@@ -25,8 +25,6 @@ FILES = {
     "from callee import inner\nfrom constants import FACTOR\n"
     "@njit(cache=True)\ndef outer(x):\n    return FACTOR * other.power(helper(x))\n"
     "@njit(cache=True)\ndef helper(x):\n    return inner(x)\n",
-    "bystander.py": "from reference_sim.kernels.kernel_cache import njit\n"
-    "@njit(cache=True)\ndef nothing(x):\n    return x\n",
 }
 # A kernel that is an argument: its caller does not import it.
 FILES["given.py"] = (
@@ -45,7 +43,7 @@ CALL_GIVEN = (
     "print(sum(given.sums.stats.cache_hits.values()))"
 )
 CALL = (
-    "import bystander, caller\nprint(caller.outer(3))\n"
+    "import caller\nprint(caller.outer(3))\n"
     "print(sum(caller.outer.stats.cache_hits.values()))\nprint(caller.outer.stats.cache_path)"
 )
 

@@ -14,7 +14,6 @@ from reference_sim.minimise.subspace import (
     SubspaceHessian,
     SubspaceNewton,
     SubspaceRun,
-    nearest_offsets,
     orthonormal,
 )
 from tests.reference_sim.meshes import grid
@@ -67,20 +66,6 @@ def test_the_whole_space_has_the_minimum_of_newtons_method():
     assert result.status == expected.status == "converged"
     assert result.energy == pytest.approx(expected.energy, rel=1e-9)
     assert np.abs(result.positions - expected.positions).max() < 1e-5
-
-
-def test_a_larger_space_has_less_energy_and_none_has_less_than_all_vertices():
-    energies, offsets = [], None
-    for size in (1, 3, 8, 16):
-        space = basis(size)
-        result = solved(space, offsets)
-        assert result.status == "converged", result.reason
-        offsets = placed().unposed(result.positions)
-        assert np.abs(nearest_offsets(space, offsets) - offsets).max() < 1e-12  # it stayed inside
-        assert np.array_equal(result.positions[PINS], SHEET[PINS])
-        energies.append(result.energy)
-    energies.append(minimise(potential(), result.positions).energy)
-    assert (np.diff(energies) < 0.0).all()
 
 
 def test_the_residual_of_a_minimum_is_that_of_automatic_differentiation():
