@@ -33,7 +33,7 @@ class PoseSpaceDeformation(GarmentNetwork):
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""
         hidden = self.activations(self.normalise(features))
-        flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
+        flat = self.output_scale * run_linear(self.offsets, hidden)
         return flat.unflatten(-1, (self.vertices, 3)), None
 
     def lay_out(self, plan: FramePlan) -> None:

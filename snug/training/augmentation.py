@@ -85,17 +85,6 @@ def make_shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -
     return augment(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
 
 
-def draw_clip_shapes(count: int, coefficients: int, recipe: Recipe, *, seed: int) -> np.ndarray:
-    """Draw the shape numbers (count, coefficients) of the bodies of mixed clips.
-
-    The recipe's share of the clips has numbers from its U(-r, r), the others zero.
-    """
-    random = np.random.default_rng([seed, SHAPE_STREAM])
-    drawn = recipe.shape_range * random.uniform(-1.0, 1.0, (count, coefficients))
-    drawn[random.random(count) >= recipe.shape_share] = 0.0
-    return drawn
-
-
 def make_mixed_clips(
     motions: Sequence[Motion], frames: int, *, turn: float, lifted: float, seed: int
 ) -> list[Motion]:
@@ -192,13 +181,17 @@ def make_training_set(
     seed: int,
     device: torch.device,
 ) -> TrainingSet:
-    """Make the training set: the motions and, if the energies teach the network, augmented clips."""
+    """Make the training set: the motions and, if the energies teach the network, augmented clips.
+
+    Where clips have shapes, the recipe's share of them has numbers from its U(-r, r); all else the mean body.
+    """
     clips = augment(motions, recipe, vertices=dressed.vertices, seed=seed) if kind.physics else []
     shapes = None
     if varies_shape(kind, dressed, recipe) and recipe.shape_of == "clip":
-        mean = np.zeros((len(motions), dressed.body.shape_count))
-        of_clips = draw_clip_shapes(len(clips), dressed.body.shape_count, recipe, seed=seed)
-        shapes = np.concatenate([mean, of_clips])
+        count, random = dressed.body.shape_count, np.random.default_rng([seed, SHAPE_STREAM])
+        drawn = recipe.shape_range * random.uniform(-1.0, 1.0, (len(clips), count))
+        drawn[random.random(len(clips)) >= recipe.shape_share] = 0.0
+        shapes = np.concatenate([np.zeros((len(motions), count)), drawn])
     return TrainingSet(
         dressed, [*motions, *clips], recipe, features=kind.network.feature_set,
         sequences=kind.network.sequential, device=device, shapes=shapes,

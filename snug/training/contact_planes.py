@@ -151,14 +151,7 @@ class TrainingContact:
         kernels: in numpy and numba, else in torch on the set's device.
     """
 
-    def __init__(
-        self,
-        data: TrainingSet,
-        contact: ContactPenalty,
-        *,
-        kept: bool,
-        kernels: bool = True,
-    ) -> None:
+    def __init__(self, data: TrainingSet, contact: ContactPenalty, *, kept: bool, kernels: bool) -> None:
         body, device = data.dressed.body, data.device
         self.data, self.contact = data, contact
         self.kernels, self.age = kernels, np.zeros(data.frames, np.int64)

@@ -101,40 +101,28 @@ class Trainer:
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
         self.targets: VertexTargets | None = None
-        self._set_up_supervision(motions, trajectories)
-        self.hidden_states = self._hidden_state_cache()
-        self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
-
-    def _set_up_supervision(self, motions: Sequence[Motion], trajectories: Trajectories | None) -> None:
-        """Prepare the loss: simulated vertices, or the energies."""
-        how, recipe, data = self.how, self.recipe, self.data
-        if not how.physics:
-            self.targets = TARGETS[how.targets](data, motions, trajectories, self.weights)
-            return
-        self.loss = PhysicsLoss(
-            self.dressed.cloth, recipe, dt=data.dt, device=self.device, kernels=self.kernels
-        )
-        self.contact = self.contact_of(data)
+        if how.physics:
+            self.loss = PhysicsLoss(
+                dressed.cloth, recipe, dt=self.data.dt, device=device, kernels=self.kernels
+            )
+            self.contact = self.contact_of(self.data)
+        else:
+            self.targets = TARGETS[how.targets](self.data, motions, trajectories, self.weights)
         if self.contact:
             self.contact.search_first(self.weights)
-
-    def _hidden_state_cache(self) -> HiddenStateCache | None:
+        self.hidden_states: HiddenStateCache | None = None
         start = self.network.random_state(1, 0.0, torch.Generator())
-        remembered = self.recipe.remembered and not self.shaped  # a state belongs to one body
-        if not (self.loss and remembered and isinstance(start, Tensor)):
-            return None
-        return HiddenStateCache(self.data.first, (start.shape[0], start.shape[-1]), self.device)
+        # A state belongs to one body.
+        if self.loss and recipe.remembered and not self.shaped and start is not None:
+            states = start.shape[0], start.shape[-1]
+            self.hidden_states = HiddenStateCache(self.data.first, states, device)
+        self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
         """Return contact anchors for the frames of a set; None if the recipe has no collision."""
         if self.loss is None or "collision" not in self.recipe.terms:
             return None
-        return TrainingContact(
-            data,
-            self.loss.contact,
-            kept=not self.shaped,
-            kernels=self.kernels,
-        )
+        return TrainingContact(data, self.loss.contact, kept=not self.shaped, kernels=self.kernels)
 
     def draw(self) -> np.ndarray:
         """Draw the next windows: every sub-sequence once, in random order, before any comes again."""

@@ -105,29 +105,22 @@ def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
 
     Those of its material come first, then any other energy of the simulator that it names.
     """
-    of_material = dict(zip(STATIC, _terms_of_material(cloth, recipe)))
-    terms = {name: of_material[name] for name in STATIC if name in recipe.terms}
-    return terms | {name: find_energy(name)(cloth) for name in recipe.terms if name not in TERMS}
-
-
-def _terms_of_material(cloth: Cloth, recipe: Recipe) -> Sequence[Energy]:
-    """Return the energies of the terms STATIC."""
     if recipe.material == "pbns":
-        return spring_terms(cloth)
-    membrane = MEMBRANES[recipe.material](cloth)
-    return membrane, BendHinge(cloth, scaling=recipe.bending), Gravity(cloth)
+        energies: Sequence[Energy] = spring_terms(cloth)
+    else:
+        membrane = MEMBRANES[recipe.material](cloth)
+        energies = membrane, BendHinge(cloth, scaling=recipe.bending), Gravity(cloth)
+    terms = {name: energy for name, energy in zip(STATIC, energies) if name in recipe.terms}
+    return terms | {name: find_energy(name)(cloth) for name in recipe.terms if name not in TERMS}
 
 
 def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
     """Return the recipe's contact term; options it leaves open are the simulator's defaults."""
     if recipe.material == "pbns":
         return SquaredContact(cloth)
-    options: dict[str, Any] = {"samples": recipe.contact_samples}
-    if recipe.contact_margin is not None:
-        options["margin"] = recipe.contact_margin
-    if recipe.contact_stiffness is not None:
-        options["stiffness"] = recipe.contact_stiffness
-    return ContactPenalty(cloth, **options)
+    options = {"margin": recipe.contact_margin, "stiffness": recipe.contact_stiffness}
+    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    return ContactPenalty(cloth, samples=recipe.contact_samples, **given)
 
 
 class ClosedForms(torch.autograd.Function):
@@ -211,13 +204,12 @@ class PhysicsLoss:
         self.terms, self.kernels, self.inertia_form = recipe.terms, kernels, recipe.inertia_form
         self.contact = make_contact(cloth, recipe)
         self.inertia = Inertia(cloth, dt)
-        self.static = static_terms(cloth, recipe)
         self._contact = self.contact
         if not kernels:
             self.inertia, self._contact = on_device(self.inertia, device), on_device(self.contact, device)
         self.static = {
             name: term if kernels and has_closed_form(term) else on_device(term, device)
-            for name, term in self.static.items()
+            for name, term in static_terms(cloth, recipe).items()
         }
         self._definitions = compiled(self._defined, device)
         self._batches: dict[str, BatchKernel] = {}
@@ -269,11 +261,9 @@ class PhysicsLoss:
         if "inertia" in self.terms and x.shape[1] >= 3:
             terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead, behind)
         if "collision" in self.terms and planes is not None:
-            if "collision" in closed:
-                terms["collision"] = closed["collision"]
-            else:
-                assert isinstance(planes, tuple)
-                terms["collision"] = self._contact.energy(x, *planes).sum(-1)
+            terms["collision"] = (
+                self._contact.energy(x, *planes).sum(-1) if isinstance(planes, tuple) else closed["collision"]
+            )
         return terms
 
     def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:

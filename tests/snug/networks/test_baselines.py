@@ -9,13 +9,12 @@ import pytest
 import torch
 
 from snug.kinds import KINDS
-from snug.named_recipes import ABLATIONS
 from snug.networks.dressed_body import DressedBody
 from snug.networks.garment_network import make_network
 from snug.networks.roll_out import roll_out
 from snug.networks.tailornet import DROPOUT, FrequencyMixture
 from snug.recipe import DEFAULT
-from snug.training.physics_loss import PhysicsLoss, SquaredContact, spring_terms
+from snug.training.physics_loss import SquaredContact, spring_terms
 from snug.training.simulated_data import smooth_offsets
 from snug.training.train_network import train_network
 from tests.snug.training.dressing import swaying, tube_dress
@@ -122,27 +121,3 @@ def test_the_springs_of_pbns_by_hand():
     force = np.zeros_like(x)
     force[7, 1] = 2 * 25 * 0.003
     assert np.allclose(gradient, -force, atol=1e-12)
-
-
-@pytest.mark.parametrize("recipe", ABLATIONS[1:9], ids=lambda recipe: recipe.name)
-def test_an_ablation_leaves_out_what_it_says_and_never_evaluates_it(recipe, monkeypatch):
-    asked = []
-
-    def noting(energy):
-        plain = energy.energy
-        return lambda *data: (asked.append(energy.name), plain(*data))[1]
-
-    dressed = tube_dress()
-    loss = PhysicsLoss(dressed.cloth, recipe, dt=1 / 30, kernels=False)
-    for energy in (*loss.static.values(), loss._contact):
-        monkeypatch.setattr(energy, "energy", noting(energy))
-    frames = recipe.window
-    x = dressed.rest().expand(2, frames, -1, 3)
-    samples = len(loss.contact.stencils)
-    planes = torch.full((2, frames, samples, 3), -9.0), torch.ones(2, frames, samples, 3)
-    still = torch.zeros(2, frames, 3)
-    terms = loss(x, still, planes, behind=still)
-    assert tuple(sorted(terms)) == tuple(sorted(recipe.terms))
-    left_out = {"strain", "bending", "gravity", "inertia", "collision"} - set(recipe.terms)
-    assert not left_out & set(asked) and ("collision" in asked) == ("collision" in recipe.terms)
-    assert ("spring" in asked) == (recipe.material == "springs")

@@ -53,7 +53,7 @@ def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path
     assert np.abs(positions - expected).max() < 3e-6 * max(size, 1.0)
 
 
-@pytest.mark.parametrize(("vertices", "joints"), [(1, 2), (63, 5), (64, 24), (200, 24)])
+@pytest.mark.parametrize(("vertices", "joints"), [(1, 2), (200, 24)])
 def test_skinning_by_blocks_is_skinning(vertices, joints):
     random = np.random.default_rng(vertices)
     weights = random.random((vertices, joints)) * (random.random((vertices, joints)) < 0.3)

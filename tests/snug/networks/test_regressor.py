@@ -8,7 +8,6 @@ from snug.body.skeleton import axis_angles, rotation_matrices
 from snug.motion.motion import Motion
 from snug.named_recipes import PAPER, RECIPES, find_recipe
 from snug.networks.garment_network import make_network
-from snug.networks.pbns import PoseSpaceDeformation
 from snug.networks.regressor import Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
 from snug.recipe import DEFAULT, Recipe, RecipeError
@@ -126,7 +125,6 @@ class SmallRegressor(Regressor):
         (SmallRegressor, 1, True),
         (SmallRegressor, 5, False),
         (FitAndWrinkles, 4, True),  # its units fill no vector register
-        (PoseSpaceDeformation, 3, False),
     ],
 )
 def test_closed_forms_train_as_the_modules_do(make, frames, state):

@@ -71,7 +71,6 @@ def equal_states(plain, captured):
     [
         ("snug", PLAIN),
         ("pbns", PAPER),
-        *(pytest.param(*both, marks=pytest.mark.slow) for both in (("pbns", PLAIN), ("snug", PAPER))),
     ],
 )
 def test_a_captured_step_is_the_step(kind, recipe, monkeypatch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import shutil
 from pathlib import Path
 
@@ -13,7 +12,7 @@ import pytest
 from snug import train
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion
-from snug.training.simulated_data import read_data_set, settings_of, write_data_set
+from snug.training.simulated_data import read_data_set, write_data_set
 from tests.snug.training.dressing import tube_dress
 
 FRAMES = 18  # two windows of the supervised network
@@ -53,7 +52,6 @@ def test_the_file_holds_motions_and_what_was_simulated(built):
         (lambda file: file.pop("1/vertices"), "no file of simulated motions"),
         (lambda file: file.attrs.update(format=9), "format 9; this version reads 2"),
         (lambda file: file.attrs.update(settings="[]"), "another garment: None there"),
-        (lambda file: file["0"].attrs.pop("fps"), "no file of simulated motions"),
     ],
 )
 def test_a_file_that_is_not_as_it_was_written_is_named(built, tmp_path, damage, message):
@@ -83,19 +81,3 @@ def test_the_command_learns_from_the_file(built, tmp_path, capsys, refused, monk
         (["--dataset", str(text)], "no file of simulated motions"),
     ):
         refused(message, train.main, options)
-
-
-def test_settings_tell_garments_and_bodies_apart():
-    dressed = tube_dress()
-    settings = settings_of(dressed.body, dressed.garment)
-    moved = dressed.garment.rest_positions.copy()
-    moved[3, 1] += 1e-5
-    larger = dataclasses.replace(dressed.body, template=1.01 * dressed.body.template)
-    others = {
-        "mesh": settings_of(dressed.body, dataclasses.replace(dressed.garment, rest_positions=moved)),
-        "body": settings_of(larger, dressed.garment),
-    }
-    for name, other in others.items():
-        assert [key for key in settings if settings[key] != other[key]] == [name]
-    rounded = dataclasses.replace(dressed.garment, rest_positions=dressed.garment.rest_positions + 1e-12)
-    assert settings_of(dressed.body, rounded) == settings
