@@ -39,13 +39,13 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("garment", help="triangle mesh at rest: OBJ, PLY, VTK, STL or OFF")
+    add("garment", help="triangle mesh at rest: OBJ, PLY, STL or OFF")
     add("-o", "--out", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
     add("--units", choices=("m", "cm", "mm", "in"), default="m", help="of all meshes (default m)")
     add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
     add("--pins", metavar="WHICH", help="vertices held in place: '0,9,12', or 'top'")
     add("--material", type=Path, metavar="FILE",
-        help=".toml or .json: young_modulus [Pa], poisson_ratio, thickness [m], density [kg/m^3], "
+        help=".toml: young_modulus [Pa], poisson_ratio, thickness [m], density [kg/m^3], "
         "bending_stiffness [J] (default: the cotton of the SNUG paper)",
     )  # fmt: skip
     add("--obstacle", metavar="MESHES", help="closed mesh, or one per frame: a folder or a quoted glob")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 from benchmarks.declarations import attributes_of
@@ -51,11 +52,20 @@ SHORT = {  # field -> its placeholder in help; those of a scene first
 }  # fmt: skip
 OF_SCENES = tuple(SHORT)[:4]
 SINGLE = ("body", "garment", "trained")  # given once
+BEHIND_A_PATH = "units up fps other-mesh motion-up motion-fps joint-map garment-units garment-up"
+REPLACED = {  # former option, which people have in scripts -> what to say in its place
+    **{f"--{f.name.replace('_', '-')}": f"--set {f.name}=..." for f in fields(Study) if f.name not in SHORT},
+    **{f"--{name}": "say it behind the path: FILE,units=cm" for name in BEHIND_A_PATH.split()},
+    "--preset": "name a study (smoke, paper), or --set sizes=NAME",
+    "--suite": "name parts of a study: python -m benchmarks.run full:NAME",
+    "--frames": "--set sizes.frames=N",
+}
 
 
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of benchmarks.run."""
     parser = Parser(
+        replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
         description="Run a study: dress a body, simulate the ground truth, train the networks, compare all "
         "methods and write tables, figures and a PDF.",

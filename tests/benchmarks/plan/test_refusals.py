@@ -31,7 +31,10 @@ FIELDS = [  # study.toml -> line, field, and what is near it
     ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
     ("garment = { path = 'a b.obj' }", "'a b' cannot name scenes"),
     ("garment = { path = 'tshirt.obj' }", "the project has scenes of that name: give the file another"),
-    ("[rollouts]\nm = { path = 'a', unit = 'cm' }", "line 2: rollouts.m: unknown word 'unit'; there are"),
+    (
+        "[rollouts]\nm = { path = 'a', unit = 'cm' }",
+        "line 2: rollouts.m.unit: no field is called 'unit'; did you mean units?",
+    ),
     ("like = 'smok'", "no study 'smok'"),
     ("like = 'study.toml'", "is like itself"),
     ("[garment]\npath = 'a.obj'\nmaterial = ''", "line 3: garment.material: '': give a path"),
@@ -66,6 +69,9 @@ WORDS = [
     ("--set metrics=bare.py", "metric 'mine/x' has no unit"),
     ("--scenes worn.py", "no garment is called 'toga'; there are tshirt, "),
     ("--methods random.py", "Python knows random as"),
+    ("--split all", "--split is no option any more: --set split=..."),
+    ("--preset smoke", "--preset is no option any more: name a study"),
+    ("--motion-up z", "--motion-up is no option any more: say it behind the path"),
 ]
 HEAD = "from benchmarks.method import MethodEntry\n"
 PLAIN, MAKE = 'name="a", description="b"', "def make(**options): pass\n"
