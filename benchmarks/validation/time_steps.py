@@ -230,9 +230,13 @@ class Viscosity(energies.Energy):
         return 0.5 * self.factor * float((change**2).sum()), gradient
 
     def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the Hessian of each edge, (E, 6, 6) [N/m], the same for all coordinates."""
-        block = self.factor * np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3))
-        return np.tile(block, (len(self.stencils), 1, 1))
+        """Return the Hessian of each edge, (E, 6, 6) [N/m]."""
+        return np.kron(self.scalar_stiffness(x)[1], np.eye(3))
+
+    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the edges and their blocks (E, 2, 2) [N/m], the same for all coordinates."""
+        block = self.factor * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
 
 
 @known_answer(
