@@ -127,15 +127,13 @@ class IsolatedProcess:
 
     def stop(self) -> None:
         """Kill it and what it has started, from another thread: a call under way raises WorkerDied."""
-        process = self._process
-        if process is not None and process.pid is not None:
+        if (process := self._process) is not None:
             end_group(process.pid)
             process.kill()
 
     def _kill(self) -> None:
         if self._process is not None:
-            end_group(self._process.pid)
-            self._process.kill()
+            self.stop()
             self._process.join()
             self._pipe.close()
             self._process = None
@@ -169,15 +167,14 @@ def lead_a_group() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "setpgrp"):
         os.setpgrp()
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_follow, args=(parent.sentinel,), name="follow-parent", daemon=True).start()
 
+    def follow() -> None:
+        if (parent := multiprocessing.parent_process()) is not None:
+            wait([parent.sentinel])
+            end_group(os.getpid())
+            os._exit(1)
 
-def _follow(parent: int) -> None:
-    wait([parent])
-    end_group(os.getpid())
-    os._exit(1)
+    threading.Thread(target=follow, name="follow-parent", daemon=True).start()
 
 
 _pipe: Connection | None = None  # to the one who called this process

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.method import MethodEntry
 from benchmarks.metrics import find_metric
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.plan import Plan, protocol_of, protocol_of_case
@@ -66,68 +67,46 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
     batch = outcomes.get(cell.batch_id, Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
-    machines = machines_of(network, taught_by)
-    for suite in cell.suites:
-        rows = _rows(
-            cell, suite, outcome, status=status, reason=reason, metrics=metrics, outside=plan.metrics,
-            origin=_origin(outcome, protocol_of(cell, plan)),
-        )  # fmt: skip
-        for row in rows:
-            machine = machines.get(row.metric)
-            yield row if machine is None else dataclasses.replace(row, hardware=machine)
-
-
-def _rows(
-    cell: Cell,
-    suite: str,
-    outcome: Outcome,
-    *,
-    status: str,
-    reason: str,
-    metrics: Mapping[str, Any],
-    outside: tuple[str, ...],
-    origin: Mapping[str, Any],
-) -> Iterator[Row]:
-    """Yield a row for each metric of a cell in one suite; one that says why, where there is none."""
-    scene, entry = cell.scene, cell.entry
+    scene, entry, protocol = cell.scene, cell.entry, protocol_of(cell, plan)
     # Of a cell without numbers: nobody has asked for a time where none is taken.
-    alone = (
-        ("energy/total", "J")
-        if "energy" in (scene.metrics or ()) and not scene.timed
-        else ("cost/frame", "ms")
-    )
+    untimed = "energy" in (scene.metrics or ()) and not scene.timed
+    # A row of an earlier run keeps the protocol under which it was made.
+    origin = {"protocol": protocol, **outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
     base = Row(
-        suite=suite, scene=scene.name, method=cell.method, seed=cell.seed, metric=alone[0], unit=alone[1],
+        suite="", scene=scene.name, method=cell.method, seed=cell.seed,
+        metric="energy/total" if untimed else "cost/frame", unit="J" if untimed else "ms",
         status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
         dtype=entry.dtype, **origin, garment=scene.garment, motion=scene.motion, part=scene.part,
         family=entry.reporting.family or entry.name, level=entry.reporting.level, role=entry.role,
         base=entry.reporting.base, seeded=entry.seeded, pairing_group=entry.reporting.pairing_group,
     )  # fmt: skip
-    if not metrics:
-        yield base
-    for name, measured in metrics.items():
-        value, uncertainty, moved = measured if isinstance(measured, (tuple, list)) else (measured, None, ())
-        metric, why, ended = find_metric(name, outside), reason, status
-        if name == "cost/frame" and not entry.timed:
-            why = DECLARED
-        if name == "cost/spread" and value > 100.0 * SPREAD:
-            why = why or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
-        judged: dict[str, Any] = {"protocol": OWN} if metric.declared_in else {}
-        if not math.isfinite(value):
-            why, ended = why or f"{name} is not finite", "failed" if status == "ok" else status
-        yield dataclasses.replace(
-            base, metric=name, unit=metric.unit, value=_finite(value),
-            status=ended, reason=why, uncertainty=_finite(uncertainty),
-            moved=tuple((twin, change) for twin, change in moved if math.isfinite(change)),
-            seeded=entry.seeded and metric.of == "answer", **judged,
-        )  # fmt: skip
+    machines = machines_of(network, taught_by)
+    of_metrics = [_row(base, status, cell.entry, *item, plan.metrics) for item in metrics.items()]
+    for suite in cell.suites:
+        for row in of_metrics or [base]:
+            hardware = machines.get(row.metric, row.hardware)
+            yield dataclasses.replace(row, suite=suite, hardware=hardware)
 
 
-def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
-    """Return the provenance of an outcome's rows; it keeps the protocol under which it was made."""
-    if not outcome.origin:
-        return {"protocol": protocol}
-    return {**outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
+def _row(
+    base: Row, status: str, entry: MethodEntry, name: str, measured: Any, outside: tuple[str, ...]
+) -> Row:
+    """Return the row of a metric of a cell; measured: a number, or the parts of an Estimate."""
+    value, uncertainty, moved = measured if isinstance(measured, (tuple, list)) else (measured, None, ())
+    metric, reason = find_metric(name, outside), base.reason
+    if name == "cost/frame" and not entry.timed:
+        reason = DECLARED
+    if name == "cost/spread" and value > 100.0 * SPREAD:
+        reason = reason or f"repeats lie more than {100.0 * SPREAD:.0f} % apart: read times with care"
+    if not math.isfinite(value):
+        reason, status = reason or f"{name} is not finite", "failed" if status == "ok" else status
+    return dataclasses.replace(
+        base, metric=name, unit=metric.unit, value=_finite(value), status=status, reason=reason,
+        uncertainty=_finite(uncertainty),
+        moved=tuple((twin, change) for twin, change in moved if math.isfinite(change)),
+        seeded=entry.seeded and metric.of == "answer",
+        protocol=OWN if metric.declared_in else base.protocol,
+    )  # fmt: skip
 
 
 def _finite(number: float | None) -> float | None:
@@ -223,7 +202,8 @@ def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
     result = outcome.result
     row = Row(**result) if result else case.row(status="failed", reason=outcome.reason)
     unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
-    origin = _origin(outcome, protocol_of_case(row.scene, row.metric))
+    protocol = protocol_of_case(row.scene, row.metric)
+    origin = {"protocol": protocol, **outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
     yield dataclasses.replace(row, **origin, unit=unit)
 
 

@@ -37,37 +37,39 @@ def trajectory(frames=4, **changes) -> Trajectory:
     return Trajectory(**(values | changes))
 
 
-@dataclasses.dataclass
-class FourFrames:
-    frames: int = 4
-    cloth: SimpleNamespace = dataclasses.field(default_factory=lambda: SimpleNamespace(vertex_count=3))
+FOUR = SimpleNamespace(frames=4, cloth=SimpleNamespace(vertex_count=3))
+CONVERGED = {"converged": np.array([1, 1, 0, 0.0])}
 
 
-def test_a_trajectory_is_judged_by_what_is_in_it():
-    def judged(truncated=False, **changes):
-        return judge(trajectory(**changes), Reading(1.0), FourFrames(), truncated=truncated)
-
-    assert judged() == ("ok", "")
-    assert judged(status="max_iterations", truncated=True) == ("ok", "")
-    assert judged(status="max_iterations", reason="frame 2: gave up")[0] == "stalled"
-    assert judged(frames=2)[0] == "diverged"
-    assert judged(frames=2, status="timeout", reason="60 s") == ("timeout", "60 s")
-    assert judged(positions=np.full((4, 3, 3), np.nan))[0] == "diverged"
-    assert judged(status="fine")[0] == "failed"
-    stalled = judged(
-        status="stalled", reason="frame 2: x", frame_fields={"converged": np.array([1, 1, 0, 0.0])}
-    )
-    assert stalled == ("stalled", "2 of 4 frames did not converge; frame 2: x")
-    early = {"truncated": True, "frame_fields": {"converged": np.array([1, 0, 0, 0.0])}}
-    assert judged(status="stalled", reason="frame 3: x", **early) == ("stalled", "frame 3: x")
-    assert judged(status="diverged", reason="frame 3: y", frames=3, truncated=True)[0] == "diverged"
-    relaxed = judged(status="converged", reason="frame 1: round-off: residual 2e-6 above tolerance 1e-6")
-    assert relaxed == ("ok", "frame 1: round-off: residual 2e-6 above tolerance 1e-6")
-
-
-def test_a_time_that_cannot_be_believed_fails_the_cell():
-    status, reason = judge(trajectory(), Reading((1.0,), "it went on"), FourFrames(), truncated=False)
-    assert status == "failed" and "it went on" in reason
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, ("ok", "")),
+        ({"status": "max_iterations", "truncated": True}, ("ok", "")),
+        ({"status": "max_iterations", "reason": "frame 2: gave up"}, ("stalled", "frame 2: gave up")),
+        ({"frames": 2}, ("diverged", "ended after 2 of 4 frames")),
+        ({"frames": 2, "status": "timeout", "reason": "60 s"}, ("timeout", "60 s")),
+        ({"positions": np.full((4, 3, 3), np.nan)}, ("diverged", "a position is not finite")),
+        ({"status": "fine"}, ("failed", "unknown status 'fine'")),
+        (
+            {"status": "stalled", "reason": "frame 2: x", "frame_fields": CONVERGED},
+            ("stalled", "2 of 4 frames did not converge; frame 2: x"),
+        ),
+        (
+            {"status": "stalled", "reason": "frame 3: x", "frame_fields": CONVERGED, "truncated": True},
+            ("stalled", "frame 3: x"),
+        ),
+        ({"status": "diverged", "reason": "y", "frames": 3, "truncated": True}, ("diverged", "y")),
+        ({"reason": "frame 1: round-off: residual 2e-6"}, ("ok", "frame 1: round-off: residual 2e-6")),
+        ({"complaint": "it went on"}, ("failed", "its time cannot be believed: it went on")),
+    ],
+)
+def test_a_trajectory_is_judged_by_what_is_in_it_and_by_the_clock(changes, expected):
+    changes = {"truncated": False, "complaint": "", **changes}
+    reading = Reading((1.0,), changes.pop("complaint"))
+    truncated = changes.pop("truncated")
+    status, reason = judge(trajectory(**changes), reading, FOUR, truncated=truncated)
+    assert status == expected[0] and reason.startswith(expected[1])
 
 
 def rows(cell: Cell, outcome: Outcome, metrics: dict[str, float] | None = None, **more: Outcome) -> list[Row]:
@@ -137,19 +139,17 @@ def test_the_last_line_counts_the_endings_of_every_suite():
     assert summary(rows, stages) == last
 
 
-def test_what_a_reason_says_of_times_and_networks_has_one_definition():
-    row = Row(
-        "garments", "s", "mine", 0, "cost/frame", "ms", 1.0, reason="declared by its author, not measured"
-    )
-    assert row.declared and not row.pretrained
-    taken = dataclasses.replace(
-        row, reason="its network learned without a; pretrained network n of 1; the same bits"
-    )
-    assert taken.pretrained == "pretrained network n of 1; the same bits" and not taken.declared
-    refused = dataclasses.replace(
-        row, value=None, status="skipped", reason="no pretrained network n: train it"
-    )
-    assert not refused.pretrained and not refused.declared
+@pytest.mark.parametrize(
+    ("reason", "declared", "pretrained"),
+    [
+        ("declared by its author, not measured", True, ""),
+        ("its network learned without a; pretrained network n of 1", False, "pretrained network n of 1"),
+        ("no pretrained network n: train it", False, ""),
+    ],
+)
+def test_what_a_reason_says_of_times_and_networks_has_one_definition(reason, declared, pretrained):
+    row = Row("garments", "s", "mine", 0, "cost/frame", "ms", None, "skipped", reason)
+    assert (row.declared, row.pretrained) == (declared, pretrained)
 
 
 def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch):
