@@ -187,20 +187,17 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
         for scene in plan.scenes
     }
+    remarks = {row.method: "declared time" for row in rows if row.declared}
+    remarks |= {row.method: "pretrained" for row in rows if row.pretrained}
     of_methods = {
         name: {
-            "label": entry.label, "description": entry.description, "role": entry.role,
-            "family": entry.reporting.family, "level": entry.reporting.level, "base": entry.reporting.base,
-            "seeded": entry.seeded, "dtype": entry.dtype,
+            "label": f"{entry.label or name} ({remarks[name]})" if name in remarks else entry.label,
+            "description": entry.description, "role": entry.role, "family": entry.reporting.family,
+            "level": entry.reporting.level, "base": entry.reporting.base, "seeded": entry.seeded,
+            "dtype": entry.dtype,
         }
         for name, entry in methods.items()
     }  # fmt: skip
-    for name in {row.method for row in rows if row.declared}:
-        if name in methods:
-            of_methods[name]["label"] = f"{methods[name].label or name} (declared time)"
-    for name in {row.method for row in rows if row.pretrained}:
-        if name in methods:
-            of_methods[name]["label"] = f"{of_methods[name]['label'] or name} (pretrained)"
     cases = {
         case.name: {
             "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
