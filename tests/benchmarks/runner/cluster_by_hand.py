@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import multiprocessing
 import os
@@ -12,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from benchmarks.runner.cache import Cache
 from benchmarks.runner.cluster import Cluster
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
-from benchmarks.runner.task import Outcome, Task
+from benchmarks.runner.task import Context, Outcome, Task
 from tests.benchmarks.runner.tasks_by_hand import Bar
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -98,58 +98,46 @@ def worker() -> int:
     return asking.pid
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Write:
-    """A file of so many random numbers, plus those of what it needs; `how` says what it does besides."""
+def work(name: str, seed: int, how: str, mark: str, sleep: float, context: Context, needed) -> Outcome:
+    """Write a file of random numbers, plus those of what is needed.
 
-    name: str
-    count: int = 1000
-    seed: int = 0
-    how: str = ""
-    mark: str = ""  # a file that says that it is at it
-    sleep: float = 0.0
-
-    def run(self, context, needed):
-        if self.mark:
-            with open(self.mark, "a") as file:
-                file.write(f"{worker()} {os.getpid()}\n")
-        if self.how == "raise":
-            raise ValueError("broken on purpose")
-        if self.how == "die":
-            os.kill(os.getpid(), signal.SIGKILL)
-        if self.how == "die with the worker":
-            os.kill(worker(), signal.SIGKILL)
-            time.sleep(60)
-        time.sleep(self.sleep)
-        numbers = np.random.default_rng(self.seed).random(self.count)
-        for outcome in needed.values():
-            numbers += np.load(context.folder.path / outcome.files[0])[: self.count]
-        path = context.folder.path / "numbers" / f"{self.name}.npy"
-        path.parent.mkdir(exist_ok=True)
-        np.save(path, numbers)
-        context.memo.setdefault("done", []).append(self.name)
-        return Outcome(result={"memo": list(context.memo["done"])}, files=(context.folder.relative(path),))
+    how: what is done besides; mark: a file that says that it is begun.
+    """
+    if mark:
+        with open(mark, "a") as file:
+            file.write(f"{worker()} {os.getpid()}\n")
+    if how == "raise":
+        raise ValueError("broken on purpose")
+    if how == "die":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if how == "die with the worker":
+        os.kill(worker(), signal.SIGKILL)
+        time.sleep(60)
+    time.sleep(sleep)
+    numbers = np.random.default_rng(seed).random(1000)
+    for outcome in needed.values():
+        numbers += np.load(context.folder.path / outcome.files[0])
+    path = context.folder.path / "numbers" / f"{name}.npy"
+    path.parent.mkdir(exist_ok=True)
+    np.save(path, numbers)
+    context.memo.setdefault("done", []).append(name)
+    return Outcome(result={"memo": list(context.memo["done"])}, files=(context.folder.relative(path),))
 
 
-def write(name: str, needs=(), batch: str = "", seconds: float = 1.0, **fields) -> Task:
+def write(name: str, *needs: int, seed=0, how="", mark="", sleep=0.0, batch: str = "") -> Task:
     return Task(
-        kind="numbers", name=name, label=name, stage="writing", silent=True, needs=needs, batch=batch,
-        run=Write(name=name, **fields).run, code=("benchmarks/results",), seconds=seconds,
+        kind="numbers", name=name, label=name, stage="writing", silent=True, batch=batch,
+        needs=tuple(("numbers", str(need)) for need in needs), code=("benchmarks/results",),
+        run=partial(work, name, seed, how, mark, sleep),
     )  # fmt: skip
 
 
 def chain(**fields) -> list[Task]:
     """Twelve tasks in three rounds, the later ones made from the earlier ones, the last two one batch."""
-
-    def number(n: int, *needs: int, **more) -> Task:
-        ids = tuple(("numbers", str(need)) for need in needs)
-        return write(str(n), seed=n, needs=ids, **fields | more)
-
-    first = [number(n) for n in range(6)]
     return [
-        *first,
-        *(number(n, n - 6, 0) for n in range(6, 10)),
-        *(number(n, 6, batch="b") for n in (10, 11)),
+        *(write(str(n), seed=n, **fields) for n in range(6)),
+        *(write(str(n), n - 6, 0, seed=n, **fields) for n in range(6, 10)),
+        *(write(str(n), 6, seed=n, batch="b", **fields) for n in (10, 11)),
     ]
 
 
@@ -167,8 +155,8 @@ def finish(folder: Path, address: str = "", **fields) -> Runner:
     return runner
 
 
-def together(folder: RunFolder, address: str, *batches, needed=None) -> dict[str, Outcome]:
-    left, cluster = [(batch, needed or {}) for batch in reversed(batches)], executor(folder, address)
+def together(folder: RunFolder, address: str, *batches) -> dict[str, Outcome]:
+    left, cluster = [(batch, {}) for batch in reversed(batches)], executor(folder, address)
     try:
         outcomes = cluster.together(lambda: left.pop() if left else None, Bar())
         return {task.name: outcome for task, outcome in outcomes}
