@@ -69,6 +69,8 @@ def clocked(
 
     run() is called again, MOST times at most, until `least` seconds are measured.
     """
+    import numpy as np
+
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
     children = set(multiprocessing.active_children())
@@ -78,7 +80,7 @@ def clocked(
             _synchronise()
             busy, clock = time.process_time(), time.perf_counter()
             made = run()
-            touch(of(made))
+            np.add.reduce(np.asarray(of(made)), axis=None)  # what is made only when looked at is made now
             _synchronise()
             seconds, busy = time.perf_counter() - clock, time.process_time() - busy
         if first and compiled:
@@ -87,7 +89,7 @@ def clocked(
         first = False
         runs.append(seconds)
         used += busy
-        if earlier is not None and _same(of(earlier), of(made)):
+        if earlier is not None and np.may_share_memory(np.asarray(of(earlier)), np.asarray(of(made))):
             again = "run() gave again what it had given before: each call of run() has to do all of the "
             return made, Reading(tuple(runs), again + "work, and to return an array of its own")
         if sum(runs) >= least or len(runs) == MOST:
@@ -113,19 +115,6 @@ def _compilations() -> Iterator[list[object]]:
 
     with install_recorder("numba:compile") as recorder:
         yield recorder.buffer
-
-
-def _same(one: np.ndarray, other: np.ndarray) -> bool:
-    import numpy as np
-
-    return np.may_share_memory(np.asarray(one), np.asarray(other))
-
-
-def touch(positions: np.ndarray) -> float:
-    """Read every number: what is made only when looked at is made now."""
-    import numpy as np
-
-    return float(np.add.reduce(np.asarray(positions), axis=None))
 
 
 def _still_at_work(

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from benchmarks.assets import Assets
 from benchmarks.results.run_folder import RunFolder
@@ -23,6 +23,8 @@ from benchmarks.timing import give_back
 
 if TYPE_CHECKING:
     from tqdm import tqdm
+
+    from benchmarks.runner.cluster import Cluster
 
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
 POLL = 0.2  # [s] between looks at what has ended
@@ -103,31 +105,11 @@ class TaskProcess(IsolatedProcess):
                 self.call(forget, seconds=None)
 
 
-class BackEnd(Protocol):
-    """Where untimed tasks are done: by processes of this machine, or by a cluster."""
-
-    @property
-    def slots(self) -> int:
-        """Number of batches that are done at once."""
-
-    def do(self, tasks: Sequence[Task], needed: Needed, told: Told) -> Iterator[Outcome]:
-        """Yield the outcome of each task of a batch, however it ends; called by several threads.
-
-        What a task leaves in the memo is there for its batch alone.
-        """
-
-    def stop(self) -> None:
-        """End what is at work, from another thread."""
-
-    def rest(self) -> None:
-        """End all processes, none of which is at work; others begin where they are needed."""
-
-    def close(self) -> None:
-        """End everything that was begun."""
-
-
 class LocalProcesses:
-    """Single-threaded processes of this machine, of which `slots` are at work side by side."""
+    """The back end of this machine: single-threaded processes, of which `slots` are at work side by side.
+
+    Another back end has the same methods, see benchmarks.runner.cluster.
+    """
 
     def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:
         self._begin, self.slots = (folder, assets), slots
@@ -135,7 +117,10 @@ class LocalProcesses:
         self._idle: list[TaskProcess] = []
 
     def do(self, tasks: Sequence[Task], needed: Needed, told: Told) -> Iterator[Outcome]:
-        """Yield the outcomes of a batch, done by one process."""
+        """Yield the outcome of each task of a batch, however it ends; called by several threads.
+
+        One process does them. What a task leaves in the memo is there for its batch alone.
+        """
         if self._idle:
             process = self._idle.pop()
         else:
@@ -147,12 +132,12 @@ class LocalProcesses:
         self._idle.append(process)
 
     def stop(self) -> None:
-        """Kill all processes."""
+        """Kill all processes, from another thread."""
         for process in self._all:
             process.stop()
 
     def rest(self) -> None:
-        """End all processes."""
+        """End all processes, none of which is at work; others begin where they are needed."""
         while self._all:
             self._all.pop().close()
         self._idle.clear()
@@ -168,10 +153,10 @@ class Executor:
     """
 
     def __init__(
-        self, folder: RunFolder, assets: Assets | None, workers: int, back_end: BackEnd | None = None
+        self, folder: RunFolder, assets: Assets | None, workers: int, cluster: Cluster | None = None
     ) -> None:
         self.folder, self.assets = folder, assets
-        self.back_end = back_end or LocalProcesses(folder, assets, workers)
+        self.back_end = cluster or LocalProcesses(folder, assets, workers)
         self._named: dict[str, TaskProcess] = {}
 
     @property
