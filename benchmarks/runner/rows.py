@@ -199,8 +199,12 @@ def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
     outcome = outcomes.get(("case", case.name))
     if outcome is None:
         return
-    result = outcome.result
-    row = Row(**result) if result else case.row(status="failed", reason=outcome.reason)
+    row = Row(
+        case.suite, case.scene or case.name, case.method, 0, case.metric, case.unit, status="failed",
+        reason=outcome.reason, expected=case.expected, tolerance=case.tolerance,
+    )  # fmt: skip
+    if outcome.result:
+        row = Row(**outcome.result)
     unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
     protocol = protocol_of_case(row.scene, row.metric)
     origin = {"protocol": protocol, **outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
