@@ -6,7 +6,7 @@ import argparse
 import functools
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
@@ -24,29 +24,21 @@ class WrongWord(ValueError):
 class Parser(argparse.ArgumentParser):
     """Argument parser that answers a wrong or empty word with one line; examples stay as they are written.
 
-    Args:
-        replaced: former option -> what to say in its place, for scripts that still have it.
-        options: of the base class.
-
     Example:
-        >>> Parser(prog="tools.halve", replaced={"--by": "--divisor"}).prog
+        >>> Parser(prog="tools.halve").prog
         'tools.halve'
     """
 
-    def __init__(self, *, replaced: Mapping[str, str] | None = None, **options: Any) -> None:
+    def __init__(self, **options: Any) -> None:
         plain = argparse.RawDescriptionHelpFormatter
         super().__init__(formatter_class=plain, allow_abbrev=False, **options)
-        self._replaced = replaced or {}
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse as the base class does.
 
         Raises:
-            WrongWord: also for a former option, and for an empty value, as "$UNSET" leaves one.
+            WrongWord: also for an empty value, as "$UNSET" leaves one.
         """
-        for word in sys.argv[1:] if args is None else args:
-            if remedy := self._replaced.get(word.partition("=")[0]):
-                self.error(f"{word.partition('=')[0]} is no option any more: {remedy}")
         parsed, unknown = super().parse_known_args(args, namespace)
         for action in self._actions:
             value = getattr(parsed, action.dest, None)

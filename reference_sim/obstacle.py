@@ -21,19 +21,12 @@ DEFAULT_REGION = 0.20  # [m]
 
 @dataclass(frozen=True)
 class Planes:
-    """Contact plane of each sample.
+    """Contact plane of each sample."""
 
-    Attributes:
-        points: (S, 3) [m] on the obstacle.
-        normals: (S, 3) unit, outward.
-        faces: (S,) of the obstacle.
-        barycentric: (S, 3) places on them.
-    """
-
-    points: np.ndarray
-    normals: np.ndarray
-    faces: np.ndarray
-    barycentric: np.ndarray
+    points: np.ndarray  # (S, 3) [m] on the obstacle
+    normals: np.ndarray  # (S, 3) unit, outward
+    faces: np.ndarray  # (S,) of the obstacle
+    barycentric: np.ndarray  # (S, 3) places on them
 
 
 def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: float) -> np.ndarray:

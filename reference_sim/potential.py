@@ -173,13 +173,10 @@ class HessianPattern:
         i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
         values[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += blocks
 
-    def lower(self, values: np.ndarray) -> sp.csc_matrix:
-        """Return the values as a scipy matrix; the upper halves of its diagonal blocks are stored too."""
-        return sp.csc_matrix((values, self.indices, self.indptr), shape=(self.size, self.size))
-
     def symmetric(self, values: np.ndarray) -> sp.csc_matrix:
         """Return the whole symmetric (3n, 3n) matrix."""
-        lower = sp.tril(self.lower(values), format="csc")
+        shape = self.size, self.size  # the upper halves of its diagonal blocks are stored too
+        lower = sp.tril(sp.csc_matrix((values, self.indices, self.indptr), shape=shape), format="csc")
         return sp.csc_matrix(lower + sp.tril(lower, -1).T)
 
 

@@ -10,7 +10,7 @@ time_step.py takes one frame; here frames are counted, timed and recorded.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -137,7 +137,10 @@ def simulate_with(
     stepper.check_start(x, v)
     state = State(x, v)
     record.add(x, 0.0, 0.0, _fields_of_start(stepper.potential.energies))
-    for frame in _with_bar(range(1, frames), progress):
+    due: Iterable[int] = range(1, frames)
+    if progress is not None:
+        due = progress_bar(due, desc=progress, unit="frame", initial=1, total=frames)
+    for frame in due:
         clock = time.perf_counter()
         after, results = stepper.advance(frame, state, pin_positions and pin_positions(frame))
         seconds = time.perf_counter() - clock
@@ -224,9 +227,3 @@ def _checked(value: np.ndarray | None, default: np.ndarray, name: str) -> np.nda
     if len(bad := np.flatnonzero(~np.isfinite(value).all(axis=1))):
         raise ValueError(f"simulate: {name} of vertex {bad[0]} is {value[bad[0]]}: give finite numbers")
     return value
-
-
-def _with_bar(frames: range, label: str | None) -> Iterator[int] | range:
-    if label is None:
-        return frames
-    return progress_bar(frames, desc=label, unit="frame", initial=frames.start, total=frames.stop)

@@ -28,15 +28,10 @@ FirstGuess = Callable[[int, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Positions and velocity between two frames.
+    """Positions and velocity between two frames."""
 
-    Attributes:
-        x: (V, 3) [m].
-        v: (V, 3) [m/s].
-    """
-
-    x: np.ndarray
-    v: np.ndarray
+    x: np.ndarray  # (V, 3) [m]
+    v: np.ndarray  # (V, 3) [m/s]
 
 
 class TimeStepper:

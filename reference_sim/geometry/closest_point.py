@@ -222,17 +222,11 @@ def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, apart, leaves, b
 
 @dataclass(frozen=True)
 class Closest:
-    """Closest points of samples.
+    """Closest points of samples."""
 
-    Attributes:
-        faces: (S,).
-        barycentric: (S, 3) place on the face.
-        points: (S, 3) [m].
-    """
-
-    faces: np.ndarray
-    barycentric: np.ndarray
-    points: np.ndarray
+    faces: np.ndarray  # (S,)
+    barycentric: np.ndarray  # (S, 3) place on the face
+    points: np.ndarray  # (S, 3) [m]
 
 
 class FaceSearch:

@@ -1,7 +1,15 @@
 """Declaration of a term's fast kernels, their forms, and how a solver or a training finds them.
 
-The class attribute `kernels` of an `Energy` has a function for each use (USES) that it serves. Where one is
-missing, a solver with a slower way says so once (`warn_slow_path`); the others refuse the term.
+The class attribute `kernels` of an `Energy` has, by use, a function of the term that gives
+
+    vertex_inertia  (V,) [N/m] of a pull towards term.x_hat: early-stopped L-BFGS, block descent, XPBD
+    vertex_weights  (V,) [N] of a constant pull along -y: early-stopped L-BFGS, block descent, XPBD
+    float32_lanes   kernels.lanes.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS
+    vertex_block    VertexBlocks: vertex block descent
+    constraint      Constraints: XPBD
+    training_batch  BatchKernel: the loss of trainings on a CPU
+
+Where one is missing, a solver with a slower way says so once (`warn_slow_path`); the others refuse the term.
 
 Gauss-Seidel sweeps (vertex block descent, XPBD) move vertices between one element and the next, so their
 kernels work on one element at a time, in float64; tests/benchmarks/methods/test_minimisers.py holds them to
@@ -31,15 +39,6 @@ if TYPE_CHECKING:
     from reference_sim.potential import Potential
 
 
-# Use -> what the function (term) -> ... gives, and who asks for it.
-USES = {
-    "vertex_inertia": "(V,) [N/m] of a pull towards term.x_hat: early-stopped L-BFGS, block descent, XPBD",
-    "vertex_weights": "(V,) [N] of a constant pull along -y: early-stopped L-BFGS, block descent, XPBD",
-    "float32_lanes": "kernels.lanes.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS",
-    "vertex_block": "VertexBlocks: vertex block descent",
-    "constraint": "Constraints: XPBD",
-    "training_batch": "BatchKernel: the loss of trainings on a CPU",
-}
 OF_VERTICES = ("vertex_inertia", "vertex_weights")
 
 

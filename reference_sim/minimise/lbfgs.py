@@ -175,11 +175,11 @@ class LBFGSRun(Descent):
         """Factorise the preconditioner here; return whether it is positive definite."""
         values = self.timed("assemble", self.preconditioner.assemble, self.x)
         self.factorisations += 1
-        return self.timed("factorise", self.preconditioner.factorise, values)
+        return self.timed("factorise", self.preconditioner.solver.factorise, values)
 
     def solve(self, q: np.ndarray) -> np.ndarray:
         """Return the inverse of the preconditioner times q (3n,)."""
-        return self.timed("solve", self.preconditioner.solve, q)
+        return self.timed("solve", self.preconditioner.solver.solve, q.reshape(-1, 3)).ravel()
 
 
 # In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions alone;
@@ -193,7 +193,7 @@ class ScalarPreconditioner:
     def __init__(self, potential: Potential) -> None:
         free = potential.cloth.free
         self._pattern = potential.pattern(free, block=1)
-        self._solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
+        self.solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
         self._floor = FLOOR * potential.cloth.masses[free] * 30**2
 
     def assemble(self, x: np.ndarray) -> np.ndarray:
@@ -201,11 +201,3 @@ class ScalarPreconditioner:
         values = self._pattern.assemble(x)
         values[self._pattern.diagonal] += self._floor
         return values
-
-    def factorise(self, values: np.ndarray) -> bool:
-        """Factorise the matrix with these values (nnz,); False if it is not positive definite."""
-        return self._solver.factorise(values)
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last factorisation: b (3n,)."""
-        return self._solver.solve(b.reshape(-1, 3)).ravel()

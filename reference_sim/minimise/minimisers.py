@@ -44,14 +44,6 @@ def make_minimiser(
 
     Raises:
         ValueError: unknown name.
-
-    >>> from reference_sim import Cloth, Material, Potential
-    >>> from reference_sim.energies import StretchStVK
-    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    >>> cloth = Cloth(square, np.array([[0, 1, 2], [0, 2, 3]]), Material(), pins=[0, 1])
-    >>> minimiser = make_minimiser(Potential([StretchStVK(cloth)]), "newton")
-    >>> minimiser.minimise(1.01 * square).status
-    'converged'
     """
     if callable(method):
         return method(potential, **options)

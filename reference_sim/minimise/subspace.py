@@ -28,15 +28,10 @@ SINGULAR = 1e-9  # of the largest singular value: smaller ones are those of colu
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Place of a subspace in one step.
+    """Place of a subspace in one step."""
 
-    Attributes:
-        turns: R, (V, 3, 3), invertible.
-        centre: c, (V, 3) [m].
-    """
-
-    turns: np.ndarray
-    centre: np.ndarray
+    turns: np.ndarray  # R, (V, 3, 3), invertible
+    centre: np.ndarray  # c, (V, 3) [m]
 
     def unposed(self, x: np.ndarray) -> np.ndarray:
         """Return the offsets (V, 3) that the placement takes to x (V, 3) [m]."""

@@ -15,10 +15,10 @@ from tests.reference_sim.minimise.minima import assert_minimum, hanging
 def test_without_a_preconditioner_newton_takes_over_at_once():
     potential, x = hanging()
     minimiser = make_minimiser(potential, "lbfgs")
-    minimiser.preconditioner.factorise = lambda data: False
+    minimiser.preconditioner.solver.factorise = lambda data: False
     assert_minimum(potential, x, minimiser.minimise(x))
     alone = make_minimiser(potential, "lbfgs", finish=False)
-    alone.preconditioner.factorise = lambda data: False
+    alone.preconditioner.solver.factorise = lambda data: False
     assert alone.minimise(x).status == "stalled"
 
 
