@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from benchmarks import methods as methods
-from benchmarks import metrics, run, scenes
+from benchmarks import metrics, scenes
 from benchmarks.declarations import DeclarationError
 from benchmarks.metric import Measurements, Metric
 from benchmarks.presets import find_preset
@@ -54,11 +54,3 @@ def test_a_role_and_a_size_that_nobody_knows_are_named():
     scene = dataclasses.replace(scenes.SCENES[0], sizes=("sheet_cell",))
     with pytest.raises(DeclarationError, match="'sheet_cell', which no preset has"):
         scene.at(find_preset("smoke"))
-
-
-@pytest.mark.parametrize("more", [[], ["--dry-run"]])
-def test_the_command_says_it_in_one_line_and_leaves_nothing(more, tmp_path, monkeypatch, refused):
-    wrong = dataclasses.replace(scenes.SCENES[0], name="kite", module="benchmarks.scenes.kite")
-    monkeypatch.setattr(scenes, "SCENES", (*scenes.SCENES, wrong))
-    flags = ["smoke", "--scenes", "kite", "--methods", "simulation", "-o", str(tmp_path / "run")]
-    refused("no module benchmarks.scenes.kite", run.main, [*flags, *more])

@@ -37,14 +37,6 @@ def test_the_list_names_everything(capsys):
         assert name in listing
 
 
-@pytest.mark.parametrize("study", ["smoke", "paper", "garments"])
-def test_the_list_names_every_scene_that_a_study_has(study, capsys):
-    asked = {scene.name for scene in planned(study, "--methods", "simulation,snug").scenes}
-    assert run.main(["--list"]) == 0
-    listed = {line.split()[0] for line in capsys.readouterr().out.splitlines() if line.strip()}
-    assert not {name.removesuffix("@clip") for name in asked} - listed
-
-
 def test_the_list_has_the_scenes_that_the_study_measures(capsys):
     assert run.main(["--list", "smoke:speed"]) == 0
     measured = capsys.readouterr().out.partition("where none is named")[2].partition("\n\n")[0]

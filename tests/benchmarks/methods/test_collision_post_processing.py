@@ -43,13 +43,6 @@ def test_what_lies_below_the_skin_comes_out_to_two_millimetres(scene):
         assert np.median(np.abs(moved[deep] - (MARGIN - before[deep]))) < 1e-3
 
 
-def test_the_given_vertices_are_not_written_to(scene):
-    clean, _, x = scene
-    kept = x[2].copy()
-    clean(x[2], 2)
-    assert np.array_equal(kept, x[2])
-
-
 def test_what_lies_deep_finds_the_near_way_out_whatever_came_before(scene):
     """Faces remembered from another pose may speed the search up, and change nothing."""
     clean, obstacle, x = scene

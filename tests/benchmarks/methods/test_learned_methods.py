@@ -7,37 +7,20 @@ import torch
 
 from benchmarks.methods import METHODS
 from benchmarks.methods.declared_networks import TRAININGS
-from benchmarks.presets import PRESETS, find_preset
+from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.networks import train
 from snug.kinds import KINDS
-from snug.named_recipes import ABLATIONS, RECIPES
 from snug.networks.trained_model import TrainedModel
-from snug.recipe import TERMS
-from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress
 
 
-def plan(*options):
-    return planned("full:garments", *options)
-
-
-@pytest.mark.parametrize("entry", [entry for entry in METHODS if entry.trained not in (None, "untrained")])
-def test_every_trained_method_has_a_training_and_steps_in_each_preset(entry):
-    kind = (entry.training or TRAININGS[entry.trained]).kind
-    assert entry.seeded != KINDS[kind].fitted and entry.reporting.pairing_group
-    assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
-
-
-def test_an_ablation_trains_as_long_as_the_whole():
-    quick = find_preset("quick")
-
-    def steps(name: str) -> int:
-        return quick.steps_of(name, TRAININGS[name].kind if name in TRAININGS else name)
-
-    assert steps("snug-no-bending") == steps("snug-springs") == quick.steps["snug"]
-    assert steps("pbns-springs") == quick.steps["pbns"] and steps("untrained") == 0
+def test_every_trained_method_has_a_training_and_steps_in_each_preset():
+    for entry in (entry for entry in METHODS if entry.trained not in (None, "untrained")):
+        kind = (entry.training or TRAININGS[entry.trained]).kind
+        assert entry.seeded != KINDS[kind].fitted and entry.reporting.pairing_group
+        assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
 
 
 CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
@@ -81,21 +64,3 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     )
     assert all(torch.equal(one[name], other[name]) for name in one)
     assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]
-
-
-def test_each_ablation_differs_from_the_default_in_what_its_name_says():
-    changes = {
-        recipe.name: {
-            name: value for name, value in recipe.as_dict().items()
-            if value != RECIPES["default"].as_dict()[name] and name != "name"
-        }
-        for recipe in ABLATIONS
-    }  # fmt: skip
-    assert changes["no-noise"] == {"h0_sigma": 0.0, "remembered": False} and changes["springs"] == {
-        "material": "springs"
-    }
-    for term in ("bending", "strain", "gravity", "inertia"):
-        assert set(TERMS) - set(changes[f"no-{term}"]["terms"]) == {term}
-    for frames in (6, 12):
-        changed = changes[f"window{frames}"]
-        assert changed == {"window": frames, "batch": 48 // frames}

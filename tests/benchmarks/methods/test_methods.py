@@ -29,7 +29,6 @@ from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
 from reference_sim import Trajectory
-from reference_sim.files.array_file import read_arrays
 from snug.named_recipes import RECIPES
 from snug.training.physics_loss import static_terms
 from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, plan_of, small_scene
@@ -191,28 +190,6 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
         assert "newton-1" not in unsure or unsure["newton-1"] > 0.0
 
 
-def test_the_settled_shirt_is_at_rest_outside_of_the_body(scenes):
-    scene = scenes[BODY]
-    distance = scene.obstacle.signed_distance(scene.start, 0)
-    assert (distance < -0.002).mean() < 0.02 and np.median(distance) < 0.1
-    assert np.abs(scene.origin_heights - 0.9).max() < 0.4
-
-
-def test_skinning_is_the_network_that_starts_at_zero_offsets(run):
-    """PBNS after two steps has moved by little from skinning, its start: both stand on one skinning."""
-    skinned, pbns = (trajectory_of(run, BODY, method).positions for method in ("skinning", "pbns"))
-    assert 0.0 < np.linalg.norm(pbns - skinned, axis=2).max() < 0.01
-
-
-def test_all_solvers_start_where_the_scene_starts(run, scenes):
-    for name, scene in scenes.items():
-        for method, outcome in outcomes_of(run, name).items():
-            if outcome.files and find_method(method).dtype == "float64":
-                first = trajectory_of(run, name, method).positions[0]
-                shift = find_method(method).options.get("shift", 0.0)
-                assert np.abs(first - scene.start).max() <= 1.01 * shift, f"{name} x {method}"
-
-
 @pytest.mark.parametrize(
     "name",
     ["simulation", "newton-1", "vbd-5", "xpbd-10", "skinning", "snug", "skinning+lbfgs-1", "snug+newton-1"],
@@ -236,15 +213,6 @@ def test_a_run_that_is_done_again_gives_the_same_and_inputs_are_what_it_takes_as
         rest, shifts = scene.dressed.body.joints()[0], scene.dressed.motion.translations
         assert np.array_equal(pelvis, rest + shifts[last])
     assert Method().inputs(scenes["hanging_sheet"]) is None
-
-
-def test_a_warm_started_solver_goes_on_from_skinning_and_has_its_time_on_the_clock(run, scenes):
-    skinned, warm = (trajectory_of(run, BODY, method) for method in ("skinning", "skinning+lbfgs-1"))
-    moved = np.linalg.norm(warm.positions - skinned.positions, axis=2).max(axis=1)
-    assert np.array_equal(warm.positions[0], scenes[BODY].start) and moved[1:].min() > 1e-4
-    seconds = {m: o.result["seconds"] for m, o in outcomes_of(run, BODY).items() if o.files}
-    assert seconds["skinning+lbfgs-1"] > seconds["skinning"]
-    assert warm.frame_fields["iterations"].tolist() == [0] + [1] * (scenes[BODY].frames - 1)
 
 
 @pytest.mark.parametrize(
@@ -276,16 +244,6 @@ def test_another_material_is_simulated_and_judged_by_the_scenes_own(exchange, pl
     # No uncertainty of the reference and no approximation of it: a variant that stands beside its base.
     assert group.reference is None
     assert (entry.role, entry.reporting.base) == ("ablation", "simulation")
-
-
-def test_every_method_has_the_whole_protocol(tmp_path):
-    for entry in METHODS:
-        if entry.package is None:
-            assert isinstance(entry.make(models=tmp_path, seed=0), Method)
-            assert entry.label and entry.role
-    assert Method().quasi_static() is None
-    with pytest.raises(NotImplementedError):
-        Method().batch(2)
 
 
 def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks(run, rows, scenes, tmp_path):
@@ -339,11 +297,3 @@ def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_
         len(curves["newton-1"]["energy/total"]) == 3 and np.isfinite(curves["newton-1"]["energy/total"]).all()
     )
     assert not any(name.startswith("time_error") for name in metrics["simulation"])  # dt/8 was not whole
-
-
-def test_curves_of_a_roll_out_that_was_lost_end_where_it_did(tmp_path):
-    from benchmarks.runner.measurements import write_curves
-
-    write_curves(tmp_path / "lost.npz", {"energy/total": np.ones(3)}, 5)
-    curves = read_arrays(tmp_path / "lost.npz")
-    assert np.isfinite(curves["energy/total"]).tolist() == [True] * 3 + [False] * 2

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods.sweeps import XPBD, VertexBlockDescent, block
-from benchmarks.methods.warm_started import SHARE, GivenFrames, WarmStarted
+from benchmarks.methods.warm_started import SHARE, GivenFrames
 from benchmarks.metrics.energy import first_guess
 from benchmarks.scenes.sheets import exact_fall
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
@@ -140,20 +138,6 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
 
 
 @pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
-def test_hinges_without_stiffness_are_no_hinges(method):
-    positions, faces = square_sheet(4, 0.2)
-    cloth = Cloth(positions, faces, Material(bending_stiffness=0.0), pins=(0, 4))
-    ends = []
-    for bending in ([], [BendHinge(cloth)]):
-        potential = Potential([StretchStVK(cloth), *bending, Gravity(cloth), Inertia(cloth, DT)])
-        potential.prepare(Step(positions, np.zeros_like(positions), positions, DT))
-        reached = method(potential, max_iterations=20).minimise(positions)
-        assert reached.status == "max_iterations"
-        ends.append(reached.positions)
-    np.testing.assert_array_equal(*ends)
-
-
-@pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
 def test_weight_alone_is_one_sweep_to_the_exact_fall(method):
     positions, faces = square_sheet(3, 0.2)
     cloth = Cloth(positions, faces, Material())
@@ -181,16 +165,6 @@ def test_what_a_sweep_cannot_do_is_refused_and_a_runaway_is_a_status(method, tou
     assert result.status == "diverged" and result.reason
 
 
-def test_simulate_takes_a_minimiser_of_its_callers_and_says_which():
-    positions, faces = square_sheet(4, 0.2)
-    cloth = Cloth(positions, faces, Material(), pins=(0, 4))
-    run = simulate(
-        cloth, [StretchStVK(cloth), Gravity(cloth)], frames=3, method=VertexBlockDescent, max_iterations=5
-    )
-    assert run.status == "max_iterations" and run.provenance["options"]["method"] == "VertexBlockDescent"
-    assert run.frame_fields["iterations"].tolist() == [0, 5, 5]
-
-
 def test_given_frames_begin_anew_with_each_run_and_carry_what_the_solver_added_to_the_last():
     frames = np.random.default_rng(0).normal(size=(3, 5, 3))
     added = np.random.default_rng(1).normal(size=(2, 5, 3))
@@ -206,33 +180,3 @@ def test_given_frames_begin_anew_with_each_run_and_carry_what_the_solver_added_t
             carried = SHARE * step * added[step - 1][:, ::-1]
             assert np.array_equal(plain(step, x), frames[step])
             assert carrying(step, x) == pytest.approx(frames[step] + carried, abs=1e-12)
-
-
-def test_a_warm_started_solver_has_no_starts_for_steps_between_frames(tmp_path):
-    scene = small_scene("hanging_sheet")
-    solver = {"method": "lbfgs", "max_iterations": 1}
-    method = WarmStarted(options={}, guess="skinning", path=tmp_path, solver=solver)
-    with pytest.raises(ValueError, match="2 steps a frame"):
-        method.prepare(replace(scene, substeps=2))
-
-
-def test_a_warm_started_solver_has_its_first_guesses_ready_before_the_clock_starts(monkeypatch, tmp_path):
-    scene = small_scene("hanging_sheet")
-    made, begun = [], []
-
-    def ready(scene):
-        made.append("on the clock" if warm_started.prepared else "before")
-        return frames
-
-    def frames():
-        begun.append(True)
-        return (scene.start.copy() for _ in range(scene.frames))
-
-    solver = {"method": "lbfgs", "max_iterations": 1, "finish": False}
-    warm_started = WarmStarted(options={}, guess="skinning", path=tmp_path, solver=solver)
-    warm_started.prepared = False
-    monkeypatch.setattr(warm_started, "_frames", ready)
-    warm_started.prepare(scene)
-    warm_started.prepared, warm = True, len(begun)
-    assert warm_started.run().frames == warm_started.run().frames == scene.frames
-    assert made == ["before"] and len(begun) == warm + 2  # each run begins them anew

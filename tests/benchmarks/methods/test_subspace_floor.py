@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.methods import FURTHER_METHODS, find_method
+from benchmarks.methods import find_method
 from benchmarks.metrics.energy import copied_terms, freeze_step
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
@@ -101,11 +101,3 @@ def test_the_floor_of_a_network_lies_in_the_span_of_its_last_layer(scene, tmp_pa
     assert floor.status == "converged"
     columns, _ = network.offset_space()
     assert left_over(columns.double().numpy(), unposed(scene, floor.positions)) < 1e-6
-
-
-def test_floors_run_when_named_and_are_not_timed():
-    floors = [entry for entry in FURTHER_METHODS if entry.name.endswith("-floor")]
-    assert len(floors) == 6 and not any(entry.timed or entry.static_known for entry in floors)
-    assert {find_method(entry.reporting.base).name for entry in floors} == {
-        entry.name.removesuffix("-floor") for entry in floors
-    }

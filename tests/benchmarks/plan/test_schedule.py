@@ -6,16 +6,14 @@ import dataclasses
 
 from benchmarks import provenance
 from benchmarks.methods import find_method
-from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.networks import NetworkTraining
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.training import Training
-from snug.recipe import DEFAULT, TERMS
-from tests.benchmarks.runner.tasks_by_hand import dressed_scene, plan_of
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene
+from tests.benchmarks.runner.test_cell_tasks import plan_of
 
 MOTIONS = Motions(train=("walk",), test=("kick",))
 
@@ -30,13 +28,6 @@ def test_the_key_of_a_training_is_that_of_all_it_depends_on(tmp_path, monkeypatc
     assert before and training(plan).key == before
     monkeypatch.setattr("benchmarks.provenance._version", lambda package: "another")
     assert training(plan).key != before
-
-
-def test_an_energy_that_a_recipe_names_is_part_of_the_training(tmp_path, monkeypatch):
-    terms = (*TERMS, "spring")
-    monkeypatch.setitem(TRAININGS, "mine", Training("snug", dataclasses.replace(DEFAULT, terms=terms)))
-    plan = plan_of(tmp_path, motions=MOTIONS)
-    assert training(plan, "mine").key != training(plan).key
 
 
 def test_a_cell_that_begins_removes_nothing_that_another_task_of_its_scene_has_made(tmp_path):

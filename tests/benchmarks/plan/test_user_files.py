@@ -18,10 +18,9 @@ from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Plan
-from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.measurements import measured
-from benchmarks.runner.schedule import Schedule, declared
+from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import of_garment
 from benchmarks.training import Training
 from benchmarks.validation.registry import CASES
@@ -96,17 +95,6 @@ def test_entries_of_files_and_as_a_program_are_rows_like_others(done):
     assert rows["mine", "height/highest"].unit == "m" and rows["mine", "height/highest"].value > 0.4
 
 
-def test_they_stand_in_tables_and_plots(done):
-    table = (done.tables / "height_by_scene.csv").read_text()
-    assert table.startswith("suite,scene,method,height/highest [m],")
-    assert all(f"\nspeed,lift,{method}," in table for method in ("mine", "other-1", "theirs"))
-    config = done.read_config()
-    assert config["metrics"]["height/highest"]["definition"] == "of all vertices"
-    assert config["methods"]["mine"]["label"] == "Mine"
-    figures = {path.name for path in done.figures.glob("*.svg")}
-    assert "error_against_time.svg" in figures
-
-
 def test_a_program_is_not_timed_and_its_own_time_is_marked(done):
     costs = {
         row.metric: row
@@ -175,15 +163,6 @@ def test_a_known_answer_has_a_name_of_its_own(tmp_path, refused):
     (tmp_path / "none.py").write_text("x = 1\n")
     (tmp_path / "study.toml").write_text(STUDY.format("none.py"))
     refused("declares no known answer, a function with @known_answer", run.main, [str(tmp_path), *out])
-
-
-def test_a_scene_whose_file_has_changed_is_done_again(files):
-    text = SCENE_FILE.replace('sizes=("sheet_frames",)', 'sizes=("sheet_frames",), files=("a.txt",)')
-    (files / "lifted_sheet.py").write_text(text)
-    (scene,) = user_files.entries_of(user_files.SCENES, str(files / "lifted_sheet.py"))
-    before = digest(declared(scene))
-    (files / "a.txt").write_text("another cloth")
-    assert digest(declared(scene)) != before
 
 
 def test_two_files_of_one_name_are_refused(tmp_path):

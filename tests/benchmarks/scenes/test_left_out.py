@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.presets import find_preset
-from benchmarks.scenes import SCENES, of_garment
+from benchmarks.scenes import of_garment
 from reference_sim import Cloth, Material, Potential, minimise, simulate
 from reference_sim.energies import BendHinge, ContactPenalty, Inertia, StretchStVK
 from tests.reference_sim.meshes import patch
@@ -44,17 +44,6 @@ scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets
 method = find_method("lbfgs-5").make(models=Path("."), seed=0)
 method.prepare(dataclasses.replace(scene, settle=lambda: start))
 assert method.run().frames == 4
-print(*sys.modules)
-"""
-STATIC = """
-import sys
-import numpy as np
-from reference_sim import Cloth, Material, Potential, minimise
-from reference_sim.energies import Gravity, StretchStVK
-x = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1], [0.1, 0.0, 0.1]])
-cloth = Cloth(x, np.array([[0, 1, 2], [1, 3, 2]]), Material(), pins=[0, 1])
-result = minimise(Potential([StretchStVK(cloth), Gravity(cloth)]), x - [0.0, 0.05, 0.0])
-assert result.status == "converged", result.reason
 print(*sys.modules)
 """
 BODY = (
@@ -110,12 +99,6 @@ def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
     }
 
 
-def test_a_static_problem_loads_no_time_step():
-    modules = loaded(STATIC)
-    assert "reference_sim.energies.stretch_stvk" in modules
-    assert not modules & {"reference_sim.energies.inertia", *BODY}
-
-
 def test_what_is_not_declared_is_not_evaluated(monkeypatch):
     """Hinges, contact and inertia would raise if anything asked them for a number."""
 
@@ -131,12 +114,3 @@ def test_what_is_not_declared_is_not_evaluated(monkeypatch):
     assert simulate(cloth, [StretchStVK(cloth)], frames=3).status == "converged"
     monkeypatch.setattr(Inertia, "value_and_gradient", asked)
     assert minimise(Potential([StretchStVK(cloth)]), 1.1 * points).status == "converged"
-
-
-def test_no_scene_declares_what_it_has_no_use_for():
-    without_body = [scene for scene in SCENES if not scene.dressed]
-    assert len(without_body) >= 4
-    for scene in without_body:
-        built = scene.at(find_preset("smoke")).build()
-        assert ("collision" in built.terms) == (built.obstacle is not None) == scene.obstacle
-        assert built.dressed is None

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -76,18 +74,6 @@ def plan_of(folder, cells):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("scene", CASES, ids=lambda scene: scene.name)
-def test_a_hard_motion_starts_where_the_shirt_has_settled(scene, walk):
-    motion = motion_of(scene, walk)
-    assert 20 <= motion.frames <= 50 and motion.fps == walk.fps
-    assert np.array_equal(motion.translations[0], walk.translations[0])
-    assert scene.counterpart == ORDINARY
-    if "betas" in scene.options:
-        assert not motion.poses[0, 1:].any() and not scene.start_of  # in T-pose, in the shirt's rest shape
-    else:
-        assert motion.poses[0] == pytest.approx(walk.poses[0], abs=1e-12) and scene.start_of == ORDINARY
-
-
 def test_what_is_hard_about_each(walk):
     made = {scene.name.partition("/")[2]: motion_of(scene, walk) for scene in CASES}
     assert np.array_equal(made["walk_x4"].poses, walk.poses[::4])
@@ -104,14 +90,6 @@ def test_what_is_hard_about_each(walk):
     joints = joint_positions(made["arms_crossed"].poses, made["arms_crossed"].translations)[-1]
     wrists = joints[JOINT["left_wrist"]] - joints[JOINT["right_wrist"]]
     assert wrists[0] < -0.1  # the left one is on the right
-
-
-def test_only_wrong_frames_are_recovered_from_and_a_small_body_is_refused(assets):
-    assert built(assets, "out_of_distribution/root_glitch").glitch == hard_motions.GLITCH
-    assert built(assets, "out_of_distribution/membrane_x10").glitch is None
-    shapeless = dataclasses.replace(assets, body=SimpleNamespace(shape_count=1))
-    with pytest.raises(ValueError, match="1 shapes"):
-        built(shapeless, "out_of_distribution/girth_+5")
 
 
 # --- what is measured --------------------------------------------------------------------------------------
@@ -168,15 +146,6 @@ def test_a_glitch_is_forgotten_or_not(positions):
     assert net["motion/recovery_1"] > net["motion/recovery_30"] > 0.0
     assert free["motion/offset"] < 1e-3  # mm: its float32
     assert free["motion/strain_ratio"] == pytest.approx(1.0)
-
-
-def test_distance_is_that_from_skinning(positions):
-    free = roll_outs(positions, "out_of_distribution/walk_x4")["skinning"]
-    moved = trajectory_of(free.scene, free.positions + np.array([0.001, 0.0, 0.0]))
-    other = RollOut(free.group, find_method("simulation"), moved)
-    free.group.roll_outs.append(other)
-    metrics = measure_extrapolation(other)
-    assert metrics["motion/offset"] == pytest.approx(1.0, abs=1e-3) and "motion/strain_ratio" not in metrics
 
 
 def test_another_material_judges_the_same_roll_out(positions):

@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets, read_inputs
-from benchmarks.meshes import sphere, square_sheet
-from benchmarks.metrics.scene_facts import measure_body_shape
 from benchmarks.plan.plan import network_of
 from benchmarks.presets import find_preset
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import Schedule
-from benchmarks.scenes import FURTHER_SCENES, GARMENT_SCENES, SCENES, all_scenes
+from benchmarks.scenes import SCENES, all_scenes
 from benchmarks.scenes.sheets import exact_fall
 from benchmarks.scenes.variations import SHAPES, shapes
 from reference_sim import simulate
@@ -36,17 +34,6 @@ def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
     assert first.terms[-1] == "inertia" and len(set(first.terms)) == len(first.terms)
     assert (first.obstacle is not None) == ("collision" in first.terms)
     assert first.dressed is None
-
-
-def test_scene_names_are_unique_and_a_dressed_scene_needs_assets():
-    scenes = all_scenes(["walk", "run"], ["twist_stop"])
-    worn = sum(2 * (1 if garment.dynamic else 3) for garment in GARMENT_SCENES)  # whole, and as a clip
-    shaped = 1 + SHAPES  # the mean body and others
-    assert len(scenes) == len(SCENES) + worn + len(FURTHER_SCENES) + shaped + 1  # one long
-    assert scenes["tshirt/walk"].garment == "tshirt" and scenes["tunic/twist_stop@clip"].garment == "tunic"
-    assert scenes["tshirt/walk"].dressed and not scenes["flag"].dressed
-    with pytest.raises(ValueError, match="needs assets"):
-        dressed_scene("walk").build()
 
 
 def test_unseen_shapes_are_drawn_as_a_training_draws_them_and_once():
@@ -87,33 +74,6 @@ def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
         assert apart == pytest.approx(np.linalg.norm(wanted, axis=2).min(1), abs=1e-9)
 
 
-def test_how_far_a_shape_is_from_the_mean_is_said_once():
-    def of(role, betas):
-        entry = SimpleNamespace(role=role)
-        scene = SimpleNamespace(dressed=SimpleNamespace(betas=betas))
-        return measure_body_shape(SimpleNamespace(entry=entry, scene=scene))
-
-    assert of("reference", np.array([3.0, 0.0, -4.0])) == {"body/shape": 5.0}
-    assert of("reference", None) == {"body/shape": 0.0} and of("network", None) == {}
-
-
-def test_the_sheet_is_a_square_without_slivers():
-    positions, faces = square_sheet(9, 0.4)
-    corners = positions[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = normals[:, 1] / 2
-    assert areas.sum() == pytest.approx(0.16) and areas.min() > 0.2 * areas.mean()
-
-
-def test_the_sphere_is_closed_outward_and_round():
-    points, faces = sphere(0.2, 16)
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
-    corners = points[faces]
-    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-    assert volume == pytest.approx(4 / 3 * np.pi * 0.2**3, rel=0.01)
-
-
 def test_the_exact_fall_obeys_backward_euler():
     start, velocity, dt = np.array([[0.1, 2.0, 0.3]]), np.array([1.0, 2.0, 3.0]), 0.1
     x = exact_fall(start, velocity, dt, 6)
@@ -135,17 +95,6 @@ def test_a_scene_of_no_sensible_duration_is_refused(field, value, says):
     built = SCENES[0].at(SMOKE).build()
     with pytest.raises(ValueError, match=f"scene {built.name}: {says}"):
         dataclasses.replace(built, **{field: value})
-
-
-def test_a_garment_is_tailored_only_where_a_scene_wears_it(monkeypatch):
-    """And each scene is built with its own: the tunic is not the T-shirt."""
-    assets = open_assets(TINY, embedded_motions(["twist_stop"]), ["tunic"])
-    assert list(assets.garments) == ["tunic"]
-    built = dressed_scene("twist_stop", "tunic").build(assets)
-    assert built.dressed.garment.name == "tunic" and built.dressed.garment.parameters["flare"] > 0
-    assert len(built.cloth.rest_positions) == pytest.approx(300, abs=3)
-    with pytest.raises(KeyError):
-        dressed_scene("twist_stop").build(assets)
 
 
 def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_path):

@@ -17,7 +17,6 @@ from benchmarks.scenes import of_garment
 from benchmarks.scenes.self_contact import with_self_contact
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reference_sim.minimise.newton import Newton
 from tests.benchmarks.plan.planned import study_with
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 from tests.reference_sim.meshes import grid
@@ -49,14 +48,6 @@ def test_solvers_that_stop_early_know_no_self_contact():
     whole = Simulation(options={})
     whole.prepare(scene)
     assert "energy/barrier" in whole.run().frame_fields
-
-
-def test_nor_do_those_that_start_elsewhere_and_subspaces_whose_minimiser_is_a_function():
-    scene = two_sheets(0.05)
-    declared = Simulation(options={"method": lambda potential, **options: Newton(potential, **options)})
-    declared.prepare(dataclasses.replace(scene, minimised=with_self_contact(scene.energies)))
-    trajectory = declared.run()
-    assert trajectory.status == "converged" and "energy/barrier" not in trajectory.frame_fields
 
 
 @pytest.mark.parametrize("exchange", ["springs", "pbns-springs", "printed-bending"])
