@@ -56,16 +56,13 @@ def network(
     return MethodEntry(name=name, label=label or KINDS[name].label, description=description, **usual | fields)
 
 
-def post_processed(entry: MethodEntry) -> MethodEntry:
+def _post_processed(entry: MethodEntry) -> MethodEntry:
     """Return the entry of a network with collision post-processing behind it."""
-    family = entry.reporting.family
     return replace(
         entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed",
         description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
-        module="benchmarks.methods.networks:make_post_processed_network", batched=False,
-        reporting=replace(
-            entry.reporting, base=entry.name, family=f"{family}+cleanup" if family else ""
-        ),
+        options=entry.options | {"cleanup": True}, batched=False,
+        reporting=replace(entry.reporting, base=entry.name),
     )  # fmt: skip
 
 
@@ -139,7 +136,7 @@ FLOORS = (
     ),
 )  # fmt: skip
 
-POST_PROCESSED = tuple(post_processed(network(name, "", "")) for name in ("snug", "supervised"))
+POST_PROCESSED = tuple(_post_processed(network(name, "", "")) for name in ("snug", "supervised"))
 
 
 _LABELS = {

@@ -25,8 +25,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -107,10 +107,7 @@ class DirectOptimisation(Method):
         pins = np.asarray(one.pins, dtype=np.int64) + one.vertex_count * np.arange(frames)[:, None]
         flat = None if one.rest_uv is None else np.concatenate([one.rest_uv] * frames)
         self.cloth = Cloth(rest, faces.reshape(-1, 3), one.material, pins=pins.ravel(), rest_uv=flat)
-        self.terms = [
-            *declared_energies(self.cloth),
-            ClipInertia(self.cloth, scene.dt, frames),
-        ]
+        self.terms = [*declared_energies(self.cloth), ClipInertia(self.cloth, scene.dt, frames)]
         # What the pelvis's own height adds to gravity: large, the same for all, and no measure of a fall.
         gravity = next(term for term in scene.energies if isinstance(term, Gravity))
         heights = np.zeros(frames) if scene.origin_heights is None else scene.origin_heights
@@ -164,9 +161,8 @@ class DirectOptimisation(Method):
                 obstacle.planes(single.sample_matrix @ clip[frame], frame, single.rest_samples)
                 for frame in range(frames)
             ]
-            kinds = _kinds(single)
-            whole.points = _by_kind(np.stack([p.points for p in planes]), kinds)
-            whole.normals = _by_kind(np.stack([p.normals for p in planes]), kinds)
+            whole.points = _by_kind(np.stack([p.points for p in planes]), single)
+            whole.normals = _by_kind(np.stack([p.normals for p in planes]), single)
 
 
 def _identity(terms: Sequence[Energy]) -> list[tuple[type[Energy], object]]:
@@ -174,17 +170,12 @@ def _identity(terms: Sequence[Energy]) -> list[tuple[type[Energy], object]]:
     return [(type(term), term.parameters()) for term in terms]
 
 
-def _kinds(contact: ContactPenalty) -> list[int]:
-    """Return where edge midpoints and centroids begin among the samples of one frame."""
-    vertices, edges = contact.cloth.vertex_count, len(contact.cloth.edges)
-    return [vertices, vertices + edges] if contact.samples == "all" else []
-
-
-def _by_kind(values: np.ndarray, kinds: list[int]) -> np.ndarray:
+def _by_kind(values: np.ndarray, contact: ContactPenalty) -> np.ndarray:
     """Reorder (T, S, 3) of frames to (T S, 3) of the whole cloth: all vertices, all edges, all centroids."""
-    return np.ascontiguousarray(
-        np.concatenate([part.reshape(-1, 3) for part in np.split(values, kinds, axis=1)])
-    )
+    vertices, edges = contact.cloth.vertex_count, len(contact.cloth.edges)
+    kinds = [vertices, vertices + edges] if contact.samples == "all" else []
+    parts = [part.reshape(-1, 3) for part in np.split(values, kinds, axis=1)]
+    return np.ascontiguousarray(np.concatenate(parts))
 
 
 def make_direct_optimisation(*, models: Path, seed: int) -> DirectOptimisation:
@@ -219,12 +210,8 @@ class SubspaceFloor(Simulation):
         start = placements[0].posed(offsets)
         start[scene.cloth.pins] = scene.start[scene.cloth.pins]
 
-        def in_subspace(potential: Potential, **options: Any) -> SubspaceNewton:
-            return SubspaceNewton(
-                potential, basis=basis, placements=placements[1:], offsets=offsets, **options
-            )
-
-        self.options = {"method": in_subspace}
+        around = {"basis": basis, "placements": placements[1:], "offsets": offsets}
+        self.options = {"method": partial(SubspaceNewton, **around)}
         state = np.stack([start, scene.start_velocity])
         super().prepare(dataclasses.replace(scene, settle=lambda: state))
 
@@ -248,26 +235,21 @@ def _placements(
     return placements
 
 
-def _handle_space(count: int) -> Callable[[DressedBody], Space]:
-    def space(dressed: DressedBody) -> Space:
-        functions = shape_functions(dressed.garment, count)
-        return span(functions), np.zeros(3 * dressed.vertices), DEFAULT.smoothing
-
-    return space
+def _handle_space(dressed: DressedBody, *, count: int) -> Space:
+    functions = shape_functions(dressed.garment, count)
+    return span(functions), np.zeros(3 * dressed.vertices), DEFAULT.smoothing
 
 
-def _last_layer(path: Path) -> Callable[[DressedBody], Space]:
-    def space(dressed: DressedBody) -> Space:
-        model = TrainedModel.load(path)
-        basis, centre = (part.double().numpy().copy() for part in model.network.offset_space())
-        rows = (3 * np.asarray(model.network.pins, dtype=np.int64)[:, None] + np.arange(3)).ravel()
-        basis[rows], centre[rows] = 0.0, 0.0
-        return basis, centre, model.recipe.smoothing
-
-    return space
+def _last_layer(dressed: DressedBody, *, path: Path) -> Space:
+    model = TrainedModel.load(path)
+    basis, centre = (part.double().numpy().copy() for part in model.network.offset_space())
+    rows = (3 * np.asarray(model.network.pins, dtype=np.int64)[:, None] + np.arange(3)).ravel()
+    basis[rows], centre[rows] = 0.0, 0.0
+    return basis, centre, model.recipe.smoothing
 
 
 def make_floor(*, models: Path, seed: int, handles: int = 0, network: str = "") -> SubspaceFloor:
     """Make the floor of so many handles, or that of the last layer of a network."""
-    space = _last_layer(model_path(models, network, seed)) if network else _handle_space(handles)
-    return SubspaceFloor(space=space)
+    if not network:
+        return SubspaceFloor(space=partial(_handle_space, count=handles))
+    return SubspaceFloor(space=partial(_last_layer, path=model_path(models, network, seed)))

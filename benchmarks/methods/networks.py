@@ -35,54 +35,8 @@ from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
 from snug.training.contact_cache import Patch
 
-
-@dataclass
-class Network(Method):
-    """Network read from its file. Features are made and the network is warmed up before run().
-
-    then: applied to each frame, as post-processing.
-    """
-
-    path: Path
-    then: Callable[[np.ndarray, int], np.ndarray] | None = field(default=None, init=False)
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Read the model, make the features and warm up. Not timed."""
-        assert scene.dressed is not None
-        self.model = TrainedModel.load(self.path)
-        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
-        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.frames = prepare_roll_out(
-            self.model, self.dressed, self.motion, self.betas, kept=scene.kept,
-            earlier=scene.dressed.before, postprocess=self.then,
-        )  # fmt: skip
-
-    def run(self) -> Trajectory:
-        """Roll out all frames."""
-        return self.frames()
-
-    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Return a function of the frame that makes features and joint transforms."""
-        assert scene.dressed is not None
-        return prepare_frame_inputs(
-            self.model, self.dressed, self.motion, self.betas, earlier=scene.dressed.before
-        )
-
-    def batch(self, copies: int) -> Callable[[], np.ndarray]:
-        """Return a function that computes `copies` bodies in this motion at once, (T, copies, V, 3) [m]."""
-        return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
-
-    def quasi_static(self) -> Trajectory:
-        """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock."""
-        return roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
-
-
-def make_network(*, models: Path, seed: int, kind: str) -> Network:
-    """Make the network of that name and seed: "untrained" or a key of TRAININGS in catalogue/trainings.py."""
-    return Network(model_path(models, kind, seed))
-
-
 MARGIN = 2e-3  # [m]
+WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
 
 
 class CollisionPostProcessing:
@@ -122,47 +76,70 @@ class CollisionPostProcessing:
         return x + np.maximum(lack, 0.0)[:, None] * normals
 
 
-WARM_UP = 3  # frames cleaned and thrown away, so that the kernels are compiled
+@dataclass
+class Network(Method):
+    """Network read from its file. Features are made and the network is warmed up before run().
 
+    cleanup: whether each frame is post-processed; the body is then posed before run() too.
+    """
 
-class PostProcessedNetwork(Network):
-    """Network read from its file, and the body that its garment is pushed out of, posed before run()."""
+    path: Path
+    cleanup: bool = False
+    clean: CollisionPostProcessing | None = field(default=None, init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Pose the body, compile the post-processing and prepare the network. Not timed."""
-        assert scene.dressed is not None and scene.obstacle is not None
+        """Read the model, make the features and warm up. Not timed."""
+        assert scene.dressed is not None
+        self.model = TrainedModel.load(self.path)
+        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         body, garment = scene.dressed.body, scene.dressed.garment
-        positions = np.asarray(scene.obstacle.positions)
-        self.then = clean = CollisionPostProcessing(
-            garment.rest_positions, body.shaped(), body.faces, positions
-        )
-        for frame in range(min(WARM_UP, len(positions))):
-            clean(np.asarray(scene.cloth.rest_positions), frame)
-        super().prepare(scene)
+        self.dressed = DressedBody(body, garment)
+        if self.cleanup:
+            assert scene.obstacle is not None
+            positions = np.asarray(scene.obstacle.positions)
+            self.clean = CollisionPostProcessing(garment.rest_positions, body.shaped(), body.faces, positions)
+            for frame in range(min(WARM_UP, len(positions))):
+                self.clean(np.asarray(scene.cloth.rest_positions), frame)
+        self.frames = prepare_roll_out(
+            self.model, self.dressed, self.motion, self.betas, kept=scene.kept,
+            earlier=scene.dressed.before, postprocess=self.clean,
+        )  # fmt: skip
 
     def run(self) -> Trajectory:
-        """Roll out, each frame post-processed."""
-        cleaned = super().run()
+        """Roll out all frames."""
+        rolled = self.frames()
+        if not self.clean:
+            return rolled
         facts = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}
-        return replace(cleaned, provenance=cleaned.provenance | facts)
+        return replace(rolled, provenance=rolled.provenance | facts)
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Return a function of the frame that makes features, joint transforms and the posed body."""
+        """Return a function of the frame that makes features, joint transforms, and the body to clean by."""
         assert scene.dressed is not None
-        features, body = super().inputs(scene), posed_body(scene.dressed)
+        features = prepare_frame_inputs(
+            self.model, self.dressed, self.motion, self.betas, earlier=scene.dressed.before
+        )
+        if not self.clean:
+            return features
+        body = posed_body(scene.dressed)
         return lambda frame: (features(frame), body(frame))
 
+    def batch(self, copies: int) -> Callable[[], np.ndarray]:
+        """Return a function that computes `copies` bodies in this motion at once, (T, copies, V, 3) [m]."""
+        return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
+
     def quasi_static(self) -> Trajectory:
-        """Return the network's quasi-static solutions, post-processed as well. Never on the clock."""
-        assert self.then is not None
-        still = super().quasi_static()
-        cleaned = [self.then(x, frame) for frame, x in enumerate(still.positions)]
+        """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock."""
+        still = roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
+        if not self.clean:
+            return still
+        cleaned = [self.clean(x, frame) for frame, x in enumerate(still.positions)]
         return replace(still, positions=np.stack(cleaned))
 
 
-def make_post_processed_network(*, models: Path, seed: int, kind: str) -> PostProcessedNetwork:
-    """Make the network of that name and seed with post-processing."""
-    return PostProcessedNetwork(model_path(models, kind, seed))
+def make_network(*, models: Path, seed: int, kind: str, cleanup: bool = False) -> Network:
+    """Make the network of that name and seed: "untrained" or a key of TRAININGS."""
+    return Network(model_path(models, kind, seed), cleanup)
 
 
 class Skinning(Method):

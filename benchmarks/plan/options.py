@@ -6,8 +6,7 @@ Light, so that --help answers at once.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from benchmarks.declarations import attributes_of
@@ -152,36 +151,30 @@ def list_names(study: Study) -> str:
     the given study.
     """
     read = read_files(study)
-    roles, parts = read.motions.role_of, study.parts
-    whole = [scene for scene in read.scenes.values() if not scene.name.endswith("@clip")]
-    in_parts = {
-        method.name: ", ".join(n for n, part in parts.items() if matching([method.name], part.methods))
-        for method in read.methods.values()
+    motions, parts = read.motions, study.parts
+    clip = f"{motions.first_garment}/{motions.measured[0]}@clip"
+    scenes = {
+        scene.name: scene.description + (f" ({motions.role_of(scene.motion)})" if scene.dressed else "")
+        for scene in read.scenes.values()
+        if not scene.name.endswith("@clip")
     }
+    methods = {}
+    for name, entry in read.methods.items():
+        known = ", ".join(part for part in parts if matching([name], parts[part].methods))
+        methods[name] = f"{entry.description} [{known or 'when named'}]"
+    listed = {part: ", ".join(names) for part, names in scenes_of_parts(read).items() if names}
     sections: dict[str, dict[str, str]] = {
         "studies": {name: read_study(name).question for name in study_names()},
         "parts of this study": {name: part.question for name, part in parts.items()},
-        "scenes of each part where none is named": {
-            name: ", ".join(scenes) for name, scenes in scenes_of_parts(read).items() if scenes
-        },
-        "scenes; of a dressed body, in a test or validation motion, also its liveliest part, as in "
-        f"{read.motions.first_garment}/{read.motions.measured[0]}@clip": {
-            scene.name: scene.description + (f" ({roles(scene.motion)})" if scene.dressed else "")
-            for scene in whole
-        },
-        "methods, and the parts in which they take part without being named": {
-            name: f"{read.methods[name].description} [{known or 'when named'}]"
-            for name, known in in_parts.items()
-        },
-        "training motions": dict.fromkeys(read.motions.train, ""),
+        "scenes of each part where none is named": listed,
+        f"scenes; of a dressed body, in a measured motion, also its liveliest part, as in {clip}": scenes,
+        "methods, and the parts in which they take part without being named": methods,
+        "training motions": dict.fromkeys(motions.train, ""),
         "sizes": {preset.name: preset.description for preset in PRESETS},
         "known answers": {case.name: f"{case.description} [{case.suite}]" for case in read.cases},
     }
-    return "\n\n".join(_section(title, rows) for title, rows in sections.items())
-
-
-def _section(title: str, rows: Mapping[str, str]) -> str:
-    if not any(rows.values()):
-        return f"{title}\n  {', '.join(rows)}"
-    width = max(map(len, rows))
-    return "\n".join([title, *(f"  {name:<{width}}  {rows[name]}".rstrip() for name in rows)])
+    lines = []
+    for title, rows in sections.items():
+        width = max(map(len, rows), default=0)
+        lines += [title, *(f"  {name:<{width}}  {text}".rstrip() for name, text in rows.items()), ""]
+    return "\n".join(lines[:-1])

@@ -11,12 +11,14 @@ are not declared.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.material import GRAVITY, Material
 
@@ -27,12 +29,14 @@ SWING, PERIOD = 0.15, 1.0  # [m] to either side, [s] of the flag's pole
 RADIUS, DRAPED_SIZE, GAP = 0.12, 0.5, 0.02  # [m] of the sphere, of the sheet on it, between both at the start
 
 
-def _cloth_energies(cloth: Cloth) -> tuple[Energy, ...]:
-    """Return strain, bending and weight; a scene without them does not load them."""
-    from reference_sim.energies.bend_hinge import BendHinge
-    from reference_sim.energies.stretch_stvk import StretchStVK
+def _built(scene: Scene, cloth: Cloth, frames: int, start: np.ndarray, **further: Any) -> BuiltScene:
+    """Return the scene of strain, bending and weight, without `energies`, with further fields."""
+    if "energies" not in further:
+        from reference_sim.energies.bend_hinge import BendHinge  # a scene without it does not load it
+        from reference_sim.energies.stretch_stvk import StretchStVK
 
-    return StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)
+        further["energies"] = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
+    return BuiltScene(name=scene.name, cloth=cloth, dt=DT, frames=frames, settle=lambda: start, **further)
 
 
 def build_free_fall(
@@ -41,15 +45,9 @@ def build_free_fall(
     """Build the scene of a thrown sheet, with its exact answer."""
     positions, faces = square_sheet(sheet_cells, SIZE)
     cloth = Cloth(positions, faces, Material())
-    return BuiltScene(
-        name=scene.name,
-        cloth=cloth,
-        energies=(Gravity(cloth),),
-        dt=DT,
-        frames=sheet_frames,
-        settle=lambda: np.stack([positions, np.broadcast_to(VELOCITY, positions.shape)]),
-        exact=exact_fall(positions, VELOCITY, DT, sheet_frames),
-    )
+    start = np.stack([positions, np.broadcast_to(VELOCITY, positions.shape)])
+    exact = exact_fall(positions, VELOCITY, DT, sheet_frames)
+    return _built(scene, cloth, sheet_frames, start, energies=(Gravity(cloth),), exact=exact)
 
 
 def exact_fall(start: np.ndarray, velocity: np.ndarray, dt: float, frames: int) -> np.ndarray:
@@ -73,14 +71,7 @@ def build_hanging_sheet(
     # Tilted by half a degree: a flat sheet hanging flat is a saddle, from which symmetry alone would choose.
     positions[:, 1] += 0.01 * positions[:, 0]
     cloth = Cloth(positions, faces, Material(), pins=(0, sheet_cells))
-    return BuiltScene(
-        name=scene.name,
-        cloth=cloth,
-        energies=_cloth_energies(cloth),
-        dt=DT,
-        frames=sheet_frames,
-        settle=lambda: cloth.rest_positions,
-    )
+    return _built(scene, cloth, sheet_frames, cloth.rest_positions)
 
 
 def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
@@ -95,15 +86,7 @@ def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_f
         phase = 2.0 * np.pi * frame * DT / PERIOD
         return positions[pole] + [0.0, 0.0, SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0]
 
-    return BuiltScene(
-        name=scene.name,
-        cloth=cloth,
-        energies=_cloth_energies(cloth),
-        dt=DT,
-        frames=sheet_frames,
-        settle=lambda: positions,
-        pin_positions=handles,
-    )
+    return _built(scene, cloth, sheet_frames, positions, pin_positions=handles)
 
 
 def build_sheet_on_sphere(
@@ -117,12 +100,5 @@ def build_sheet_on_sphere(
     # Off the sphere's axis by a little: centred, it would balance on a symmetry.
     positions += [0.004, RADIUS + GAP, 0.002]
     cloth = Cloth(positions, faces, Material())
-    return BuiltScene(
-        name=scene.name,
-        cloth=cloth,
-        energies=(*_cloth_energies(cloth), ContactPenalty(cloth)),
-        dt=DT,
-        frames=sheet_frames,
-        settle=lambda: positions,
-        obstacle=Obstacle(*sphere(RADIUS, 24)),
-    )
+    built = _built(scene, cloth, sheet_frames, positions, obstacle=Obstacle(*sphere(RADIUS, 24)))
+    return replace(built, energies=(*built.energies, ContactPenalty(cloth)))
