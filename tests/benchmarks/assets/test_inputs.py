@@ -21,8 +21,7 @@ def write_motions(folder: Path, *names: str, frames: int = 12) -> str:
 
 def write_body(path: Path, scale: float = 1.0) -> str:
     body = Body.load()
-    arrays = {"v_template": body.template, "shapedirs": body.shape_directions}
-    arrays |= {"J_template": body.joint_template, "J_shapedirs": body.joint_directions}
+    arrays = {"v_template": body.template, "J_template": body.joint_template}
     table = np.stack([np.maximum(body.parents, 0), np.arange(24)])
     scaled = {name: scale * array for name, array in arrays.items()}
     np.savez(path, f=body.faces, weights=body.skinning_weights, kintree_table=table, **scaled)

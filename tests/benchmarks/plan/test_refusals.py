@@ -57,7 +57,7 @@ WORDS = [
     ("--motions empty.amc", "empty.amc"),
     ("--motions broken.npz", "broken.npz"),
     ("--motions folder", "folder"),
-    ("--motions back.npz,up=z", "on its back or side: it stands along y"),
+    ("--motions back.npz,up=z", "stands along z in 0 % of the frames only"),
     ("--out broken.npz", "is a file"),
     ("--out full", "holds no run"),
     ("--out torn", "torn/run.json: not readable"),

@@ -13,8 +13,7 @@ from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule, tasks_of
-from tests.benchmarks.runner.tasks_by_hand import dressed_scene
-from tests.benchmarks.runner.test_cell_tasks import plan_of
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene, plan_of
 
 KICK = dressed_scene("kick")
 CELLS = tuple(Cell(KICK, find_method(name), 0, ("garments",)) for name in ("simulation", "snug"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,6 +21,7 @@ from benchmarks.scenes.variations import SHAPES, shapes
 from reference_sim import simulate
 from snug.body.parametric_body import Body
 from snug.motion.library import make_motion
+from tests.benchmarks.assets.test_inputs import write_body
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene
 
@@ -98,20 +100,15 @@ def test_a_scene_of_no_sensible_duration_is_refused(field, value, says):
 
 
 def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_path):
-    body = Body.load()
-    path, table = tmp_path / "tall.npz", np.stack([np.maximum(body.parents, 0), np.arange(24)])
-    arrays = {"v_template": body.template, "shapedirs": body.shape_directions, "f": body.faces}
-    arrays |= {"J_template": body.joint_template, "J_shapedirs": body.joint_directions}
-    tall = {key: 1.1 * array if key != "f" else array for key, array in arrays.items()}
-    np.savez(path, weights=body.skinning_weights, kintree_table=table, **tall)
-    plain, tall_plan = (planned("full:garments", *more) for more in ((), ("--body", str(path))))
+    path = write_body(tmp_path / "tall.npz", 1.1)
+    plain, tall_plan = (planned("full:garments", *more) for more in ((), ("--body", path)))
     cell = next(cell for cell in tall_plan.cells if cell.method == "snug")
     keys = [
         (key_of(Schedule(plan).network(network_of(cell))), key_of(Schedule(plan).cell(cell)))
         for plan in (plain, tall_plan)
     ]
     assert not set(keys[0]) & set(keys[1])
-    each = (read_inputs(body=file) for file in (None, path))
+    each = (read_inputs(body=file) for file in (None, Path(path)))
     low, high = (open_assets(TINY, [make_motion("walk")], ["tshirt"], inputs=inputs) for inputs in each)
     heights = [np.ptp(assets.garments["tshirt"].rest_positions[:, 1]) for assets in (low, high)]
     assert 1.05 < heights[1] / heights[0] < 1.15
