@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.metric import Metric
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import protocol_of, protocol_of_case
 from benchmarks.presets import find_preset
@@ -44,24 +43,14 @@ def _motion_of_one_more_degree(name):
     return dataclasses.replace(motion, poses=poses)
 
 
-def _metrics():
-    return {"a": Metric(name="a", unit="m", title="A", definition="a length")}
-
-
 @pytest.mark.parametrize(
     ("part", "place", "name", "value"),
     [
         ("motions", "snug.motion.library", "make_motion", _motion_of_one_more_degree),
-        ("motions", "snug.motion.library", "TEST", ("01_01_a",)),
         ("materials", "reference_sim.material", "Material", lambda: Material(bending_stiffness=4e-5)),
         ("materials", "reference_sim.material", "GRAVITY", 9.8),
-        ("metrics", "benchmarks.metrics", "declared", _metrics),
-        (
-            "reference",
-            "tests.benchmarks.protocol_definitions.Newton.__init__",
-            "__kwdefaults__",
-            {"tolerance": 1e-5},
-        ),
+        ("metrics", "benchmarks.metrics", "declared", dict),
+        ("reference", f"{protocol.__name__}.Newton.__init__", "__kwdefaults__", {"tolerance": 1e-5}),
         ("sampling", "benchmarks.metrics.surface_distance", "SAMPLED_FRAMES", 24),
         ("statistics", "benchmarks.results.protocol", "TIE", 0.1),
     ],
@@ -94,13 +83,7 @@ def test_titles_and_prose_are_no_part_of_it(monkeypatch):
         ({"scenes": ("flag",)}, NUMBER),
         ({"scenes": ("tshirt/dance_turn", "tshirt/07_02")}, NUMBER),
         ({"scenes": ("tshirt/dance_turn",)}, NUMBER),
-        (
-            {
-                "scenes": ("tshirt/dance_turn",),
-                "sizes": {"frames": 20},
-            },
-            OWN,
-        ),
+        ({"scenes": ("tshirt/dance_turn",), "sizes": {"frames": 20}}, OWN),
         ({"scenes": ("tshirt/kick",), "methods": ("simulation", "snug")}, NUMBER),
         ({"scenes": ("tshirt/dance_turn",), "validation_motions": ("05_04",), "methods": ("snug",)}, OWN),
     ],
