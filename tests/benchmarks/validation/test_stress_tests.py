@@ -21,18 +21,20 @@ from reference_sim.energies import Energy, StretchStVK
 from tests.reference_sim.element_blocks import blocks_of
 from tests.reference_sim.meshes import grid
 
-SMOKE = [case for case in STRESS_TESTS if case.smoke]
+CASES = [
+    pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow]) for case in STRESS_TESTS
+]
 
 
-@pytest.mark.parametrize("case", SMOKE, ids=lambda case: case.name)
-def test_a_case_of_the_smallest_preset_is_honest(case):
+@pytest.mark.parametrize("case", CASES)
+def test_a_stress_test_never_lies(case):
     row = case.run()
-    assert row.status == "ok", row.reason
-    assert row.suite == "extremes" and row.scene == case.name and row.metric == case.metric == "outcome"
+    honest = ("ok",) if case.smoke else ("ok", "stalled", "timeout", "diverged")
+    assert row.status in honest and row.reason, row.reason
+    assert row.suite == "extremes" and row.scene == case.name and row.metric == "outcome"
 
 
 def test_the_cases_use_every_start_shape_and_body_and_each_can_be_built():
-    assert len(STRESS_TESTS) >= 30 and len(SMOKE) == 6
     used = [{"start": "noisy", "shape": "even", **case.options} for case in STRESS_TESTS]
     for option, table in (("start", STARTS), ("shape", REST_SHAPES), ("speed", VELOCITIES), ("body", BODIES)):
         assert set(table) <= {options.get(option) for options in used}
@@ -47,13 +49,6 @@ def test_stiff_cloth_converges_in_tens_of_iterations(factor, most):
     result = minimise(*step, tolerance=RELATIVE_RESIDUAL)
     checked = check_result(*step, result)
     assert checked.status == "ok" and result.iterations <= most, checked
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", STRESS_TESTS, ids=lambda case: case.name)
-def test_a_stress_test_never_lies(case):
-    row = case.run()
-    assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, row.reason
 
 
 def test_predicted_stress_is_linear_in_the_step_and_forgotten():

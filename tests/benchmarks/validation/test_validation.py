@@ -19,12 +19,13 @@ from reference_sim.energies import Step
 from tests.benchmarks.plan.planned import planned
 
 
-def marked(case):
-    """A case for the tests: those of the smallest preset by default, the others as slow tests."""
-    return pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow])
-
-
-@pytest.mark.parametrize("case", [marked(case) for case in KNOWN_ANSWERS])
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow])
+        for case in KNOWN_ANSWERS
+    ],
+)
 def test_a_known_answer_is_found(case):
     row = case.run()
     assert row.status == "ok", row.reason
