@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -57,7 +57,7 @@ class Metric:
         declared_in: as of a MethodEntry.
 
     Raises:
-        ValueError: another `of`, no unit, or a field that is no string.
+        ValueError: another `of`, no unit, or a table that is no word.
 
     >>> Metric(name="height/mean", unit="m", title="Height", definition="mean over frames").of
     'answer'
@@ -74,14 +74,8 @@ class Metric:
     declared_in: str = ""
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"\w*", str(self.table)):
+        if not re.fullmatch(r"\w*", self.table):
             raise ValueError(f"metric '{self.name}': table='{self.table}': use letters, digits and _")
-        for what in ("name", "unit", "title", "definition", "table"):
-            if not isinstance(word := getattr(self, what), str):
-                raise ValueError(f"metric '{self.name}': {what}={word!r}: give a string")
-        for what in ("name", "unit"):  # heads of columns: no formula to programs that open CSV files
-            if getattr(self, what).startswith(("=", "+", "-", "@")):
-                raise ValueError(f"metric '{self.name}': {what} begins with one of = + - @: take another")
         if not self.unit:
             raise ValueError(f"metric '{self.name}' has no unit: say '1' where it has no dimension")
         if self.of not in NUMBERS_OF:
@@ -145,11 +139,11 @@ def measurements_in(home: str) -> Measurements:
     return Measurements(home, tuple(module.METRICS), **functions)
 
 
+@dataclass(eq=False)
 class Kept:
     """Memory of what metric modules computed of an object: kept(make) is make(object), computed once."""
 
-    def __init__(self) -> None:
-        self._made: dict[Callable[..., Any], Any] = {}
+    _made: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False)
 
     def kept(self, make: Callable[[Any], Made]) -> Made:
         """Return make(self), computed at the first call."""
@@ -158,36 +152,32 @@ class Kept:
         return self._made[make]
 
 
+@dataclass(eq=False)
 class RollOut(Kept):
     """Roll-out of one method in a scene. `positions` end before the first frame that is not finite.
 
     Attributes:
         group: the roll-outs of the scene.
         entry: the method.
+        trajectory: as the method returned it.
         status: of its cell.
         suites: those that report it.
-        trajectory: as the method returned it.
-        positions: (T,V,3) [m] of it that are finite.
         quasi_static: (T,V,3) [m] the method's quasi-static solutions, or None.
         counterpart: (T',V,3) [m] roll-out of the same method in the scene's counterpart, or None.
+        positions: (T,V,3) [m] of it that are finite.
     """
 
-    def __init__(
-        self,
-        group: SceneRollOuts,
-        entry: MethodEntry,
-        trajectory: Trajectory,
-        *,
-        status: str = "ok",
-        suites: tuple[str, ...] = (),
-        quasi_static: np.ndarray | None = None,
-    ) -> None:
-        super().__init__()
-        self.group, self.entry = group, entry
-        self.status, self.suites, self.trajectory = status, suites, trajectory
-        self.quasi_static = quasi_static
-        self.counterpart: np.ndarray | None = None
-        self.positions = trajectory.finite().positions
+    group: SceneRollOuts
+    entry: MethodEntry
+    trajectory: Trajectory
+    status: str = "ok"
+    suites: tuple[str, ...] = ()
+    quasi_static: np.ndarray | None = None
+    counterpart: np.ndarray | None = None
+    positions: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.positions = self.trajectory.finite().positions
 
     @property
     def scene(self) -> BuiltScene:
@@ -215,6 +205,7 @@ class RollOut(Kept):
         return self.group.roll_outs.index(self)
 
 
+@dataclass(eq=False)
 class SceneRollOuts(Kept):
     """Roll-outs of one scene that are measured together: they share its search trees.
 
@@ -225,11 +216,10 @@ class SceneRollOuts(Kept):
         roll_outs: to be filled before anything is measured.
     """
 
-    def __init__(self, scene: BuiltScene, *, gap_samples: int = 0) -> None:
-        super().__init__()
-        self.scene, self.gap_samples = scene, gap_samples
-        self.quasi_static: np.ndarray | None = None
-        self.roll_outs: list[RollOut] = []
+    scene: BuiltScene
+    gap_samples: int = 0
+    quasi_static: np.ndarray | None = None
+    roll_outs: list[RollOut] = field(default_factory=list)
 
     @property
     def reference(self) -> RollOut | None:

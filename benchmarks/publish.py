@@ -9,9 +9,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.plan.study import read_study, study_names
+from benchmarks.plan.study import StudyError, read_study, study_names
 from benchmarks.provenance import commit
-from benchmarks.results.row import USABLE
+from benchmarks.results.row import USABLE, ResultsError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.execute_plan import accepted
 from benchmarks.timing import one_thread
@@ -25,19 +25,15 @@ AGAIN = ("--retry",)  # so a task that lacked memory once is done again
 KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
 EXAMPLES = """examples:
   python -m benchmarks.publish shapes                one of them
-  python -m benchmarks.publish --workers 8           all of them, with more processes side by side
-  python -m benchmarks.publish --scheduler tcp://HOST:8786 --workers 40      untimed tasks on a cluster
+  python -m benchmarks.publish                       all of them
 
-Each run goes on where it was stopped, in a folder of its own below --out. When it has ended well, its
-  rows, tables, PDF, pictures and films that the documents show replace those in --into. Times want a machine
-  with nothing beside.
+Each run goes on where it was stopped, in a folder of its own below --out: what is not timed may be run there
+  before, by benchmarks.run with more workers or on a cluster. When it has ended well, its rows, tables, PDF,
+  pictures and films that the documents show replace those in reports/published. Times want a machine with
+  nothing beside.
 Then: python -m reports.docs writes the tables of README and docs from them.
 exit status: 0 all are published; 1 a run failed and is left as it was; 2 the request cannot be met: one line
   says why."""
-
-
-class PublishError(ValueError):
-    """A run cannot be published; the message says why."""
 
 
 @command(PROGRAM, goes_on="the same command goes on from there")
@@ -51,25 +47,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("studies", nargs="*", metavar="STUDY", help="names of studies (default: all that have [show])")
-    add("--workers", metavar="N", help="of benchmarks.run")
-    add("--scheduler", metavar="ADDRESS", help="of benchmarks.run")
     add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})")
-    add("--into", metavar="DIR", default=TARGET, type=Path, help=f"where they are kept (default {TARGET})")
     options = parser.parse_args(arguments)
-    names, failed = options.studies or published_studies(), 0
+    known, failed = published_studies(), 0
+    names = options.studies or known
     for name in names:
         if read_study(name).show is None:
-            raise PublishError(
-                f"study {name}: has no [show]: the studies {', '.join(published_studies())} do"
-            )
+            raise StudyError(f"study {name}: has no [show]: the studies {', '.join(known)} do")
     head = commit()
     if head.endswith("+changes"):
-        raise PublishError(f"{head}: commit the changes first, so that a commit says what was run")
-    more = [word for name in ("workers", "scheduler") if (value := getattr(options, name))
-            for word in (f"--{name}", value)]  # fmt: skip
+        raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
     for name in names:  # where one is not published, the next is done all the same
         try:
-            publish(name, options.out, options.into, head, more)
+            publish(name, options.out, TARGET, head)
         except ValueError as error:  # of the run's command, of files of results
             print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
             failed = 1
@@ -81,7 +71,7 @@ def published_studies() -> list[str]:
     return [name for name in study_names() if read_study(name).show is not None]
 
 
-def publish(name: str, out: Path, into: Path, head: str, more: Sequence[str] = ()) -> None:
+def publish(name: str, out: Path, into: Path, head: str) -> None:
     """Run a study, or go on with it, and keep what is published of it.
 
     Args:
@@ -89,28 +79,29 @@ def publish(name: str, out: Path, into: Path, head: str, more: Sequence[str] = (
         out: folder of the run's folder.
         into: folder of published runs.
         head: commit that all rows have to name.
-        more: further options of the run.
 
     Raises:
-        PublishError: the run failed, has rows of another commit, or lacks a picture that the documents show.
+        ResultsError: the run failed, has rows of another commit, or lacks a picture that the documents show.
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None
-    line = [sys.executable, "-m", "benchmarks.run", name, *AGAIN, *more, "-o", str(whole)]
-    print(f"{name}: {shlex.join(line[1:])}", file=sys.stderr, flush=True)
-    status = subprocess.run(line, check=False).returncode
-    if status and not (status == 1 and all_usable(RunFolder(whole))):
-        raise PublishError(f"{whole}: exit status {status}")
+    _call("benchmarks.run", name, *AGAIN, "-o", str(whole))
+    if not all_usable(RunFolder(whole)):
+        raise ResultsError(f"{whole}: has failed")
     if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):
         reason = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
-        raise PublishError(f"{whole}: {reason}")
+        raise ResultsError(f"{whole}: {reason}")
     for film, wanted in show.films.items():
         path = whole / "figures" / film
         path.unlink(missing_ok=True)
-        line = [sys.executable, "-m", "reports.film", str(whole), *shlex.split(wanted), "-o", str(path)]
-        subprocess.run(line, check=False)
+        _call("reports.film", str(whole), *shlex.split(wanted), "-o", str(path))
     keep(whole, into / whole.name, show.files)
     print(f"{name}: published in {into / whole.name}", flush=True)
+
+
+def _call(*words: str) -> None:
+    print(shlex.join(words), file=sys.stderr, flush=True)
+    subprocess.run([sys.executable, "-m", *words], check=False)
 
 
 def all_usable(folder: RunFolder) -> bool:
@@ -130,12 +121,12 @@ def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:
     """Replace the folder `target` by what is published of the run in `whole`.
 
     Raises:
-        PublishError: a picture or film of these names is not there.
+        ResultsError: a picture or film of these names is not there.
     """
     kept = [whole / name for name in KEPT if name != "frame_energies.csv" or (whole / name).exists()]
     kept += [whole / "tables", *(whole / "figures" / name for name in shown)]
     if missing := [path for path in kept if not path.exists()]:
-        raise PublishError(f"{missing[0]}: not there, and the documents show it")
+        raise ResultsError(f"{missing[0]}: not there, and the documents show it")
     fresh = target.with_name(f"{target.name}.new")
     shutil.rmtree(fresh, ignore_errors=True)
     with new_folder(fresh) as part:

@@ -16,24 +16,75 @@ from reference_sim.trajectory import write_point_cache
 if TYPE_CHECKING:
     from benchmarks.method import Method
     from benchmarks.scene import BuiltScene, Dressed, Scene
+    from reference_sim.obstacle import Obstacle
 
 FINGERS = 30  # joints of SMPL-H's hands, which a garment never meets
 # (x, y, z) with y up -> (x, -z, y) with z up.
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-FileList = list[tuple[str, str]]  # name of a file, its content
+README = """\
+Scene {scene}, sizes {preset}: {description}.
+
+Units: metres, kilograms, seconds, radians, joules. World coordinates, right-handed, y up; a body
+faces +z in its rest pose. motion_amass.npz alone has z up. Gravity is 9.81 m/s^2 along -y.
+Order of vertices: that of rest.obj, the same in every file. Triangles wind outwards.
+Time: {frames} frames at {rate} a second (dt {dt:.6g} s); frame 0 is the start:
+start_positions and start_velocities. The first {warm_up_frames} frames are simulated and not judged.
+npz files hold float64, and pc2 and obj beside it float32; rest.obj has all digits.
+
+Files, as far as the scene has what they hold:
+  scene.json         step, material, terms of the energy with their constants
+  rest.obj           rest mesh, with its UV
+  cloth.npz          rest_positions, start_positions, start_velocities (V,3), faces (F,3), masses (V,)
+                     [kg], pins (P,), pin_positions (T,P,3); rest_uv [m], the flat rest state; kept (T,),
+                     the frames of the motion that a roll-out holds
+  energies.npz       elements of each energy term: vertices, stiffness, rest state; formulas in
+                     docs/scene-files.md
+  obstacle.npz       positions (T,B,3) of what the cloth touches, one frame where it stands still, faces;
+                     rest_positions (B,3), the body unposed
+  obstacle.pc2, .obj the same in float32
+  motion_smpl.npz    poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up. Of a part of a
+                     motion poses_before, trans_before, the frames until then: the start has the
+                     velocities with which a simulation of them ends
+  motion_amass.npz   the same as AMASS writes it: poses (T,156), z up, fingers at rest
+  skinning.npz       weights (V,24) of the garment, smoothed_weights as method 'skinning' takes them,
+                     rest_positions (V,3) on this body, joints (24,3), parents (24,), transforms
+                     (T,24,3,4) of the joints, loops
+  reference.vtkhdf, .npz, .pc2, .obj   the simulation of the scene
+
+With a body:
+A vertex p at rest goes to sum_j w_j (R_j p + t_j), (R_j, t_j) = transforms. The motion is
+placed on the floor with its arms clear of the torso: --motions would place it anew.
+The zero of gravity's energy in a frame is origin_heights, the height of the pelvis.
+Contact: a sample of the cloth touches only faces of the body near its own place at rest:
+those whose centroid at rest lies within {contact_region_m} m of the sample's.
+
+"""
+SCORED = """\
+Write positions (T,V,3) of all frames, the start included, as mine.npz:
+  numpy.savez('mine.npz', positions=positions, fps={rate})
+and have them scored:
+  {score}
+quasi_static=(T,V,3), the answer to each pose held still, adds the method's own dynamics.
+"""
+NOT_SCORED = "The scene is for networks of benchmarks.run alone: no roll-out of a file is scored.\n"
 
 
-def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> FileList:
-    """Write arrays, meshes and the facts, as scene.json; return what was written beside scene.json."""
-    files = [*write_cloth(part, scene), *write_energies(part, scene), *write_obstacle(part, scene)]
+def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> None:
+    """Write arrays, meshes and the facts, as scene.json, into a folder; README names each file's content."""
+    write_cloth(part, scene)
+    arrays: dict[str, Any] = {
+        f"{term.name}_{name}": value for term in scene.energies for name, value in term.arrays().items()
+    }
+    np.savez(part / "energies.npz", **arrays)
+    if scene.obstacle is not None:
+        write_obstacle(part, scene, scene.obstacle)
     if scene.dressed is not None:
-        files += write_motion(part, scene.dressed)
+        write_motion(part, scene.dressed)
     (part / "scene.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
-    return files
 
 
-def write_cloth(part: Path, scene: BuiltScene) -> FileList:
-    """Write the rest mesh and all arrays of the cloth; return what was written."""
+def write_cloth(part: Path, scene: BuiltScene) -> None:
+    """Write the rest mesh and all arrays of the cloth."""
     cloth = scene.cloth
     write_obj(part / "rest.obj", cloth.rest_positions, cloth.faces, cloth.rest_uv)
     arrays: dict[str, Any] = {
@@ -41,30 +92,13 @@ def write_cloth(part: Path, scene: BuiltScene) -> FileList:
         "start_positions": scene.start, "start_velocities": scene.start_velocity,
         "pins": np.asarray(cloth.pins, dtype=np.int64),
     }  # fmt: skip
-    content = (
-        "rest_positions, start_positions, start_velocities (V,3), faces (F,3), masses (V,) [kg], pins (P,)"
-    )
     if cloth.rest_uv is not None:
         arrays["rest_uv"] = cloth.rest_uv
-        content += ", rest_uv [m], the flat rest state"
     if scene.pin_positions is not None:
         arrays["pin_positions"] = np.stack([scene.pin_positions(frame) for frame in range(scene.frames)])
-        content += ", pin_positions (T,P,3)"
     if scene.kept is not None:
         arrays["kept"] = scene.kept
-        content += ", kept (T,), the frames of the motion that a roll-out holds"
     np.savez(part / "cloth.npz", **arrays)
-    return [("rest.obj", "rest mesh" + ", with its UV" * (cloth.rest_uv is not None)), ("cloth.npz", content)]
-
-
-def write_energies(part: Path, scene: BuiltScene) -> FileList:
-    """Write the elements of every energy term; return what was written."""
-    arrays: dict[str, Any] = {
-        f"{term.name}_{name}": value for term in scene.energies for name, value in term.arrays().items()
-    }
-    np.savez(part / "energies.npz", **arrays)
-    content = "elements of each energy term: vertices, stiffness, rest state; formulas in docs/scene-files.md"
-    return [("energies.npz", content)]
 
 
 def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndarray | None) -> None:
@@ -83,27 +117,19 @@ def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndarr
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def write_obstacle(part: Path, scene: BuiltScene) -> FileList:
-    """Write the obstacle in every frame; return what was written, nothing without an obstacle."""
-    obstacle = scene.obstacle
-    if obstacle is None:
-        return []
+def write_obstacle(part: Path, scene: BuiltScene, obstacle: Obstacle) -> None:
+    """Write the obstacle in every frame."""
     times = np.arange(len(obstacle.positions)) * scene.dt
     write_point_cache(part / "obstacle.pc2", Trajectory(obstacle.positions, obstacle.faces, times))
     rest: dict[str, Any] = {}
     if scene.dressed is not None:
         rest["rest_positions"] = scene.dressed.body.shaped(scene.dressed.betas)
-    fps = 1.0 / scene.dt
-    np.savez(part / "obstacle.npz", positions=obstacle.positions, faces=obstacle.faces, fps=fps, **rest)
-    content = "positions (T,B,3) of what the cloth touches, one frame where it stands still, faces"
-    return [
-        ("obstacle.npz", content + ", rest_positions (B,3), the body unposed" * bool(rest)),
-        ("obstacle.pc2, obstacle.obj", "the same in float32"),
-    ]
+    rest |= {"positions": obstacle.positions, "faces": obstacle.faces, "fps": 1.0 / scene.dt}
+    np.savez(part / "obstacle.npz", **rest)
 
 
-def write_motion(part: Path, worn: Dressed) -> FileList:
-    """Write the poses in two layouts and the skinning of the garment; return what was written."""
+def write_motion(part: Path, worn: Dressed) -> None:
+    """Write the poses in two layouts, and the skinning of the garment."""
     body, motion, garment = worn.body, worn.motion, worn.garment
     from snug.networks.dressed_body import DressedBody
     from snug.recipe import DEFAULT
@@ -137,17 +163,6 @@ def write_motion(part: Path, worn: Dressed) -> FileList:
         transforms=body.transforms(motion.poses, motion.translations, worn.betas),
         **loops,
     )  # fmt: skip
-    content = "poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up"
-    content += "; poses_before, trans_before, the motion until then" * bool(earlier)
-    return [
-        ("motion_smpl.npz", content),
-        ("motion_amass.npz", "the same as AMASS writes it: poses (T,156), z up, fingers at rest"),
-        (
-            "skinning.npz",
-            "weights (V,24) of the garment, smoothed_weights as method 'skinning' takes them, rest_positions "
-            "(V,3) on this body, joints (24,3), parents (24,), transforms (T,24,3,4) of the joints, loops",
-        ),
-    ]
 
 
 def facts_of(scene: BuiltScene) -> dict[str, Any]:
@@ -198,12 +213,13 @@ def write_scene(
             "description": declared.description, "preset": preset, "garment": declared.garment,
             "motion": declared.motion, "part": declared.part,
         }  # fmt: skip
-        files = write_scene_files(part, scene, facts)
-        files += _reference(part, scene, simulation) if simulation is not None else []
-        (part / "README.txt").write_text(readme(scene, facts, files, score), encoding="utf-8")
+        write_scene_files(part, scene, facts)
+        if simulation is not None:
+            write_reference(part, scene, simulation)
+        (part / "README.txt").write_text(readme(facts, score), encoding="utf-8")
 
 
-def _reference(part: Path, scene: BuiltScene, method: Method) -> FileList:
+def write_reference(part: Path, scene: BuiltScene, method: Method) -> None:
     """Simulate the scene, and write the trajectory in three formats."""
     method.prepare(scene)
     trajectory = method.run()
@@ -212,56 +228,11 @@ def _reference(part: Path, scene: BuiltScene, method: Method) -> FileList:
     np.savez(
         part / "reference.npz", positions=trajectory.positions, faces=trajectory.faces, fps=1.0 / scene.dt
     )
-    return [
-        ("reference.vtkhdf, reference.npz", f"the simulation of the scene: {trajectory.status}"),
-        ("reference.pc2, reference.obj", "the same in float32"),
-    ]
 
 
-def readme(scene: BuiltScene, facts: dict[str, Any], files: FileList, score: str) -> str:
+def readme(facts: dict[str, Any], score: str) -> str:
     """Return the text of README.txt: content, units and order of each file, and how to be scored."""
-    width = max(len(name) for name, _ in files)
-    listed = [f"  {name:<{width}}  {content}" for name, content in files]
     # All digits: a roll-out is held to the scene's rate.
-    rate, warm = np.format_float_positional(facts["fps"], trim="-"), facts["warm_up_frames"]
-    lines = [
-        f"Scene {scene.name}, preset {facts['preset']}: {facts['description']}.",
-        "",
-        "Units: metres, kilograms, seconds, radians, joules. World coordinates, right-handed, y up; a body",
-        "faces +z in its rest pose. motion_amass.npz alone has z up. Gravity is 9.81 m/s^2 along -y.",
-        "Order of vertices: that of rest.obj, the same in every file. Triangles wind outwards.",
-        f"Time: {facts['frames']} frames at {rate} a second (dt {facts['dt']:.6g} s); frame 0 is the start:",
-        f"start_positions and start_velocities. The first {warm} frames are simulated and not judged.",
-        "npz files hold float64, and pc2 and obj beside it float32; rest.obj has all digits.",
-        "",
-        "Files:",
-        "  scene.json" + " " * max(width - 8, 2) + "step, material, terms of the energy with their constants",
-        *listed,
-        "",
-    ]
-    if facts["before"]:
-        lines += [
-            f"The motion is a part: the {facts['before']} frames before it are poses_before and trans_before",
-            "of motion_smpl.npz; the start has the velocities with which a simulation of them ends.",
-            "",
-        ]
-    if scene.dressed is not None:
-        lines += [
-            "A vertex p at rest goes to sum_j w_j (R_j p + t_j), (R_j, t_j) = transforms. The motion is",
-            "placed on the floor with its arms clear of the torso: --motions would place it anew.",
-            "The zero of gravity's energy in a frame is origin_heights, the height of the pelvis.",
-            "Contact: a sample of the cloth touches only faces of the body near its own place at rest:",
-            f"those whose centroid at rest lies within {facts['contact_region_m']} m of the sample's.",
-            "",
-        ]
-    if not score:
-        lines.append("The scene is for networks of benchmarks.run alone: no roll-out of a file is scored.")
-        return "\n".join(lines) + "\n"
-    lines += [
-        "Write positions (T,V,3) of all frames, the start included, as mine.npz:",
-        f"  numpy.savez('mine.npz', positions=positions, fps={rate})",
-        "and have them scored:",
-        f"  {score}",
-        "quasi_static=(T,V,3), the answer to each pose held still, adds the method's own dynamics.",
-    ]
-    return "\n".join(lines) + "\n"
+    rate = np.format_float_positional(facts["fps"], trim="-")
+    scored = SCORED.format(rate=rate, score=score) if score else NOT_SCORED
+    return README.format(rate=rate, **facts) + scored

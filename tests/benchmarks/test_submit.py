@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import shutil
 from pathlib import Path
 
@@ -88,48 +87,30 @@ def test_scores_are_those_of_a_run_without_clock_and_machine_and_the_same_bytes_
     for name in ("results.csv", "run.json"):
         assert (entry / "scores" / name).read_bytes() == (scored / "scores" / name).read_bytes()
     assert main(["score", str(entry)]) == 0
-    assert "rows, as recorded" in capsys.readouterr().out
+    assert "rows, energies as recorded" in capsys.readouterr().out
 
 
-def test_on_another_processor_energies_are_compared(copy, monkeypatch, capsys):
-    """The simulation is chaotic: there it parts from the recorded one, and so do distances from it."""
-
-    def scaled(row, factor):
-        return row if row.value is None else dataclasses.replace(row, value=factor * row.value)
-
+@pytest.mark.parametrize(
+    ("method", "metric", "factor", "same"),
+    [("waving", "energy/strain", 1.0005, True), ("waving", "energy/strain", 1.01, False),
+     ("simulation", "energy/total", 1.01, False), ("simulation", "energy/strain", 1.02, True),
+     ("waving", "distance/rms", 1.02, True)],
+)  # fmt: skip
+def test_energies_are_compared_with_the_recorded_ones(copy, capsys, method, metric, factor, same):
+    """The simulation is chaotic: on another processor it parts from the recorded one, and so do distances."""
     recorded = RunFolder(copy / "scores").read_rows()
-    mine = [row.method == "waving" and row.metric.startswith("energy/") for row in recorded]
     rows = [
-        row if own else scaled(row, 1.0005 if row.metric == "energy/total" else 1.02)
-        for row, own in zip(recorded, mine)
+        dataclasses.replace(row, value=factor * row.value)
+        if (row.method, row.metric) == (method, metric)
+        else row
+        for row in recorded
     ]
-    config = {name: value for name, value in RunFolder(copy / "scores").read_config().items() if name in KEPT}
-    write(read_entry(copy), rows, config)
-    assert main(["score", str(copy)]) == 1
-    monkeypatch.setattr(submit, "processor_name", lambda: "another")
-    capsys.readouterr()
-    assert main(["score", str(copy)]) == 0
-    assert "rows, energies as recorded, on another processor" in capsys.readouterr().out
-    for processor, method, metric in (
-        ("a third", "waving", "energy/strain"), ("a fourth", "simulation", "energy/total"),
-    ):  # fmt: skip
-        wrong = [scaled(row, 1.01) if (row.method, row.metric) == (method, metric) else row for row in rows]
-        write(read_entry(copy), wrong, config)
-        monkeypatch.setattr(submit, "processor_name", lambda name=processor: name)
-        assert main(["score", str(copy)]) == 1
-        assert f"{method} in {SCENE}, {metric}: " in capsys.readouterr().out
-
-
-def test_one_vertex_moved_and_its_digest_written_anew_is_refused(copy, capsys):
-    write_roll_out(copy / f"{SCENE}.npz", lifted=1e-3)
-    path = copy / "scores" / "run.json"
-    config = json.loads(path.read_text())
-    config["entry"] = read_entry(copy).digests()
-    path.write_text(json.dumps(config))
-    assert main(["check", str(copy)]) == 0
-    assert main(["score", str(copy)]) == 1
-    assert f"waving in {SCENE}, energy/strain: " in capsys.readouterr().out
-    assert main(["score", str(copy), "--replace"]) == 0
+    config = RunFolder(copy / "scores").read_config()
+    write(read_entry(copy), rows, {name: config[name] for name in KEPT})
+    assert main(["score", str(copy)]) == (not same)
+    shown = capsys.readouterr().out
+    assert ("energies as recorded" if same else f"{method} in {SCENE}, {metric}: ") in shown
+    assert same or main(["score", str(copy), "--replace"]) == 0
 
 
 def edit_scores(folder: Path) -> None:
@@ -139,26 +120,21 @@ def edit_scores(folder: Path) -> None:
 
 CHANGES = {
     f"{SCENE}.npz": lambda folder: write_roll_out(folder / f"{SCENE}.npz", lifted=1e-6),
-    "entry.toml": lambda folder: (folder / "entry.toml").write_text(TEXT.replace("2.5", "0.1")),
     "scores/results.csv": edit_scores,
     ".weights": lambda folder: (folder / ".weights").write_bytes(b"weights"),
-    "scores/weights.npz": lambda folder: (folder / "scores" / "weights.npz").write_bytes(b"weights"),
 }
 
 
 @pytest.mark.parametrize("name", CHANGES)
-@pytest.mark.parametrize("action", ["check", "score"])
-def test_a_file_that_is_not_as_it_was_scored_is_refused(copy, name, action, refused):
+def test_a_file_that_is_not_as_it_was_scored_is_refused(copy, name, refused):
     CHANGES[name](copy)
-    refused(f"not as it was scored: {name}: put it right", main, [action, str(copy)])
+    refused(f"not as it was scored: {name}: put it right", main, ["score", str(copy)])
 
 
-def test_scores_of_another_name_or_protocol_are_refused(copy, monkeypatch, refused):
-    other = copy.rename(copy.with_name("other"))
-    refused("no scores of 'other': give the folder its old name", main, ["check", str(other)])
+def test_scores_of_another_protocol_are_refused(copy, monkeypatch, refused):
     monkeypatch.setattr(submit, "NUMBER", "1.1")
-    (other / "entry.toml").write_text(TEXT.replace(NUMBER, "1.1"))
-    refused(f"scores of protocol {NUMBER}, this is 1.1", main, ["score", str(other)])
+    (copy / "entry.toml").write_text(TEXT.replace(NUMBER, "1.1"))
+    refused(f"scores of protocol {NUMBER}, this is 1.1", main, ["score", str(copy)])
 
 
 @pytest.mark.parametrize(
@@ -166,19 +142,12 @@ def test_scores_of_another_name_or_protocol_are_refused(copy, monkeypatch, refus
     [
         (f'protocol = "{NUMBER}"', 'protocol = "0.9"', f"line 7: protocol: '0.9': this is protocol {NUMBER}"),
         ('title = "Waving"\n', "", "title is absent"),
-        ('title = "Waving"', 'title = " "', "line 1: title: ' ': give a text"),
-        ("milliseconds = 2.5", "milliseconds = -1", "line 8: milliseconds: -1.0: give a number above 0"),
-        ("milliseconds = 2.5", "milliseconds = true", "milliseconds: True: give a number"),
         ("milliseconds = 2.5", "milliseconds = nan", "milliseconds: nan: give a number above 0"),
-        ("seeds = [0]", "seeds = [0, 1]", "roll-outs of one seed"),
-        ("seeds = [0]", 'seeds = ["a"]', "give a whole number"),
         ("seeds = [0]", "seeds = [0]\ncolour = 1", "no field is called 'colour'"),
-        ("{scene}.npz", "a.npz", "has no {scene}"),
         ("{scene}.npz", "../{scene}.npz", "lies outside of the entry's folder"),
         ('roll_outs = "{scene}.npz"', "", "give either roll_outs"),
         ('roll_outs = "{scene}.npz"', 'program = "absent.py"', "absent.py: no such file"),
         ("seeds = [0]", 'seeds = [0]\nscenes = ["tshirt/walk"]', "scenes: ('tshirt/walk',): choose from"),
-        (TEXT, "title =", "not readable as TOML"),
     ],
 )
 def test_a_fault_is_one_line_with_file_and_remedy(entry, refused, old, new, fault):
@@ -219,7 +188,7 @@ def make(*, models, seed):
         ("named_otherwise.py", WAVING.replace("name='waving'", "name='theirs'"),
          "declares method 'theirs': one of the folder's name, 'waving', is expected"),
         # Its mean over the frames, or scenes, that are left would be of the easier ones.
-        ("waving_badly.py", WAVING, f"{SCENE}, seed 0: diverged"),
+        ("waving_badly.py", WAVING, f"{SCENE}: seed 0: diverged"),
     ],
 )  # fmt: skip
 def test_a_program_of_another_name_or_that_fails_within_a_scene_is_not_scored(
@@ -247,4 +216,4 @@ def test_every_entry_here_is_as_it_was_scored(full_size, path):
 @pytest.mark.parametrize("path", FOLDERS, ids=lambda path: path.name)
 def test_every_entry_here_is_scored_again(full_size, path, capsys):
     assert main(["score", str(path)]) == 0
-    assert "rows, " in (shown := capsys.readouterr().out) and "as recorded" in shown
+    assert "rows, energies as recorded" in capsys.readouterr().out

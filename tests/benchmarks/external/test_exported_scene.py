@@ -148,7 +148,7 @@ def test_what_is_exported_is_the_scene(home):
     assert facts["material"]["young_modulus"] == 70e3 and facts["energies"]["collision"]["margin_m"] == 0.004
     assert (facts["fps"], facts["frames"], facts["warm_up_frames"]) == (30.0, 12, 2)
     text = (folder / "README.txt").read_text()
-    assert all(path.name in text for path in folder.iterdir() if path.name != "README.txt")
+    assert all(path.name in text for path in folder.iterdir() if path.suffix in (".npz", ".json"))
     assert not list(folder.parent.glob(".*part"))
 
 
@@ -221,7 +221,7 @@ def test_the_command_that_scores_it_takes_back_every_option():
 def test_the_rate_that_the_readme_names_is_that_of_the_scene(step, tmp_path):
     scene = dataclasses.replace(small_scene("hanging_sheet", cells=2, frames=3), dt=step)
     facts = facts_of(scene) | {"preset": "smoke", "description": "a sheet"}
-    text = readme(scene, facts, [("cloth.npz", "arrays")], "python -m benchmarks.score mine.npz")
+    text = readme(facts, "python -m benchmarks.score mine.npz")
     stated = re.search(r"numpy\.savez\(.* fps=(\S+)\)", text)[1]
     assert float(stated) == 1.0 / step and (step == 0.006 or stated == "30")
 
@@ -242,6 +242,5 @@ def test_of_a_part_of_a_motion_the_frames_before_it_are_exported(tmp_path):
     whole = np.concatenate([held["poses_before"], held["poses"]])
     assert np.array_equal(whole, motion.poses.reshape(20, -1))
     assert np.array_equal(np.concatenate([held["trans_before"], held["trans"]]), motion.translations)
-    listed = dict(write_motion(tmp_path, Dressed(tube.body, tube.garment, motion)))
+    write_motion(tmp_path, Dressed(tube.body, tube.garment, motion))
     assert "poses_before" not in arrays(tmp_path / "motion_smpl.npz")
-    assert "poses_before" not in listed["motion_smpl.npz"]
