@@ -165,11 +165,6 @@ def check_derivatives(energy: Energy, scene: BuiltScene) -> None:
         demand((abs(slope - stated) <= near, f"{what} gradient is not the derivative of its value: "
             f"{stated:.6g} N along a direction, differences say {slope:.6g} N"))  # fmt: skip
     turned = (ahead[1] - behind[1]) / (2.0 * DIFFERENCE_STEP)
-    if type(energy).add_hessian is Energy.add_hessian and not energy.dynamic:
-        blocks = energy.active_hessian_blocks(x)[1]  # the solver reads one half of them
-        skew = np.abs(blocks - blocks.swapaxes(1, 2)).max(initial=0.0)
-        demand((skew <= 1e-9 * np.abs(blocks).max(initial=0.0), f"{what} Hessian is not symmetric; leave it "
-            "to automatic differentiation, or mend it"))  # fmt: skip
     product = (Potential([energy]).hessian(x) @ direction.ravel()).reshape(x.shape)
     off, most = float(np.abs(turned - product).max()), float(np.abs(turned).max())
     round_off = SUM_ROUND_OFF * np.abs(gradient).max() / DIFFERENCE_STEP

@@ -64,7 +64,6 @@ def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch,
     [
         ("garments", "stalled", {"finished": "now"}, True),
         ("extremes", "diverged", {"finished": "now"}, True),
-        ("extremes", "failed", {"finished": "now"}, False),
         ("garments", "diverged", {"finished": "now"}, False),
         ("garments", "ok", {"finished": None}, False),
         ("garments", "ok", {"finished": "now", "tasks": {"training": {"snug": {"failed": "?"}}}}, False),

@@ -226,14 +226,6 @@ def test_the_rate_that_the_readme_names_is_that_of_the_scene(step, tmp_path):
     assert float(stated) == 1.0 / step and (step == 0.006 or stated == "30")
 
 
-def test_of_a_scene_for_networks_alone_nothing_is_said_to_be_scored(tmp_path, capsys):
-    options = ["--set", "sizes=smoke", "-o", str(tmp_path / "long")]
-    assert export.main(["out_of_distribution/long", *options]) == 0
-    text = (tmp_path / "long" / "README.txt").read_text()
-    assert "benchmarks.score" not in text and "for networks of benchmarks.run alone" in text
-    assert (tmp_path / "long" / "motion_smpl.npz").is_file()
-
-
 def test_of_a_part_of_a_motion_the_frames_before_it_are_exported(tmp_path):
     tube, motion = tube_dress(), swaying(20)
     part, before = motion.cut(8, 20), motion.cut(0, 8)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from benchmarks.assets import Assets
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods import find_method
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.presets import Dependence, find_preset
 from benchmarks.runner.measurements import measured
-from benchmarks.scenes import dressed_body as module
 from benchmarks.scenes import find_scene
 from snug.body.parametric_body import Body
 
@@ -65,20 +63,3 @@ def test_time_steps_of_a_frame_are_taken_from_the_scene(assets):
         made.prepare(scene)
         taken.append(made.stepper.substeps)
     assert taken == [2, 2, 8]  # so many for each of those that a method takes by itself
-
-
-def test_an_own_body_is_the_one_that_is_measured(assets, monkeypatch):
-    class Tailor:
-        def tailor(self, body, *, vertices):
-            raise ValueError(f"{vertices} vertices on a body of {len(body.template)}")
-
-    monkeypatch.setattr(module, "find_template", lambda name: Tailor())
-    mine = dataclasses.replace(assets.body, template=np.zeros((7, 3)))
-    with pytest.raises(ValueError, match="200 vertices on a body of 7"):
-        built("dependence/dt/60", dataclasses.replace(assets, body=mine))
-
-
-def test_no_network_meets_a_garment_that_it_was_not_trained_for():
-    scene = find_scene("dependence/mesh/500")
-    assert not any(entry.meant_for(scene) for entry in METHODS if entry.trained)
-    assert all(entry.meant_for(scene) for entry in METHODS if not entry.trained)

@@ -7,7 +7,6 @@ with the metric nor with the simulator.
 from __future__ import annotations
 
 import itertools
-import time
 
 import numpy as np
 import pytest
@@ -111,7 +110,7 @@ def module_is_scaled() -> bool:
     return any(getattr(term, "scaling", "") == "length_area" for term in scene.energies)
 
 
-METHODS = ("newton-1", "newton-2", "lbfgs-5", "gradient-descent-10", "xpbd-40")
+METHODS = ("newton-1", "lbfgs-5", "xpbd-40")
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -279,12 +278,3 @@ def test_a_garment_that_collapsed_a_frame_ago_spoils_its_own_gap_alone(monkeypat
     nowhere = still.copy()
     nowhere[2] = 1e200
     assert np.isnan(values(optimality(scene, nowhere, samples=1).metrics())["gap/energy"])
-
-
-def test_a_gap_is_the_same_however_slow_the_machine_is(monkeypatch):
-    scene = small_scene("hanging_sheet", cells=4)
-    x = np.array([scene.start + 0.02 * k**2 for k in range(4)])
-    quick = optimality(scene, x, samples=1).metrics()
-    clock = itertools.count(0.0, 60.0)
-    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
-    assert optimality(scene, x, samples=1).metrics() == quick

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import icosphere, right_grid
-from benchmarks.metrics import declared, find_metric
+from benchmarks.metrics import find_metric
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
     histogram_distance,
@@ -179,12 +179,7 @@ def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_reference
     assert measure_body(roll_out) == {}
 
 
-def test_every_metric_has_a_unit_a_title_and_a_definition_and_a_pattern_serves_a_new_term():
-    units = {metric.unit for metric in declared().values()}
-    known = {"J", "1/m", "mm", "%", "ms", "s", "MB", "m", "1", "deg", "frames"}
-    rare = {"N m", "% of weight", "weights", "vertex weights", "us", "h", "kB", "m/s", "m/s^2"}
-    assert known <= units <= known | rare
-    assert all(metric.title and metric.definition for metric in declared().values())
+def test_a_pattern_serves_a_new_term():
     term = find_metric("energy/my_term")
     assert (term.name, term.unit, term.title, term.table) == ("energy/my_term", "J", "My term", "energies")
     with pytest.raises(KeyError):
