@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.external.roll_out_files import RollOutFileError, StoredRollOut
+from benchmarks.metric import SceneRollOuts, skinned
 from reference_sim.files.mesh_files import to_metres_y_up
 
 if TYPE_CHECKING:
@@ -108,15 +109,6 @@ def _same_faces(theirs: np.ndarray, ours: np.ndarray) -> bool:
 
 
 def expected_positions(scene: BuiltScene) -> np.ndarray:
-    """Return the garment carried by the body's joints (T,V,3) [m]; without a body the start, (1,V,3)."""
-    if scene.dressed is None:
-        return scene.start[None]
-    worn = scene.dressed
-    body, garment, motion = worn.body, worn.garment, worn.motion
-    kept = np.arange(motion.frames) if scene.kept is None else scene.kept
-    transforms = body.transforms(motion.poses[kept], motion.translations[kept], worn.betas)
-    rest = garment.rest_for(body, worn.betas)
-    points = np.concatenate([rest, np.ones((len(rest), 1))], axis=1)
-    spread = (garment.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(rest), -1)
-    columns = transforms.transpose(0, 1, 3, 2).reshape(len(kept), spread.shape[1], 3)
-    return np.einsum("vk,tkc->tvc", spread, columns, optimize=True)
+    """Return the garment skinned to the poses (T,V,3) [m]; without a body the start, (1,V,3)."""
+    positions = skinned(SceneRollOuts(scene))
+    return scene.start[None] if positions is None else positions

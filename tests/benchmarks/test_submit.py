@@ -155,15 +155,6 @@ def test_a_fault_is_one_line_with_file_and_remedy(entry, refused, old, new, faul
     refused(fault, main, ["check", str(entry)])
 
 
-def test_a_roll_out_that_does_not_fit_is_named(entry, refused):
-    path = entry / f"{SCENE}.npz"
-    positions = np.load(path)["positions"]
-    np.savez(path, positions=positions[:, :-1])
-    refused(f"{path}: has 48 vertices", main, ["check", str(entry)])
-    path.unlink()
-    refused(f"no file for {SCENE}", main, ["score", str(entry)])
-
-
 WAVING = """
 import numpy as np
 from benchmarks import Method, MethodEntry

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from benchmarks.meshes import cylinder_patch, right_grid
+from benchmarks.meshes import right_grid
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.curvature import (
     CurvatureSeries,
@@ -74,15 +74,6 @@ def test_area_is_shared_out_whole_also_by_obtuse_triangles():
     assert mean_curvature(x, faces)[1].sum() == pytest.approx(exact.sum(), rel=1e-12)
 
 
-def test_curvature_is_blind_to_rigid_motion_and_scales_as_one_over_length():
-    x, faces = cylinder_patch(12, 0.3)
-    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
-    inside = ~boundary_mask(faces, len(x))
-    first = mean_curvature(x, faces)[0][inside]
-    assert mean_curvature(x @ turn.T + 5.0, faces)[0][inside] == pytest.approx(first, rel=1e-9)
-    assert mean_curvature(2 * x, faces)[0][inside] == pytest.approx(first / 2, rel=1e-12)
-
-
 def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_not():
     cells = 30
     i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
@@ -99,32 +90,12 @@ def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_
     assert curvature_error(flat, still)[0] == pytest.approx(still.means()[0], rel=1e-9)
 
 
-def test_wrinkles_that_stay_have_no_change_and_those_that_travel_have_nearly_all_of_it():
-    cells, frames = 40, 20
-    i, j = np.meshgrid(np.arange(cells + 1.0), np.arange(cells + 1.0), indexing="ij")
-    faces = right_grid(cells, cells, 1.0, 1.0)[1]
-
-    def waves(phases: np.ndarray, depth: float) -> np.ndarray:
-        height = depth * np.sin(0.2 * np.pi * i + phases[:, None, None])
-        frames = np.broadcast_arrays(0.01 * i, height, 0.01 * j)
-        return np.stack(frames, -1).reshape(len(phases), -1, 3)
-
-    def change(positions: np.ndarray) -> float:
-        return curvature_change(curvature_series(positions, faces))
-
-    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
-    fixed = waves(np.zeros(frames), 0.004)
-    fixed[1::2] = fixed[1::2] @ turn.T + 3.0
-    assert change(fixed) < 1e-9
-    phases = 2.0 * np.pi * np.arange(frames) / frames
-    travelling = change(waves(phases, 0.004))
-    assert 0.9 < travelling <= 1.0 + 1e-9
-    assert change(waves(phases, 0.002)) == pytest.approx(travelling, abs=0.02)  # how deep is not asked
-    assert change(waves(phases, 0.0)) is None  # flat
-
-
 def test_change_of_wrinkles_is_the_part_of_all_deviations_that_is_in_time():
     # Two vertices keep 1 and 3, two of twice their area swap: of 1 + 1 + 2 + 2 about the mean of 2 the last.
     h = np.array([[1.0, 3.0, 1.0, 3.0], [1.0, 3.0, 3.0, 1.0]])
     area = np.array([1.0, 1.0, 2.0, 2.0]) * [[0.5], [1.5]]
     assert curvature_change(CurvatureSeries(h, area)) == pytest.approx(4.0 / 6.0)
+    flat = CurvatureSeries(np.zeros((2, 4)), area)
+    assert curvature_change(flat) is None
+    kept = CurvatureSeries(np.repeat(h[:1], 2, axis=0), area)
+    assert curvature_change(kept) == 0.0

@@ -9,20 +9,17 @@ import pytest
 
 from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
-from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import dynamics
 from benchmarks.metrics.dynamics import (
     HemMotion,
     amplitude,
     correlation,
-    dynamic_part,
     gain_and_lag,
     hem_yaw,
-    in_root_frame,
     response,
 )
 from benchmarks.scene import BuiltScene, Dressed
-from reference_sim import Trajectory
+from tests.benchmarks.runner.tasks_by_hand import grouped
 from tests.snug.training.dressing import AROUND, swaying, tube_dress
 
 DT = 1 / 30
@@ -44,7 +41,7 @@ def ring(yaw=None, radius=0.25, count=40):
     return np.einsum("tij,vj->tvi", about_y(np.zeros(FRAMES) if yaw is None else yaw), shape)
 
 
-@pytest.mark.parametrize(("gain", "lag"), [(1.4, 1.4), (0.5, 0.0), (1.0, 5.25), (0.8, -2.0)])
+@pytest.mark.parametrize(("gain", "lag"), [(1.4, 1.4), (0.8, -2.0)])
 def test_a_sine_of_known_gain_and_lag_is_found(gain, lag):
     static = 0.7 * np.sin(2 * np.pi * 1.0 * TIME)
     moving = gain * 0.7 * np.sin(2 * np.pi * 1.0 * (TIME - lag * DT)) + 0.3
@@ -88,11 +85,6 @@ def test_response_takes_the_yaw_where_it_turns_and_the_displacement_where_it_shi
     assert np.isnan(response(ring() + late, ring(), STILL)).all()
 
 
-def test_a_hem_that_goes_along_with_the_root_rests_in_its_frame():
-    axes, origins, _, quiet = a_scene()
-    np.testing.assert_allclose(in_root_frame(quiet, axes, origins), ring(), atol=1e-12)
-
-
 def test_amplitude_and_correlation_of_phase_shifted_parts():
     whole = 2 * np.pi * 3 * np.arange(FRAMES) / FRAMES  # three whole periods: sine and cosine are orthogonal
     one = np.sin(whole)[:, None, None] * np.array([1.0, 0.0, 0.0]) * np.ones((1, 7, 1))
@@ -102,11 +94,6 @@ def test_amplitude_and_correlation_of_phase_shifted_parts():
     assert correlation(-one, one) == pytest.approx(-1.0)
     assert np.isnan(correlation(0 * one, one))
     assert np.isnan(amplitude(one, 0 * one))
-
-
-def test_a_constant_difference_is_no_dynamics():
-    moving = ring(0.3 * np.sin(TIME))
-    assert np.abs(dynamic_part(moving + np.array([0.01, 0.02, 0.0]), moving)).max() < 1e-15
 
 
 def a_scene(dynamic=1.0):
@@ -176,11 +163,8 @@ def test_the_hem_of_a_garment_with_legs_is_both_cuffs(names):
         name="legs", cloth=garment.cloth(), energies=(), dt=1 / 30, frames=40, settle=lambda: still[0],
         dressed=Dressed(dressed.body, garment, motion),
     )  # fmt: skip
-    group = SceneRollOuts(scene)
+    group = grouped(scene, {"simulation": still + swing, "fast-lbfgs-10": still + 0.5 * swing})
     group.quasi_static = still
-    for name, x in (("simulation", still + swing), ("fast-lbfgs-10", still + 0.5 * swing)):
-        trajectory = Trajectory(positions=x, faces=garment.faces, times=np.arange(40) / 30)
-        group.roll_outs.append(RollOut(group, find_method(name), trajectory))
     reference, method = group.roll_outs
     metrics = dynamics.compare(method, reference)
     assert metrics["dynamics/amplitude"] == pytest.approx(0.5)

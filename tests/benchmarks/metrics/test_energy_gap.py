@@ -14,15 +14,14 @@ import torch
 from scipy.optimize import minimize
 
 from benchmarks.methods import find_method
-from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import energy
 from benchmarks.metrics import energy_gap as module
 from benchmarks.metrics.curvature import curvature_error, curvature_series
 from benchmarks.metrics.energy import first_guess
 from benchmarks.metrics.energy_gap import gap_scale, optimality, spread_evenly
-from reference_sim import Potential, Trajectory, minimise, simulate
+from reference_sim import Potential, minimise, simulate
 from reference_sim.energies import Inertia, Step
-from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.benchmarks.runner.tasks_by_hand import grouped, small_scene
 
 YOUNG, POISSON, THICKNESS, DENSITY, BENDING, G = 70e3, 0.485, 0.47e-3, 426.0, 3.96e-5, 9.81
 
@@ -165,24 +164,12 @@ def test_the_gap_is_zero_for_the_reference_and_falls_with_the_iterations(name):
         assert "gap/refrozen" not in whole
 
 
-def roll_outs(scene, *trajectories):
-    """Those of a reference and of further methods, measured together."""
-    group = SceneRollOuts(scene, gap_samples=99)
-    entries = [find_method(name) for name in ("simulation", "newton-1", "newton-2")]
-    for entry, x in zip(entries, trajectories):
-        times = scene.dt * np.arange(len(x))
-        group.roll_outs.append(
-            RollOut(group, entry, Trajectory(positions=x, faces=scene.cloth.faces, times=times))
-        )
-    return group
-
-
 def test_one_scale_serves_all_methods_of_a_scene():
     """The scale is the mean energy of first guess minus reference step; a method's history does not enter."""
     scene = small_scene("hanging_sheet", cells=4)
     x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=8, start=scene.start).positions
     wild = x + 0.05 * np.random.default_rng(0).standard_normal(x.shape)
-    group = roll_outs(scene, x, wild)
+    group = grouped(scene, {"simulation": x, "newton-1": wild})
     scale, potential = gap_scale(group), Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
     above = []
     for frame in range(2, 8):
@@ -199,8 +186,7 @@ def test_one_scale_serves_all_methods_of_a_scene():
         assert away.shape == x.shape[:2] and np.isnan(away[: scene.warm_up]).all()
         rms = np.sqrt((away[scene.warm_up :] ** 2).mean(axis=1))
         assert rms.mean() == pytest.approx(metrics["step/distance"], rel=1e-5, abs=1e-9)
-    alone = roll_outs(scene)
-    assert gap_scale(alone) is None
+    assert gap_scale(grouped(scene, {})) is None
 
 
 @pytest.mark.parametrize("scale", [-0.5, float("nan"), 0.0])

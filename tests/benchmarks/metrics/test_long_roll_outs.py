@@ -19,10 +19,10 @@ from benchmarks.scenes import find_scene, hard_motions
 from benchmarks.scenes.hard_motions import ENDS, EVERY, FRAMES, LOOP_BLEND
 from benchmarks.scenes.variations import there_and_back
 from benchmarks.timing import Reading
-from reference_sim import Trajectory
 from snug.motion.library import make_motion
 from snug.networks.roll_out import roll_out
 from snug.training.train_network import untrained_model
+from tests.benchmarks.runner.tasks_by_hand import grouped
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMOKE = PRESETS[0]
@@ -34,10 +34,7 @@ def assets_of(dressed, *motions):
 
 def found_of(scene, x):
     """Return the metric's measurements of the kept frames x (T,V,3) [m]."""
-    group = SceneRollOuts(scene)
-    trajectory = Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
-    group.roll_outs.append(RollOut(group, find_method("snug"), trajectory))
-    return metric.measure_long_roll_out(group.roll_outs[0])
+    return metric.measure_long_roll_out(grouped(scene, {"snug": x}).roll_outs[0])
 
 
 def rolled(scene, models, name):

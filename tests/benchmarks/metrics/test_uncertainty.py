@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from benchmarks.methods import METHODS, find_method
-from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import curvature, dynamics, energy
 from benchmarks.metrics import penetration_and_distances as geometry
 from benchmarks.metrics.dynamics import HemMotion
@@ -16,38 +15,25 @@ from benchmarks.results.protocol import MEMBERS, is_member
 from benchmarks.results.row import Row
 from benchmarks.runner.measurements import compared, measured
 from benchmarks.runner.rows import with_uncertainty
-from reference_sim import Trajectory
-from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.benchmarks.runner.tasks_by_hand import grouped, small_scene
 
 EAST = np.array([1.0, 0.0, 0.0])
 TWINS = ("simulation-refrozen", "simulation-perturbed-1e-4", "simulation-1e-8")
 
 
-def group_of(scene, **positions):
-    """Roll-outs by the names of their methods, in which "_" stands for "-"."""
-    group = SceneRollOuts(scene, gap_samples=99)
-    for name, x in positions.items():
-        entry = find_method(name.replace("__", "/").replace("_", "-"))
-        times = scene.dt * np.arange(len(x))
-        trajectory = Trajectory(positions=x, faces=scene.cloth.faces, times=times)
-        group.roll_outs.append(RollOut(group, entry, trajectory, suites=("garments",)))
-    return group
-
-
-def swaying(scene, shift=0.0, frames=6):
+def swaying(scene, frames=6):
     x = np.repeat(scene.start[None], frames, axis=0)
-    x = x + 0.02 * np.sin(np.arange(frames) + 5.0 * scene.start[:, :1].sum())[:, None, None]
-    return x + np.array([shift, 0.0, 0.0])
+    return x + 0.02 * np.sin(np.arange(frames) + 5.0 * scene.start[:, :1].sum())[:, None, None]
 
 
 def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes():
     scene = small_scene("hanging_sheet", cells=4)
     x = swaying(scene)
-    group = group_of(
-        scene, simulation=x, simulation_refrozen=x + 0.001 * EAST,
-        simulation_perturbed_1e_4=x - 0.004 * EAST, simulation_dt__2=x + 0.05 * EAST,
-        simulation_perturbed_1e_9=x + 0.3 * EAST, newton_1=x + 0.01 * EAST,
-    )  # fmt: skip
+    shifts = {
+        "simulation": 0.0, "simulation-refrozen": 0.001, "simulation-perturbed-1e-4": -0.004,
+        "simulation-dt/2": 0.05, "simulation-perturbed-1e-9": 0.3, "newton-1": 0.01,
+    }  # fmt: skip
+    group = grouped(scene, {name: x + shift * EAST for name, shift in shifts.items()})
     metrics = compared(group.roll_outs[-1], geometry.compare)
     value, uncertainty, moved = metrics["distance/rms"]
     assert (value, uncertainty) == pytest.approx((10.0, 7.0**0.5))  # of 0, -1 and 4
@@ -55,7 +41,7 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
     # A member is compared with the others, not with itself: with one, whose spread nobody knows.
     assert compared(group.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(1.0)
     assert compared(group.roll_outs[0], geometry.compare) == {}
-    alone = group_of(scene, simulation=x, newton_1=x + 0.01 * EAST)
+    alone = grouped(scene, {"simulation": x, "newton-1": x + 0.01 * EAST})
     assert compared(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
 
 
@@ -114,7 +100,7 @@ def test_means_are_over_the_judged_frames_alone():
     x = swaying(scene)
     wild = x.copy()
     wild[:1] += np.random.default_rng(0).normal(size=x[:1].shape)  # no inertia of frame 3 hangs on it
-    one, other = (group_of(scene, simulation=x, newton_1=y).roll_outs[1] for y in (x, wild))
+    one, other = (grouped(scene, {"simulation": x, "newton-1": y}).roll_outs[1] for y in (x, wild))
     for measure in (energy.measure_energy, curvature.measure, geometry.measure):
         assert measure(one) == pytest.approx(measure(other))
     for compare in (curvature.compare, geometry.compare):
@@ -122,10 +108,14 @@ def test_means_are_over_the_judged_frames_alone():
         assert pair[0] == pytest.approx(pair[1])
     late = x.copy()
     late[-1] += 0.1 * np.random.default_rng(0).normal(size=x[0].shape)
-    last = group_of(scene, simulation=x, newton_1=late).roll_outs[1]
+    last = grouped(scene, {"simulation": x, "newton-1": late}).roll_outs[1]
     assert energy.measure_energy(last)["energy/strain"] > 2.0 * energy.measure_energy(one)["energy/strain"]
     # What ended in the warm-up has no number.
-    assert measured(group_of(scene, newton_1=x[:3]).roll_outs[0]) == ({}, {}, ("ok", ""))
+    assert measured(grouped(scene, {"newton-1": x[:3]}, suites=("garments",)).roll_outs[0]) == (
+        {},
+        {},
+        ("ok", ""),
+    )
 
 
 def test_dynamics_are_told_by_the_own_static_answer_and_by_the_simulators(monkeypatch):
@@ -134,7 +124,7 @@ def test_dynamics_are_told_by_the_own_static_answer_and_by_the_simulators(monkey
     time = np.arange(frames)[:, None, None] * scene.dt
     still = np.repeat(scene.start[None], frames, axis=0)
     swing = 0.02 * np.sin(9.0 * time) * scene.start[None, :, :1]
-    group = group_of(scene, simulation=still + swing, snug=still + 0.5 * swing)
+    group = grouped(scene, {"simulation": still + swing, "snug": still + 0.5 * swing})
     reference, method = group.roll_outs
     method.quasi_static = method.positions
     hem = HemMotion(

@@ -13,6 +13,9 @@ from benchmarks.methods import find_method
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.plan import Plan
+=======
+from benchmarks.metric import RollOut, SceneRollOuts
+>>>>>>> abb4f10a (One builder of roll-outs that are measured together)
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -23,6 +26,7 @@ from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
+from reference_sim import Trajectory
 
 TINY = dataclasses.replace(
     find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1, least_seconds=0.01
@@ -67,6 +71,7 @@ def context(folder, assets: Assets | None = None, **fields) -> Context:
     return Context(RunFolder(folder), assets, **fields)
 
 
+<<<<<<< HEAD
 def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
     """A plan of these methods in one scene. how: what those do that are no simulation, see misbehaving."""
     preset = changes.get("preset", TINY)
@@ -100,6 +105,15 @@ def outcome_of(plan: Plan, number: int = 0, *, processes: bool = False) -> Outco
     """Run one cell to the end of its process and return its outcome."""
     one = dataclasses.replace(plan, cells=plan.cells[number : number + 1])
     return finish(one, processes=processes).outcomes["cell", plan.cells[number].name]
+
+
+def grouped(scene: BuiltScene, positions: dict[str, np.ndarray], **fields) -> SceneRollOuts:
+    """Roll-outs of methods, by name, measured together; fields are those of each roll-out."""
+    group = SceneRollOuts(scene, gap_samples=99)
+    for name, x in positions.items():
+        trajectory = Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
+        group.roll_outs.append(RollOut(group, find_method(name), trajectory, **fields))
+    return group
 
 
 class Bar:
