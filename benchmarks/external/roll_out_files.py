@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -74,11 +74,6 @@ class RollOutOption:
                 "begins with one of -+."
             )
 
-    @property
-    def places(self) -> bool:
-        """True where there is a file for each of several scenes."""
-        return PLACE in self.path
-
     def path_for(self, scene: str) -> str:
         """Return the path of the roll-out in a scene."""
         return self.path.replace(PLACE, scene.replace("/", "-"))
@@ -125,11 +120,6 @@ class StoredRollOut:
     quasi_static: np.ndarray | None = None
     converged: np.ndarray | None = None
 
-    def mapped(self, change: Callable[[np.ndarray], np.ndarray], **others: Any) -> StoredRollOut:
-        """Return it with positions and quasi-static solutions changed alike; others: further fields."""
-        held = None if self.quasi_static is None else change(self.quasi_static)
-        return replace(self, positions=change(self.positions), quasi_static=held, **others)
-
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
     """Read a file, a folder or a pattern of files.
@@ -156,19 +146,6 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
     except Exception as error:  # a damaged file can fail in nearly every way, and none is this program's own
         why = " ".join(str(error).split())[:300] or type(error).__name__
         raise RollOutFileError(why if path in why else f"{path}: {why}") from None
-
-
-def first_not_finite(positions: np.ndarray) -> tuple[int, int] | None:
-    """Return the first frame with a position that is not finite, and its vertex; None without one.
-
-    Args:
-        positions: (T, V, 3).
-
-    >>> first_not_finite(np.array([[[0.0, 0.0, 0.0]], [[0.0, np.nan, 0.0]]]))
-    (1, 0)
-    """
-    bad = np.argwhere(~np.isfinite(positions).all(axis=-1))
-    return (int(bad[0, 0]), int(bad[0, 1])) if len(bad) else None
 
 
 def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:

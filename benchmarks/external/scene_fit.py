@@ -6,7 +6,7 @@ numbers, and nobody would see that they mean nothing.
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,9 +65,13 @@ def fit_to_scene(
         )
     if frames != scene.frames:
         raise RollOutFileError(f"has {frames} frames, the scene has {scene.frames} with its start")
-    fitted = stored.mapped(partial(to_metres_y_up, units=units, up=up))
-    _check_place(fitted.positions, expected_positions(scene), ordered=not other_mesh)
-    return fitted
+    positions = to_metres_y_up(stored.positions, units=units, up=up)
+    _check_place(positions, expected_positions(scene), ordered=not other_mesh)
+    held = stored.quasi_static
+    return replace(
+        stored, positions=positions,
+        quasi_static=None if held is None else to_metres_y_up(held, units=units, up=up),
+    )  # fmt: skip
 
 
 def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) -> None:

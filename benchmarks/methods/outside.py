@@ -21,9 +21,9 @@ import numpy as np
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import (
     MODULE,
+    PLACE,
     RollOutFileError,
     RollOutOption,
-    first_not_finite,
     read_roll_out,
 )
 from benchmarks.external.scene_files import facts_of, write_scene_files
@@ -65,8 +65,8 @@ class Stored(Method):
         return None if held is None else self._trajectory(held)
 
     def _trajectory(self, positions: np.ndarray) -> Trajectory:
-        stored, place = self.stored, first_not_finite(positions)
-        where = "frame {}, vertex {}".format(*place) if place else ""
+        stored, bad = self.stored, np.argwhere(~np.isfinite(positions).all(axis=-1))
+        where = f"frame {bad[0, 0]}, vertex {bad[0, 1]}" if len(bad) else ""
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
         claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
         return Trajectory(
@@ -88,7 +88,7 @@ def make_stored(*, models: Path, seed: int, path: str, digest: str, **stated: An
 def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:
     """Return the entry of that scene; None where it has no file. Raises RollOutFileError."""
     path = option.path_for(scene)
-    if option.places and not Path(path).exists() and not glob.glob(path):
+    if PLACE in option.path and not Path(path).exists() and not glob.glob(path):
         return None
     stored = read_roll_out(path)
     declared = option.ms is not None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from benchmarks.assets import Inputs
+from benchmarks.external.roll_out_files import PLACE
 from benchmarks.method import MethodEntry
 from benchmarks.metrics import measured_in
 from benchmarks.plan.cell import Cell
@@ -223,7 +224,7 @@ def roll_out_cells(study: Study, cells: Sequence[Cell], methods: Mapping[str, Me
         what = f"{option.name}={option.path}"
         if option.name in methods:
             raise StudyError(f"{what}: a method is called {option.name}: give another name, as in NAME=FILE")
-        if len(scenes) != 1 and not option.places:
+        if len(scenes) != 1 and PLACE not in option.path:
             raise StudyError(
                 f"{what}: is of one scene, and {len(scenes)} are asked for: name it with --scenes, or put "
                 "{scene} into the path"

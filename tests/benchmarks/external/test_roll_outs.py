@@ -257,12 +257,3 @@ def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_
     assert HEADER_SIZE == 32
     with pytest.raises(RollOutFileError, match="the file has 68"):
         read_roll_out(path)
-    import h5py
-
-    faces = np.array([[0, 1, 2]])
-    Trajectory(np.zeros((2, 3, 3)), faces, np.arange(2) / 30).save(tmp_path / "a.vtkhdf")
-    with h5py.File(tmp_path / "a.vtkhdf", "r+") as file:
-        del file["VTKHDF/Points"]
-        file.create_dataset("VTKHDF/Points", (10**12, 3), chunks=(10**4, 3), dtype="f8")
-    with pytest.raises(RollOutFileError, match="more than its file can hold"):
-        read_roll_out(tmp_path / "a.vtkhdf")
