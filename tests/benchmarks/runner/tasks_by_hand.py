@@ -11,11 +11,9 @@ import pytest
 from benchmarks.assets import Assets
 from benchmarks.methods import find_method
 from benchmarks.methods.declared_networks import TRAININGS
+from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.plan import Plan
-=======
-from benchmarks.metric import RollOut, SceneRollOuts
->>>>>>> abb4f10a (One builder of roll-outs that are measured together)
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -71,7 +69,6 @@ def context(folder, assets: Assets | None = None, **fields) -> Context:
     return Context(RunFolder(folder), assets, **fields)
 
 
-<<<<<<< HEAD
 def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
     """A plan of these methods in one scene. how: what those do that are no simulation, see misbehaving."""
     preset = changes.get("preset", TINY)
