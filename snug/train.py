@@ -187,14 +187,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def print_summary(model: TrainedModel) -> None:
-    """Print the last losses, high windows, the best validation and the size of a model."""
+    """Print the last losses, the best validation and the size of a model."""
     terms = [f"{name} {value:.4g}" for name, value in model.history[-1].items()
              if name not in ("step", "seconds")]  # fmt: skip
-    print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
+    high = model.summary["high_windows"]
+    print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames, {high} high windows")
     print(f"last steps, {model.unit}, mean over frames: " + "  ".join(terms))
     if validation := model.summary.get("validation"):
-        best, step = validation["best"], validation["best_step"]
-        print(f"validation {best:.4g} {model.unit} at step {step}, whose weights are kept")
+        print("validation {best:.4g} at step {best_step}, whose weights are kept".format(**validation))
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
           f"{model.megabytes:.1f} MB")  # fmt: skip
 

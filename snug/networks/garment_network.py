@@ -131,9 +131,7 @@ _GENERATOR = threading.Lock()  # torch's generator is one for all threads
 
 @contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """Draw from torch's generators as from a seed, and give them back as they were; threads take turns.
-
-    Those of GPUs are left alone until something is on a GPU.
+    """Draw from torch's CPU generator as from a seed, and give it back as it was; threads take turns.
 
     >>> with seeded(0):
     ...     first = torch.rand(1)
@@ -141,12 +139,8 @@ def seeded(seed: int) -> Iterator[None]:
     ...     bool(torch.rand(1) == first)
     True
     """
-    on_gpus = torch.cuda.is_initialized()
-    with _GENERATOR, torch.random.fork_rng(devices=range(torch.cuda.device_count()) if on_gpus else ()):
-        if on_gpus:
-            torch.manual_seed(seed)
-        else:  # manual_seed would seed GPUs for when they are begun with
-            torch.default_generator.manual_seed(seed)
+    with _GENERATOR, torch.random.fork_rng(devices=()):
+        torch.default_generator.manual_seed(seed)
         yield
 
 
@@ -218,10 +212,6 @@ def make_network(
         free[list(network.pins)] = 0.0
         network.register_buffer("free", free, persistent=False)
 
-        def hold_pins(
-            network: nn.Module, _features: object, output: tuple[Tensor, Tensor | None]
-        ) -> tuple[Tensor, Tensor | None]:
-            return output[0] * network.get_buffer("free"), output[1]
-
-        network.register_forward_hook(hold_pins)
+        # Not a closure over `free`: the buffer moves with the network to a GPU.
+        network.register_forward_hook(lambda net, _, out: (out[0] * net.get_buffer("free"), out[1]))
     return network

@@ -128,10 +128,8 @@ class TrainingLoop:
 
     def _identity(self) -> dict[str, Any]:
         names = self.validator.data.names if self.validator else []
-        return describe_run(
-            self.trainer, self.validator, every=self.every,
-            validation=[names, self.validated_every, self.patience],
-        )  # fmt: skip
+        watched = [names, self.validated_every, self.patience]
+        return describe_run(self.trainer, self.validator, every=self.every, validation=watched)
 
     def _save(self, checkpoint: Checkpoint) -> None:
         tensors, facts = self.trainer.state()
@@ -171,19 +169,11 @@ class TrainingLoop:
             summary["validation"] = {"motions": self.validator.data.names, "best": self.best_value,
                                      "best_step": self.best_step, "stopped_at": self.done}  # fmt: skip
         return TrainedModel(
-            trainer.kind,
-            trainer.network.cpu().eval(),
-            trainer.recipe,
-            seed=trainer.seed,
-            steps=self.done,
-            seconds=self.seconds + time.perf_counter() - self._started,
-            setup_seconds=self.setup_seconds,
-            history=self.history,
-            summary=summary,
-            unit=trainer.how.unit,
-            fps=1.0 / trainer.data.dt,
+            trainer.kind, trainer.network.cpu().eval(), trainer.recipe, seed=trainer.seed, steps=self.done,
+            seconds=self.seconds + time.perf_counter() - self._started, setup_seconds=self.setup_seconds,
+            history=self.history, summary=summary, unit=trainer.how.unit, fps=1.0 / trainer.data.dt,
             triangles=digest_of_triangles(trainer.dressed.garment.faces),
-        )
+        )  # fmt: skip
 
 
 def train_network(
@@ -256,14 +246,9 @@ def train_network(
 
 
 def _fitted_model(
-    model_kind: str,
-    dressed: DressedBody,
-    motions: Sequence[Motion],
-    trajectories: Trajectories | None,
-    *,
-    seed: int,
-    recipe: Recipe,
-) -> TrainedModel:
+    model_kind: str, dressed: DressedBody, motions: Sequence[Motion], trajectories: Trajectories | None, *,
+    seed: int, recipe: Recipe,
+) -> TrainedModel:  # fmt: skip
     """Fit a network to the offsets of simulated frames; its loss is that of the posed vertices."""
     begun = time.perf_counter()
     kind = find_kind(model_kind)
