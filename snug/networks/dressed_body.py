@@ -125,7 +125,10 @@ class DressedBody:
         rotations = rotation_matrices(motion.poses)
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if feature_set == "motion":
-            velocity = _root_velocity(motion, rotations[:, 0], recipe.velocity_frame)
+            # Zero in the first frame, which has no past.
+            velocity = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * motion.fps
+            if recipe.velocity_frame == "root":
+                velocity = np.einsum("tji,tj->ti", rotations[:, 0], velocity)
             parts.append(velocity * (not still))
         if feature_set in ("motion", "pose_shape"):
             shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
@@ -159,9 +162,3 @@ def _pose_numbers(poses: np.ndarray, rotations: np.ndarray, pose_input: str) -> 
     up = rotations[:, 0, 1, :]  # R^T e_y: a walk to the east and a walk to the north give the same input
     columns = rotations[:, 1:, :, :2].swapaxes(-1, -2)
     return np.concatenate([up, columns.reshape(len(poses), -1)], axis=1)
-
-
-def _root_velocity(motion: Motion, root: np.ndarray, frame: str) -> np.ndarray:
-    """Return the velocity of the root joint, (T, 3) [m/s]; zero in the first frame, which has no past."""
-    velocity = np.diff(motion.translations, axis=0, prepend=motion.translations[:1]) * motion.fps
-    return velocity if frame == "world" else np.einsum("tji,tj->ti", root, velocity)

@@ -280,8 +280,18 @@ def prepare_frame_inputs(
     return inputs
 
 
-def demand_fit(model: TrainedModel, dressed: DressedBody, motion: Motion) -> None:
-    """Raise RollOutError for another garment's model, or one that has learned motions of another rate."""
+def _features(
+    model: TrainedModel,
+    dressed: DressedBody,
+    motion: Motion,
+    betas: np.ndarray | None,
+    *,
+    still: bool = False,
+) -> Tensor:
+    """Return the network's inputs (T, D).
+
+    Raises RollOutError for another garment's model, or one that has learned motions of another rate.
+    """
     if model.vertices != dressed.vertices:
         raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
     if model.triangles and model.triangles != digest_of_triangles(np.asarray(dressed.garment.faces)):
@@ -295,18 +305,6 @@ def demand_fit(model: TrainedModel, dressed: DressedBody, motion: Motion) -> Non
             f"the model has learned from {model.fps:g} frames a second, motion {motion.name} has "
             f"{motion.fps:g}: resample it (snug.motion.motion.resample)"
         )
-
-
-def _features(
-    model: TrainedModel,
-    dressed: DressedBody,
-    motion: Motion,
-    betas: np.ndarray | None,
-    *,
-    still: bool = False,
-) -> Tensor:
-    """Return the network's inputs (T, D). Raises RollOutError if the model does not fit."""
-    demand_fit(model, dressed, motion)
     features = dressed.features(
         motion, model.recipe, betas, feature_set=model.network.feature_set, still=still
     )

@@ -140,13 +140,20 @@ class TrainingSet:
             mean[-shapes:], std[-shapes:] = 0.0, self.recipe.shape_range / np.sqrt(3.0)
         return mean, std
 
-    def at(self, frames: np.ndarray) -> Batch:
-        """Return rows (N, T), those of a line from one motion, as tensors; each motion on its own body."""
-        batch = replace(self.gathered(torch.as_tensor(frames, device=self.device)), frames=frames)
+    def at(self, frames: np.ndarray, betas: np.ndarray | None = None) -> Batch:
+        """Return rows (N, T), those of a line from one motion, as tensors.
+
+        Each line is on the body of its motion, or of its shape in betas (N, S).
+        """
+        rows = torch.as_tensor(frames, device=self.device)
+        if betas is not None:
+            return replace(self.gathered(rows, torch.as_tensor(betas, device=self.device)), frames=frames)
+        batch = replace(self.gathered(rows), frames=frames)
         if self.shapes is None:
             return batch
-        betas = self.shapes[self.motion_of(frames[:, 0])]
-        return self._dressed(batch, torch.as_tensor(betas, device=self.device))
+        return self._dressed(
+            batch, torch.as_tensor(self.shapes[self.motion_of(frames[:, 0])], device=self.device)
+        )
 
     def gathered(self, rows: Tensor, betas: Tensor | None = None) -> Batch:
         """Return rows (N, T) on the device, each line on the mean body or that of shape numbers (N, S).
@@ -175,12 +182,8 @@ class TrainingSet:
         return self.starts[windows][:, None] + np.arange(self.window)
 
     def batch(self, windows: np.ndarray, betas: np.ndarray | None = None) -> Batch:
-        """Return windows (N,) as tensors, each on the body of its motion, or of its shape in betas (N, S)."""
-        frames = self.frames_of(windows)
-        if betas is None:
-            return self.at(frames)
-        rows, shapes = (torch.as_tensor(numbers, device=self.device) for numbers in (frames, betas))
-        return replace(self.gathered(rows, shapes), frames=frames)
+        """Return windows (N,) as tensors, see `at`."""
+        return self.at(self.frames_of(windows), betas)
 
     def _dressed(self, batch: Batch, betas: Tensor) -> Batch:
         """Return the batch with the unposed garments of shapes (N, S)."""
