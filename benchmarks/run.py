@@ -18,7 +18,6 @@ from benchmarks.plan.options import PROGRAM, make_parser, study_of
 from benchmarks.plan.plan import Plan
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
-from reference_sim.command_line import print_text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.list:
             from benchmarks.plan.options import list_names
 
-            print_text(list_names(study))
+            print(list_names(study))
             return 0
         plan = make_plan(
             study,
@@ -61,7 +60,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
 
     try:
         if dry_run:
-            print_text(describe(plan))
+            print(describe(plan))
             return 0
         from benchmarks.runner.isolated_process import LOADED_BY_DRESSED, start_loading
         from reference_sim.command_line import announce_compilation

@@ -55,14 +55,6 @@ class Parser(argparse.ArgumentParser):
         raise WrongWord(f"{message}; see --help")
 
 
-def print_text(text: str) -> None:
-    """Print a text that may be read no further than its first lines, as by `| head`."""
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python still has to write
-
-
 def command(
     program: str, *, goes_on: str = "", bad_input: tuple[type[Exception], ...] = (ValueError,)
 ) -> Callable[[Callable[Given, int]], Callable[Given, int]]:

@@ -10,8 +10,7 @@ from typing import Any
 from benchmarks.declarations import load_function
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from reference_sim.time_loop import simulate_with
-from reference_sim.time_step import TimeStepper
+from reference_sim.time_loop import TimeStepper, simulate_with
 from reference_sim.trajectory import Trajectory
 
 

@@ -21,7 +21,7 @@ from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.geometry.closest_point import FaceSearch
 from reference_sim.material import Material
 from reference_sim.obstacle import DEFAULT_REGION
-from reference_sim.time_step import State, TimeStepper
+from reference_sim.time_loop import State, TimeStepper
 from snug.body.parametric_body import Body
 from snug.garments.templates import TSHIRT, find_template
 from snug.motion.library import TRAIN

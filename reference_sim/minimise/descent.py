@@ -140,11 +140,6 @@ class Result:
     relaxed: bool = False
 
 
-def severity(status: str) -> int:
-    """Return how bad the status of a minimisation is: 0 is good."""
-    return STATUSES[status]
-
-
 def check_tolerance(tolerance: float) -> None:
     """Raise ValueError for a tolerance that is no finite number above zero."""
     if not 0.0 < tolerance < float("inf"):

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from reference_sim.minimise.descent import Result, severity
+from reference_sim.minimise.descent import STATUSES, Result
 from reference_sim.minimise.lbfgs import LBFGS
 from reference_sim.minimise.newton import Newton
 from reference_sim.potential import Potential
@@ -209,7 +209,7 @@ class StepMinimiser:
         result = _after(*rough, self.minimise_from(x))
         if result.status == "diverged":
             return result
-        status = max("stalled", "timeout" if late else result.status, key=severity)
+        status = max("stalled", "timeout" if late else result.status, key=STATUSES.__getitem__)
         problem = "no way without intersection" if status == "stalled" else "gave up after the timeout"
         return replace(result, status=status, reason=f"{problem}: pins came {progress:.1%} of their way")
 

@@ -21,7 +21,7 @@ from engine_runs import Engine, EngineCloth
 from newton_cloth import NewtonCloth
 from reference_sim import GRAVITY, Cloth
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
-from reference_sim.time_step import State, TimeStepper
+from reference_sim.time_loop import State, TimeStepper
 
 
 class ReferenceCloth(EngineCloth):

@@ -109,7 +109,7 @@ def test_a_planted_import_is_found(path, source, found):
 
 STUDIES = sorted((ROOT / "studies").glob("*/*.py"))
 # What a study may import of ours, as docs/extend.md promises: these, and names of the faces.
-DOOR = ("benchmarks.meshes", "benchmarks.validation", "reference_sim.energies", "reference_sim.time_step")
+DOOR = ("benchmarks.meshes", "benchmarks.validation", "reference_sim.energies", "reference_sim.time_loop")
 
 
 def test_studies_enter_by_the_public_door():

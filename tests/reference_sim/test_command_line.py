@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import importlib
 import io
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -84,17 +82,6 @@ def test_a_fault_of_the_program_is_raised():
 
     with pytest.raises(ValueError, match="shapes"):
         main()
-
-
-def test_a_text_may_be_read_no_further_than_its_first_line():
-    code = "from reference_sim.command_line import print_text; print_text('line\\n' * 1_000_000)"
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as writing:
-        assert writing.stdout and writing.stdout.readline() == b"line\n"
-        writing.stdout.close()
-        assert writing.stderr and writing.stderr.read() == b""
-    assert writing.returncode == 0
 
 
 def _time_left(*, done, seconds, expected_rate):

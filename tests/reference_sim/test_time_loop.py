@@ -23,8 +23,7 @@ from reference_sim.energies import (
     StretchStVK,
 )
 from reference_sim.minimise.newton import Newton
-from reference_sim.time_loop import simulate_with
-from reference_sim.time_step import TimeStepper
+from reference_sim.time_loop import TimeStepper, simulate_with
 from tests.reference_sim.meshes import box, grid
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
