@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from reference_sim.cholesky import CholmodSolver, SuperLUSolver, analyse, nested_dissection
-from tests.reference_sim.meshes import patch
+from reference_sim.cholesky import CholmodSolver, SuperLUSolver, analyse
 
 both = pytest.mark.parametrize("backend", [CholmodSolver, SuperLUSolver])
 
@@ -83,18 +82,3 @@ def test_analyse_takes_cholmod_where_it_is_and_superlu_where_it_is_not(monkeypat
     assert isinstance(analyse(*pattern), CholmodSolver)
     monkeypatch.setitem(__import__("sys").modules, "cvxopt", None)
     assert isinstance(analyse(*pattern), SuperLUSolver)
-
-
-def test_the_order_is_a_permutation_that_saves_fill():
-    x, faces = patch(3, cells=16)
-    faces = np.random.default_rng(0).permutation(len(x))[faces]  # a numbering without any locality
-    graph = sp.csr_matrix((np.ones(3 * len(faces)), (faces.ravel(), np.roll(faces, 1, axis=1).ravel())))
-    graph = sp.csr_matrix(((graph + graph.T) > 0).astype(float))
-    order = nested_dissection(graph)
-    assert sorted(order.tolist()) == list(range(len(x)))
-    dense = graph.toarray() * -1.0 + 10 * np.eye(len(x))
-
-    def fill(p: np.ndarray) -> int:
-        return int((np.abs(np.linalg.cholesky(dense[np.ix_(p, p)])) > 1e-14).sum())
-
-    assert fill(order) < 0.7 * fill(np.arange(len(x)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import importlib
 import io
-from pathlib import Path
 
 import pytest
 
@@ -56,23 +55,6 @@ def test_what_a_command_meets_is_its_exit_status(met, goes_on, status, message, 
     assert main() == status
     error = capsys.readouterr().err
     assert error.startswith("some.command: ") and message in error and error.count("\n") == 1
-
-
-NOWHERE = "/proc/nowhere/out"  # nobody makes a folder there, not even who may do everything
-
-
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a place where nothing can be written")
-@pytest.mark.parametrize(
-    ("name", "arguments"),
-    [
-        ("benchmarks.run", ["smoke", "--scenes", "free_fall", "--methods", "simulation"]),
-        ("benchmarks.export", ["hanging_sheet"]),
-    ],
-)
-def test_a_place_that_cannot_be_written_is_one_line(name, arguments, capsys):
-    assert importlib.import_module(name).main([*arguments, "-o", NOWHERE]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1 and f"{NOWHERE}: cannot be made" in error
 
 
 def test_a_fault_of_the_program_is_raised():

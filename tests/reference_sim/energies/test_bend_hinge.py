@@ -10,7 +10,7 @@ from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Energy
 from reference_sim.kernels.lanes import arctan2
 from tests.reference_sim.element_blocks import blocks_of
-from tests.reference_sim.energies.test_derivatives import close, curved_cloth
+from tests.reference_sim.energies.test_derivatives import close
 
 
 def hinge_at(phi: float) -> np.ndarray:
@@ -45,19 +45,6 @@ def test_a_hinge_passes_through_half_a_turn(phi, rest):
     assert second == pytest.approx(2.0, rel=1e-12)  # k
     assert close(gradient, Energy.value_and_gradient(energy, x)[1], 1e-10)
     assert close(blocks_of(energy, x), Energy.hessian_blocks(energy, x), 1e-10)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"scaling": "area"}, "choose one of length_area, none"),
-        ({"rest_angles": "flat"}, "give an array, a number or 'rest'"),
-        ({"rest_angles": np.zeros(3)}, "shape|broadcast"),
-    ],
-)
-def test_unknown_bending_options_are_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        BendHinge(curved_cloth(), **options)
 
 
 def test_the_arctangent_of_the_kernels_is_that_of_numpy():

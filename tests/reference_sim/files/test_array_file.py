@@ -55,13 +55,6 @@ def test_what_is_written_is_read(tmp_path, array):
     np.testing.assert_array_equal(read_array(tmp_path / "a.npy"), array)
 
 
-def test_an_array_of_objects_is_refused_only_where_it_is_asked_for(tmp_path):
-    np.savez(tmp_path / "a.npz", poses=POSES, gender=np.array(["f", None], dtype=object))
-    assert list(read_arrays(tmp_path / "a.npz", ("poses",))) == ["poses"]
-    with pytest.raises(ArrayFileError, match=r"a\.npz: array 'gender': Object arrays cannot be loaded"):
-        read_arrays(tmp_path / "a.npz")
-
-
 def whole_archive() -> bytes:
     np.savez(stream := io.BytesIO(), poses=POSES)
     return stream.getvalue()

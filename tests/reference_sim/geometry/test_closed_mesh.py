@@ -44,6 +44,7 @@ def test_closed_surfaces_pass():
         (BALL[None][:0], FACES, "nothing to touch"),
         (BALL[None], FACES + 1, r"vertex outside 0\.\.17"),
         (with_vertex(1, 4, np.nan), FACES, "vertex 4 of frame 1 is not finite"),
+        (with_vertex(2, FACES[5, 0], BALL[FACES[5, 1]]), FACES, "has no area in frame 2: remove it"),
         (
             BALL[None],
             FACES[1:],
@@ -61,10 +62,3 @@ def test_closed_surfaces_pass():
 def test_what_is_no_closed_surface(positions, faces, message):
     with pytest.raises(MeshError, match=message):
         check_closed(positions, faces)
-
-
-def test_a_face_that_collapses_on_the_way_is_named_with_its_frame():
-    a, b, c = FACES[5]
-    positions = with_vertex(2, a, 0.5 * (BALL[b] + BALL[c]))
-    with pytest.raises(MeshError, match="face 5 has no area in frame 2: remove it"):
-        check_closed(positions, FACES)

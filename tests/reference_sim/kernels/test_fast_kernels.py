@@ -5,13 +5,11 @@ from __future__ import annotations
 import warnings
 from typing import ClassVar
 
-import numpy as np
 import pytest
 
 from reference_sim import Cloth, Potential
 from reference_sim.energies import (
     AreaBarrier,
-    BendHinge,
     Gravity,
     Inertia,
     StretchSpring,
@@ -66,16 +64,3 @@ def test_a_slow_minimisation_is_announced_once(cloth, told_anew):
         warnings.simplefilter("error")
         LBFGS(slow)
         LBFGS(Potential([StretchStVK(cloth), AreaBarrier(cloth)]))  # at rest there is no fast way
-
-
-@pytest.mark.parametrize("made", [StretchStVK, BendHinge])
-def test_a_kernel_is_that_of_its_own_term(cloth, made):
-    """Two terms of one class, of other constants, keep them apart."""
-    soft, stiff = made(cloth), made(cloth)
-    for name in ("lam", "mu", "stiffness"):
-        if hasattr(stiff, name):
-            setattr(stiff, name, 2 * getattr(stiff, name))
-    x = (1.1 * cloth.rest_positions + np.arange(3) * cloth.rest_positions[:, :1] ** 2).astype(np.float32)
-    lanes = np.repeat(x[None, ..., None], 16, axis=-1)
-    one, two = (fast_kernel(term, "training_batch")(lanes, np.zeros_like(lanes)) for term in (soft, stiff))
-    assert two == pytest.approx(2 * one) and (one > 0).all()
