@@ -26,6 +26,7 @@ from typing import Any
 
 from benchmarks.declarations import DeclarationError
 
+ROOT = Path(__file__).resolve().parents[1]
 # For a reader; what a task depends on is found from the source: see benchmarks.provenance.
 PACKAGES = (
     "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis", "ipctk",
@@ -36,19 +37,13 @@ PACKAGES = (
 @cache  # that of the first call, which is nearer to the code that was loaded than a later one
 def commit() -> str:
     """Return the commit of the checkout, "+changes" where tracked files differ; else the package version."""
-    root = Path(__file__).resolve().parent.parent
-
-    def git(*arguments: str) -> str:
-        # No lock on the index: one would stay there where the disk is full.
-        command = ["git", "--no-optional-locks", "-C", str(root), *arguments]
-        answer = subprocess.run(command, capture_output=True, text=True, timeout=20)
-        return answer.stdout.strip() if answer.returncode == 0 else ""
-
-    try:
-        if (root / ".git").exists() and (head := git("rev-parse", "--short=10", "HEAD")):
-            return head + ("+changes" if git("status", "--porcelain", "--untracked-files=no") else "")
-    except (OSError, subprocess.TimeoutExpired):
-        pass  # no git on this machine: the installed version is what can be said
+    # No lock on the index: one would stay there where the disk is full. A tag is no commit.
+    command = ["git", "--no-optional-locks", "-C", str(ROOT), "describe", "--always", "--abbrev=10"]
+    command += ["--exclude=*", "--dirty=+changes"]
+    with suppress(OSError, subprocess.SubprocessError):  # no git here: the installed version is what is known
+        if (ROOT / ".git").exists():
+            done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)
+            return done.stdout.strip()
     return f"version {package_version('neural-garment-benchmark')}"
 
 
@@ -77,9 +72,7 @@ def processor_name() -> str:
 
 def usable_cores() -> int:
     """Return the number of processor cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def hardware(device: str = "cpu") -> dict[str, Any]:
@@ -152,7 +145,6 @@ def damaged(folder: Path, digests: Mapping[str, str]) -> str:
 
 
 ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
-ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("reference_sim", "snug", "benchmarks")
 # Prose, compiled kernels; and trained networks: a task that reads one names its digest.
 NO_PART = (".pyc", ".md", ".nbi", ".nbc", ".safetensors")
@@ -231,11 +223,14 @@ def _content(place: str) -> tuple[str, frozenset[str]]:
 def _files_of(place: str) -> list[Path]:
     """Return the files of the project at a place that count, in order."""
     path = ROOT / place
+
+    def counts(file: Path) -> bool:
+        name = file.relative_to(ROOT)
+        hidden = any(part.startswith((".", "__pycache__")) for part in name.parts)
+        return file.suffix not in NO_PART and not hidden and not name.as_posix().startswith(NO_RESULT)
+
     files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())
-    names = [(file, file.relative_to(ROOT)) for file in files if file.suffix not in NO_PART]
-    hidden = [any(part.startswith((".", "__pycache__")) for part in name.parts) for _, name in names]
-    others = [name.as_posix().startswith(NO_RESULT) for _, name in names]
-    return [file for (file, _), *left_out in zip(names, hidden, others) if not any(left_out)]
+    return list(filter(counts, files))
 
 
 def _neighbours(home: Path) -> list[Path]:
