@@ -62,6 +62,8 @@ WORDS = [
     ("--out full", "holds no run"),
     ("--out torn", "torn/run.json: not readable"),
     ("--workers 0", "1 or more"),
+    ("--trained none", "no such folder"),
+    ("--trained folder --scheduler tcp://there", "leave out --scheduler"),
     ("--frobnicate", "--frobnicate"),
     ("--methods gone.py", "gone.py: no such file"),
     ("--set metrics=energy", "energy: is no file"),

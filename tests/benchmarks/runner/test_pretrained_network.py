@@ -13,7 +13,6 @@ from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import check_machines
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.options import make_parser, study_of
 from benchmarks.plan.plan import Network, Plan
 from benchmarks.plan.study import Study, StudyError
 from benchmarks.results.row import BEFORE_FRAMES
@@ -24,7 +23,6 @@ from benchmarks.runner.run_json import described
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.runner.task import Outcome
 from benchmarks.training import Training
-from snug import trained
 from snug.named_recipes import PBNS
 from snug.networks.trained_model import TrainedModel
 from tests.benchmarks.runner.tasks_by_hand import TINY, assets_of, context, dressed_scene, plan_of
@@ -130,17 +128,7 @@ def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
     assert described(plan, rows)["methods"]["pbns"]["label"] == "PBNS (pretrained)"
 
 
-def test_the_option_takes_the_package_or_a_folder(tmp_path):
-    def folder(*options: str) -> Path | None:
-        return study_of(make_parser().parse_args(list(options))).trained
-
-    assert folder() is None and folder("--trained") == trained.FOLDER
-    assert folder("--trained", str(tmp_path)) == tmp_path
-    for path, scheduler, word in (
-        (tmp_path / "none", "", "no such folder"), (tmp_path, "tcp://there", "leave out --scheduler"),
-    ):  # fmt: skip
-        with pytest.raises(StudyError, match=word):
-            check_machines(Study(trained=path), tmp_path / "run", scheduler)
+def test_the_networks_of_a_run_do_not_take_the_place_of_its_trainings(tmp_path):
     with pytest.raises(StudyError, match="the folder of this run itself: give another by --out"):
         check_machines(Study(trained=tmp_path), tmp_path / "deeper" / "..", "")
 
