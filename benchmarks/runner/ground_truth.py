@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.method import MethodEntry
@@ -86,28 +86,20 @@ def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: 
     return Outcome(result=result, files=(run.relative(path),))
 
 
-@dataclass(frozen=True, kw_only=True)
-class MixedClips:
-    """Some of a garment's augmented clips.
+def simulate_clips(
+    scene: Scene, entry: MethodEntry, motions: tuple[str, ...], part: int, context: Context, needed: Needed
+) -> Outcome:
+    """Write the vertices of those clips whose simulation, settled like a motion's, is whole and converged.
 
-    Attributes:
+    Args:
         scene: that of any motion in the garment.
         entry: method that simulates.
         motions: the training motions that the clips are mixed from.
-        clips: name of all of them.
-        part: number of these: those that `part` + 1 augmented frames for each original one have, and `part`
-            have not.
+        part: number of these clips: those that `part` + 1 augmented frames for each original one have, and
+            `part` have not.
+        context: of the process.
+        needed: not read.
     """
-
-    scene: Scene
-    entry: MethodEntry
-    motions: tuple[str, ...]
-    clips: str
-    part: int
-
-
-def simulate_clips(mixed: MixedClips, context: Context, needed: Needed) -> Outcome:
-    """Write the vertices of those clips whose simulation, settled like a motion's, is whole and converged."""
     import numpy as np
 
     from snug.training.augmentation import make_shared_clips
@@ -116,39 +108,43 @@ def simulate_clips(mixed: MixedClips, context: Context, needed: Needed) -> Outco
     assert assets is not None
     kept: dict[str, Any] = {}
     left_out: dict[str, str] = {}
-    vertices = len(assets.garments[mixed.scene.garment].rest_positions)
-    before, clips = (
-        make_shared_clips(assets.named(mixed.motions), share, vertices=vertices)
-        for share in (mixed.part, mixed.part + 1)
-    )
+    given, vertices = assets.named(motions), len(assets.garments[scene.garment].rest_positions)
+    before, clips = (make_shared_clips(given, share, vertices=vertices) for share in (part, part + 1))
     new = clips[len(before) :]
     for clip in new:
-        positions, reason = simulated_clip(clip, mixed, context)
+        positions, reason = simulated_clip(clip, scene, entry, context)
         if reason:
             left_out[clip.name] = reason
         else:
             kept[clip.name] = positions.astype(np.float32)  # as networks see it
         context.tell(1.0 / len(new))
-    path = run.clips_path(mixed.clips, mixed.entry.name, mixed.part)
+    path = run.clips_path(clips_of(scene.garment, motions), entry.name, part)
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
         np.savez(temporary, **kept)
     return Outcome(result={"clips": list(kept), "left_out": left_out}, files=(run.relative(path),))
 
 
-def simulated_clip(clip: Motion, mixed: MixedClips, context: Context) -> tuple[np.ndarray, str]:
+def clips_of(garment: str, motions: tuple[str, ...]) -> str:
+    """Return the name of the clips that are mixed from so many motions."""
+    return f"{garment}/mixed-{len(motions)}"
+
+
+def simulated_clip(
+    clip: Motion, scene: Scene, entry: MethodEntry, context: Context
+) -> tuple[np.ndarray, str]:
     """Return positions (T,V,3) [m] of a clip, and why no network learns from them, or empty."""
     import numpy as np
 
-    assets, garment = context.assets, mixed.scene.garment
+    assets = context.assets
     assert assets is not None
     alone = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
-    scene = replace(mixed.scene, name=f"{garment}/{clip.name}", motion=clip.name).build(alone)
+    built = replace(scene, name=f"{scene.garment}/{clip.name}", motion=clip.name).build(alone)
     try:
-        trajectory = simulated(scene, mixed.entry, context.folder)
+        trajectory = simulated(built, entry, context.folder)
     except RuntimeError as error:  # a pose that leaves the cloth no room
         return np.empty(0), str(error) or type(error).__name__
-    done = trajectory.status == "converged" or mixed.entry.truncated
+    done = trajectory.status == "converged" or entry.truncated
     whole = trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all()
     return trajectory.positions, "" if done and whole else f"{trajectory.status}: {trajectory.reason}"
 

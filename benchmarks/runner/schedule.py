@@ -30,7 +30,7 @@ from benchmarks.runner.cells import (
     too_long,
 )
 from benchmarks.runner.ground_truth import (
-    MixedClips,
+    clips_of,
     files_of_start,
     settle_start,
     simulate_clips,
@@ -179,15 +179,14 @@ class Schedule:
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
         """Return the task that simulates one part of the augmented clips of these motions."""
         entry = find_method(simulated.method)
-        clips = f"{garment}/mixed-{len(motions)}"
+        clips = clips_of(garment, motions)
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
         of_scene = self._simulated_by(entry, scene)
         mixed_of = {name: self._motion(name) for name in motions}
-        mixed = MixedClips(scene=scene, entry=entry, motions=motions, clips=clips, part=part)
         return Task(
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
             label=_label(f"{garment}, mixed clips of {len(motions)} motions, part {part}", entry),
-            stage="ground truth", silent=True, run=partial(simulate_clips, mixed),
+            stage="ground truth", silent=True, run=partial(simulate_clips, scene, entry, motions, part),
             seconds=FRAME * sum(map(self._frames, motions)),
             inputs=of_scene["inputs"] | {"part": part, "motions": mixed_of},
             code=(*of_scene["code"], *MIXING),

@@ -16,7 +16,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.runner import ground_truth, training_motions
-from benchmarks.runner.ground_truth import MixedClips, simulate_clips, simulate_quasi_static
+from benchmarks.runner.ground_truth import simulate_clips, simulate_quasi_static
 from benchmarks.runner.networks import LONGEST, train
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.training import Simulated
@@ -41,11 +41,8 @@ MOTION = swaying(90)
 
 def clips_of(part: int, folder, assets, method: str = "simulation"):
     """Return the outcome of a part of the clips."""
-    mixed = MixedClips(
-        scene=dressed_scene(MOTION.name), entry=find_method(method), motions=(MOTION.name,),
-        clips="tshirt/mixed", part=part,
-    )  # fmt: skip
-    return simulate_clips(mixed, context(folder, assets), {})
+    scene, entry = dressed_scene(MOTION.name), find_method(method)
+    return simulate_clips(scene, entry, (MOTION.name,), part, context(folder, assets), {})
 
 
 def still(clip, entry) -> Trajectory:
