@@ -65,7 +65,7 @@ def docstring_rows(module: str) -> Rows:
     """Return the rows of the table in the docstring of a module.
 
     >>> docstring_rows("snug.body.smpl_files")[2]
-    ('faces, closed and wound outwards', '`f`, `faces`', '(F, 3), (F, 4)')
+    ('faces, closed and wound outwards', '`f`, `faces`', '(F, 3)')
     """
     text = import_module(module).__doc__ or ""
     lines = [line.strip("|") for line in text.splitlines() if line.startswith("|")]
