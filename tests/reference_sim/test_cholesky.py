@@ -48,7 +48,7 @@ class Problem:
 
 
 @both
-@pytest.mark.parametrize("size", [1, 2, 3, 60])
+@pytest.mark.parametrize("size", [1, 60])
 def test_solves_as_dense_numpy_does(backend, size):
     problem = Problem(size, seed=size)
     solver = problem.solver(backend)

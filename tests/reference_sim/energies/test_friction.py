@@ -86,27 +86,21 @@ def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
 def test_friction_without_the_step_before_is_refused():
     """A step may be prepared alone, since that after it needs no more; it has no energy."""
     scene = on_a_belt()
-    x = np.repeat(scene.start[None], 9, axis=0)
+    x = scene.start
     contact, friction = scene.energies[2:]
-    assert isinstance(contact, ContactPenalty) and isinstance(friction, ContactFriction)
 
-    def prepare(frame: int, obstacle: Obstacle | None = scene.obstacle) -> None:
-        step = Step(x[0], 0 * x[0], x[0], scene.dt, obstacle, frame)
+    def value(frame: int, obstacle: Obstacle) -> float:
+        step = Step(x, 0 * x, x, scene.dt, obstacle, frame)
         contact.prepare(step)
         friction.prepare(step)
+        return friction.value_and_gradient(x)[0]
 
-    prepare(5)
-    for evaluate in (friction.value_and_gradient, friction.active_hessian_blocks, friction.scalar_stiffness):
-        with pytest.raises(ValueError, match="step of the frame before"):
-            evaluate(x[0])
-    prepare(6)
-    assert friction.value_and_gradient(x[0])[0] > 0
-    prepare(8)  # 7 was jumped over
-    with pytest.raises(ValueError, match="step of the frame before"):
-        friction.value_and_gradient(x[0])
-    assert scene.obstacle is not None
-    prepare(9, scene.obstacle.refined(2))  # another run's frame 8
-    with pytest.raises(ValueError, match="step of the frame before"):
-        friction.value_and_gradient(x[0])
-    prepare(1)  # a first step needs none
-    assert friction.value_and_gradient(x[0])[0] > 0
+    belt = scene.obstacle
+    for frame, obstacle, known in (
+        (5, belt, False), (6, belt, True), (8, belt, False), (9, belt.refined(2), False), (1, belt, True),
+    ):  # fmt: skip
+        if known:
+            assert value(frame, obstacle) > 0
+        else:
+            with pytest.raises(ValueError, match="step of the frame before"):
+                value(frame, obstacle)
