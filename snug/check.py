@@ -44,7 +44,7 @@ def describe(garment: Garment, body: Body) -> Iterator[tuple[str, str]]:
     """Yield what a garment on a body is, by matter."""
     import numpy as np
 
-    from reference_sim.files.uv_chart import stretches
+    from reference_sim.files.mesh_files import stretches
     from reference_sim.geometry.topology import corner_angles
     from reference_sim.obstacle import Obstacle
     from snug.garments.fit import measure_fit

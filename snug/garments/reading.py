@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.files.array_file import ArrayFileError, read_arrays
-from reference_sim.files.mesh_files import METRES, Surface, read_mesh, to_metres_y_up
-from reference_sim.files.uv_chart import join_seams, rest_chart
+from reference_sim.files.mesh_files import METRES, Surface, join_seams, read_mesh, rest_chart, to_metres_y_up
 from reference_sim.material import Material, MaterialError
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body

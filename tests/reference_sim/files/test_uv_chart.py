@@ -8,8 +8,7 @@ import pytest
 from reference_sim import Cloth
 from reference_sim.cloth import MeshError
 from reference_sim.energies import BendHinge, Gravity, StretchSpring, StretchStVK
-from reference_sim.files.mesh_files import Surface
-from reference_sim.files.uv_chart import join_seams, rest_chart
+from reference_sim.files.mesh_files import Surface, join_seams, rest_chart
 from tests.reference_sim.meshes import grid
 from tests.snug.garments.garment_files import doubled_along, own_chart
 
