@@ -14,7 +14,7 @@ from pathlib import Path
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import RollOutFileError
 from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.options import PROGRAM, make_parser, study_of
+from benchmarks.plan.options import PROGRAM, make_parser, refuse_former, study_of
 from benchmarks.plan.plan import Plan
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
@@ -25,6 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command_line = list(sys.argv[1:] if arguments is None else arguments)
     one_thread()
     try:
+        refuse_former(command_line)
         options = make_parser().parse_args(command_line)
         study = study_of(options, options.study)
         if options.list:

@@ -76,31 +76,27 @@ SKINNING = "skinning"
 SHARE = 0.6  # of the last residual
 
 
-class GivenFrames:
-    """First guesses of the steps of a run, one of the given frames each.
+def given_frames(
+    start: Callable[[], Iterator[np.ndarray]], carry: ResidualTransport | None = None
+) -> Callable[[int, np.ndarray], np.ndarray]:
+    """Return the function of step and x (V, 3) [m] that gives the first guess (V, 3) [m] of a step from x.
 
-    With `carry`, SHARE of the last frame's residual, carried by the skin, is added to each guess. The
-    residual is what the solver added to the frame before: where the step starts, less the frame given there.
-
-    Args:
-        frames: starts the frames, each (V, 3) [m], from frame 0 on, at each call.
-        carry: transport of the residual, or None.
+    Steps are asked for in turn, from 1, where `start` begins the frames anew. With `carry`, SHARE of the last
+    frame's residual, carried by the skin, is added to each. The residual is what the solver added to the
+    frame before: where the step starts, less the frame given there.
     """
+    frames: Iterator[np.ndarray]
+    given = np.zeros((0, 3))
 
-    def __init__(
-        self, frames: Callable[[], Iterator[np.ndarray]], carry: ResidualTransport | None = None
-    ) -> None:
-        self._start, self._carry = frames, carry
-
-    def __call__(self, step: int, x: np.ndarray) -> np.ndarray:
-        """Return the guess (V, 3) [m] for a step from x (V, 3) [m]. Steps are asked for in turn, from 1."""
+    def guess(step: int, x: np.ndarray) -> np.ndarray:
+        nonlocal frames, given
         if step == 1:
-            self._frames = self._start()
-            self._given = next(self._frames)  # frame 0 itself is the scene's start, as for every solver
-        before, self._given = self._given, next(self._frames)
-        if self._carry is None:
-            return self._given
-        return self._given + SHARE * self._carry.carried(x - before, step)
+            frames = start()
+            given = next(frames)  # frame 0 itself is the scene's start, as for every solver
+        before, given = given, next(frames)
+        return given if carry is None else given + SHARE * carry.carried(x - before, step)
+
+    return guess
 
 
 @dataclass(kw_only=True)
@@ -122,7 +118,7 @@ class WarmStarted(Simulation):
         """Prepare the network or skinning, and the solver that starts from its frames."""
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
-        guess = GivenFrames(self._frames(scene), self._carry(scene) if self.residual else None)
+        guess = given_frames(self._frames(scene), self._carry(scene) if self.residual else None)
         self.options = {"guess": guess, **self.solver}
         super().prepare(scene)
 

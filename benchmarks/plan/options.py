@@ -14,7 +14,7 @@ from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import parse_roll_out
 from benchmarks.plan.choose_cells import matching, scenes_of_parts
 from benchmarks.plan.make_plan import read_files
-from benchmarks.plan.study import Layer, Study, option, parse_setting, read_study, study_names
+from benchmarks.plan.study import Layer, Study, StudyError, option, parse_setting, read_study, study_names
 from benchmarks.presets import PRESETS
 from reference_sim.command_line import Parser
 from snug.file_options import split_words
@@ -62,10 +62,16 @@ REPLACED = {  # former option, which people have in scripts -> what to say in it
 }
 
 
+def refuse_former(words: Sequence[str]) -> None:
+    """Raise StudyError for a former option among the words of a command line."""
+    for word in (word.partition("=")[0] for word in words):
+        if remedy := REPLACED.get(word):
+            raise StudyError(f"{word} is no option any more: {remedy}")
+
+
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of benchmarks.run."""
     parser = Parser(
-        replaced=REPLACED,
         prog=f"python -m {PROGRAM}",
         description="Run a study: dress a body, simulate the ground truth, train the networks, compare all "
         "methods and write tables, figures and a PDF.",

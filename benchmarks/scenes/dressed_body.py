@@ -63,21 +63,18 @@ def build_dressed_body(
         return np.stack([x[-1], (x[-1] - x[-2]) * way.fps])
 
     cloth = garment.cloth()
-    terms = energies = declared_energies(cloth)
+    energies = declared_energies(cloth)
+    minimised: tuple[Energy, ...] = ()
     if scene.self_contact:
         from benchmarks.scenes.self_contact import with_self_contact  # loads the barrier
 
-        terms = with_self_contact(energies)
+        minimised = with_self_contact(energies)
+    terms = minimised or energies
     return worn(
-        scene,
-        assets,
-        Dressed(body, garment, motion, shape, before=before),
-        cloth=cloth,
-        energies=energies,
-        settle=settle,
-        minimised=terms if scene.self_contact else (),
+        scene, assets, Dressed(body, garment, motion, shape, before=before), cloth=cloth, energies=energies,
+        settle=settle, minimised=minimised,
         warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
-    )
+    )  # fmt: skip
 
 
 def worn(scene: Scene, assets: Assets, dressed: Dressed, **further: Any) -> BuiltScene:

@@ -61,15 +61,9 @@ def build_hard_motion(
         root = body.transforms(motion.poses[:1], motion.translations[:1], shape)[0, 0]
         return garment.rest_for(body, shape) @ root[:, :3].T + root[:, 3]
 
-    return worn(
-        scene,
-        assets,
-        Dressed(body, garment, motion, shape),
-        cloth=cloth,
-        energies=energies,
-        settle=settle,
-        glitch=GLITCH if change in ("root_jumps", "limb_flips") else None,
-    )
+    glitch = GLITCH if change in ("root_jumps", "limb_flips") else None
+    dressed = Dressed(body, garment, motion, shape)
+    return worn(scene, assets, dressed, cloth=cloth, energies=energies, settle=settle, glitch=glitch)
 
 
 def ordinary(walk: Motion) -> Motion:

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.meshes import sphere, square_sheet
 from benchmarks.methods.sweeps import XPBD, VertexBlockDescent, block
-from benchmarks.methods.warm_started import SHARE, GivenFrames
+from benchmarks.methods.warm_started import SHARE, given_frames
 from benchmarks.metrics.energy import first_guess
 from benchmarks.scenes.sheets import exact_fall
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
@@ -173,7 +173,7 @@ def test_given_frames_begin_anew_with_each_run_and_carry_what_the_solver_added_t
         def carried(self, residual, frame):
             return frame * residual[:, ::-1]
 
-    plain, carrying = GivenFrames(lambda: iter(frames)), GivenFrames(lambda: iter(frames), Turning())
+    plain, carrying = given_frames(lambda: iter(frames)), given_frames(lambda: iter(frames), Turning())
     for _ in range(2):
         for step in (1, 2):
             x = frames[step - 1] + added[step - 1]

@@ -43,18 +43,13 @@ def test_of_whole_motions_the_first_alone_is_timed_and_all_else_is_measured_in_a
     assert all(cell.scene.timed for cell in cells)
 
 
-def test_the_reference_comes_first_in_every_scene():
-    first = {}
-    for cell in planned("full:garments,speed", *TESTS).cells:
+def test_the_reference_comes_first_in_every_scene_and_only_what_has_a_seed_is_repeated():
+    first, seeds = {}, {}
+    for cell in planned("full:garments,speed", *TESTS, "--seeds", "3,5").cells:
+        seeds.setdefault(cell.method, set()).add(cell.seed)
         if not cell.scene.networks_only:
             first.setdefault(cell.scene.name, cell.method)
     assert set(first.values()) == {"simulation"} and len(first) == 8
-
-
-def test_only_what_has_a_seed_is_repeated_and_the_rest_is_the_same_whatever_the_seeds():
-    seeds = {}
-    for cell in planned("full:garments", *TESTS, "--seeds", "3,5").cells:
-        seeds.setdefault(cell.method, set()).add(cell.seed)
     assert seeds["snug"] == seeds["untrained"] == {3, 5} and seeds["simulation"] == seeds["skinning"] == {0}
 
 

@@ -43,21 +43,17 @@ def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, t
 def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, tube):
     path, out = saved(tmp_path, tube), str(tmp_path / "run")
 
-    def inputs(words="", path=path):
+    def inputs(words=""):
         plan = planned(*WORDS, "--garment", f"{path}{words}", "-o", out)
         return Schedule(plan).cell(plan.cells[0]).inputs
 
     first = inputs()
-    assert inputs() == first != inputs(",shift=0 0.001 0")
-    (tmp_path / "elsewhere").mkdir()
-    moved = path.rename(tmp_path / "elsewhere" / path.name)
-    assert inputs(path=moved) == first
     (tmp_path / "silk.json").write_text('{"density": 300.0}')
-    assert inputs(f",material={tmp_path}/silk.json", moved) != first
-    moved.write_text(moved.read_text() + "# a remark\n")
-    assert inputs(path=moved) == first  # the garment as read is what counts
-    saved(moved.parent, tube, positions=1.001 * tube.rest_positions)
-    assert inputs(path=moved) != first
+    assert first not in (inputs(",shift=0 0.001 0"), inputs(f",material={tmp_path}/silk.json"))
+    path.write_text(path.read_text() + "# a remark\n")
+    assert inputs() == first  # the garment as read is what counts
+    saved(tmp_path, tube, positions=1.001 * tube.rest_positions)
+    assert inputs() != first
 
 
 @pytest.mark.slow

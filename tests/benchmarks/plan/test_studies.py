@@ -57,7 +57,7 @@ def test_a_study_has_its_own_fields_those_that_it_is_like_and_paths_beside_its_f
     assert study.sizes.dependence.frames == 3 and study.sizes.dependence.meshes == quick.dependence.meshes
     assert study.garment.path == mine / "shirt.obj" and study.garment.shift == (0.0, 0.1, 0.0)
     assert study.rollouts["theirs"].path == str(mine / "out/{scene}.npz")
-    assert study.rollouts["others"].stated.units == "cm" and study.rollouts["others"].declared_ms == 2.5
+    assert study.rollouts["others"].units == "cm" and study.rollouts["others"].ms == 2.5
     assert study.written["sizes"]["frames"] == 60 and "like" not in study.written
     (mine / "other.toml").write_text('like = "study.toml"\nbody = "other.npz"\n')
     assert read_study(str(mine / "other.toml")).body == mine / "other.npz"

@@ -255,12 +255,3 @@ def test_a_program_that_goes_wrong_says_so_in_its_last_line(body, seconds, messa
     with pytest.raises(Exception) as raised:
         method.run()
     assert message in str(raised.value) and "\n" not in str(raised.value)
-
-
-def test_a_command_without_its_places_is_refused(tmp_path):
-    with pytest.raises(DeclarationError, match=r"has no \{out\}"):
-        program("p", "run.sh {scene}")
-    method = program("p", "nowhere/run.sh {scene} {out}").make(models=tmp_path, seed=0)
-    method.prepare(SCENE["free_fall"].at(TINY).build())
-    with pytest.raises(RuntimeError, match="cannot be started"):
-        method.run()
