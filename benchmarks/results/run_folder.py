@@ -210,12 +210,12 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
 
     if not path.is_file():
         return pd.DataFrame()
-    kinds: dict[str, type] = {"scene": str, "method": str, "seed": int}
     try:
-        table = pd.read_csv(path, dtype=kinds, float_precision="round_trip")
+        table = pd.read_csv(path, dtype=str, keep_default_na=False)
         columns = list(table)
         if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL):
             raise ValueError(f"the columns should be {','.join(CELL)} and energies")
-        return table.astype(dict.fromkeys(columns[3:], float))
+        numbers = {name: [float(cell or "nan") for cell in table[name]] for name in columns[3:]}
+        return table.assign(seed=list(map(int, table["seed"])), **numbers)
     except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({' '.join(str(error).split())})") from None
