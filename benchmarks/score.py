@@ -45,7 +45,7 @@ EXAMPLES = """examples:
   python -m benchmarks.score mine.pc2,units=cm,up=z --scene tshirt/kick
   python -m benchmarks.score theirs=frames/,ms=2.2 --scene hanging_sheet
   python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
-  python -m benchmarks.score mine.npz --scene tshirt/kick --json --no-report > numbers.json
+  python -m benchmarks.score mine.npz --scene tshirt/kick --json > numbers.json
   python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
 
 ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
@@ -78,13 +78,9 @@ def make_parser() -> argparse.ArgumentParser:
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
     reference.add_argument("--no-reference", action="store_true", help="leave out what needs a reference")
-    add(
-        "--no-report",
-        action="store_true",
-        help="numbers of the roll-out alone: no figures, page and PDF, and no times and "
-        "gaps of what it is compared with",
-    )
-    add("--json", action="store_true", help="print all numbers as one JSON object in place of the line")
+    add("--json", action="store_true",
+        help="print all numbers of the roll-out as one JSON object in place of the line: no figures, page "
+        "and PDF, and no times and gaps of what it is compared with")  # fmt: skip
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     return parser
 
@@ -98,11 +94,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     plan = plan_score(
         study_of(options), options.roll_out, options.scene or "",
         rest_mesh=options.rest_mesh, reference=False if options.no_reference else options.reference,
-        report=not options.no_report, folder=Path(options.out) if options.out else None,
+        report=not options.json, folder=Path(options.out) if options.out else None,
         command_line=shlex.join(["python", "-m", PROGRAM, *command_line]),
     )  # fmt: skip
     with contextlib.redirect_stdout(sys.stderr):
-        status = carry_out(plan, program=PROGRAM, report=not options.no_report)
+        status = carry_out(plan, program=PROGRAM, report=not options.json)
     if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file():
         print(json.dumps(numbers(plan), indent=1) if options.json else summary(plan))
     return status
