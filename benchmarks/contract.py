@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import reduce
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -109,7 +109,8 @@ def distance(one: np.ndarray, other: np.ndarray) -> float:
 
 def fingerprints(scene: BuiltScene) -> dict[str, str]:
     """Return name -> digest of the arrays of a scene, which nobody may alter."""
-    values = {name: reduce(lambda of, a: getattr(of, a, None), name.split("."), scene) for name in UNALTERED}
+    whole: Any = scene
+    values = {name: reduce(lambda of, a: getattr(of, a, None), name.split("."), whole) for name in UNALTERED}
     return {name: digest(np.asarray(value)) for name, value in values.items() if value is not None}
 
 
