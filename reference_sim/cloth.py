@@ -75,9 +75,6 @@ class Cloth:
                 )
         for name, value in (("rest_positions", positions), ("faces", faces), ("pins", pins), ("rest_uv", uv)):
             object.__setattr__(self, name, value)
-        self._check_elements()
-
-    def _check_elements(self) -> None:
         small = np.flatnonzero(~(self.areas > 1e-12 * self.areas.max()))
         if small.size:
             raise MeshError(f"face {small[0]} has no rest area ({self.areas[small[0]]:.3g} m^2): remove it")

@@ -30,15 +30,9 @@ class Planes:
 
 
 def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: float) -> np.ndarray:
-    """Find the faces that some sample may meet, by the rule of regions.
+    """Return the faces that some sample may meet: those with a centroid no farther away than `region` [m].
 
-    Args:
-        rest_points: (S, 3) [m] samples at rest.
-        centroids: (F, 3) [m] of the faces at rest.
-        region: [m] a sample meets faces whose centroid lies no farther away; all faces where there is none.
-
-    Returns:
-        Indices of the faces.
+    rest_points (S, 3) and centroids (F, 3) [m] are at rest. Where a sample has no such face, it is all faces.
     """
     from scipy.spatial import cKDTree
 

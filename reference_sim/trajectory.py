@@ -116,18 +116,15 @@ class Trajectory:
             reason = " ".join(str(error).split())
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 
-    def first(self, count: int) -> Trajectory:
-        """Return the first `count` frames, or all if there are fewer."""
+    def finite(self) -> Trajectory:
+        """Return the frames before the first in which a position is not finite."""
+        whole = np.isfinite(self.positions).all(axis=(1, 2))
+        count = len(whole) if whole.all() else int(np.argmin(whole))
         return replace(
             self, positions=self.positions[:count], times=self.times[:count],
             frame_seconds=self.frame_seconds[:count],
             frame_fields={name: values[:count] for name, values in self.frame_fields.items()},
         )  # fmt: skip
-
-    def finite(self) -> Trajectory:
-        """Return the frames before the first in which a position is not finite."""
-        whole = np.isfinite(self.positions).all(axis=(1, 2))
-        return self if whole.all() else self.first(int(np.argmin(whole)))
 
 
 def _read(path: Path) -> Trajectory:

@@ -18,7 +18,7 @@ from benchmarks.validation.extreme_steps import (
 from benchmarks.validation.registry import STRESS_TESTS
 from reference_sim import Cloth, minimise
 from reference_sim.energies import Energy, StretchStVK
-from tests.reference_sim.element_blocks import blocks_of
+from tests.reference_sim.energies.test_derivatives import blocks_of
 from tests.reference_sim.meshes import grid
 
 CASES = [

@@ -9,8 +9,7 @@ from numba import vectorize
 from reference_sim import Cloth, Material
 from reference_sim.energies import BendHinge, Energy
 from reference_sim.kernels.lanes import arctan2
-from tests.reference_sim.element_blocks import blocks_of
-from tests.reference_sim.energies.test_derivatives import close
+from tests.reference_sim.energies.test_derivatives import blocks_of, close
 
 
 def hinge_at(phi: float) -> np.ndarray:
