@@ -118,23 +118,7 @@ def within_tolerance(metric: Metric, mean: Mean, new: Mean, far: Effect, scale: 
 
 
 ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter
-
-
-@dataclass(frozen=True)
-class Table:
-    """Values of one metric of one method in a run.
-
-    Attributes:
-        scenes: names of its rows, sorted.
-        values: (scenes, seeds); NaN where a scene lacks a seed.
-        uncertainty: (scenes,), 0 where it is unknown.
-        seeded: whether the method has seeds.
-    """
-
-    scenes: tuple[str, ...]
-    values: np.ndarray
-    uncertainty: np.ndarray
-    seeded: bool
+NETWORK_METRIC = ["method", "metric"]
 
 
 def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Metric]) -> list[Change]:
@@ -148,90 +132,76 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     from scipy import stats
 
     answers = [name for name, metric in metrics.items() if metric.of != "machine"]
-    before, after = (_tables(frame[frame["metric"].isin(answers)]) for frame in (one, other))
-    parts = [
-        _differences(method, metrics[name], table, after[method, name])
-        for (method, name), table in before.items()
-        if not table.seeded or min(table.values.shape[1], after[method, name].values.shape[1]) > 1
-    ]
-    if not parts:
+    frame = pd.concat([one.assign(run=0), other.assign(run=1)], ignore_index=True)
+    frame = frame[frame["metric"].isin(answers)].astype(dict.fromkeys((*NETWORK_METRIC, "scene"), str))
+    # One seed says nothing of how seeds scatter.
+    seeds = frame.groupby(NETWORK_METRIC)["seed"].transform("nunique")
+    frame = frame[~frame["seeded"] | (seeds > 1)]
+    if frame.empty:
         return []
-    rows = pd.concat(parts)
+    groups = frame.groupby(NETWORK_METRIC, sort=False)
+    rows = pd.concat([_differences(metrics[name], of_group) for (_, name), of_group in groups])
     tests = max(int((rows["error"] > 0.0).sum()), 1)
     beyond = rows["error"] * stats.t.isf(LEVEL / 2.0 / tests, rows["freedom"])
     rows = rows[rows["far"].abs() > np.maximum(rows["least"], beyond)]
-    changes = []
-    for row in rows.itertuples():
-        metric = metrics[row.metric]
-        size = size_of_values(metric, row.before, row.after)
-        changes.append(Change(side(metric, row.far), row.scene, row.method, metric.name, size))
-    return changes
-
-
-def _tables(frame: pd.DataFrame) -> dict[tuple[str, str], Table]:
-    """Return (method, metric) -> its table, in the order of the rows.
-
-    The frame is pivoted once: a pivot of each metric of each method takes pandas some 10 s a run.
-    """
-    if frame.empty:
-        return {}
-    group = ["method", "metric"]
-    pivot = frame.pivot_table(index=[*group, "scene"], columns="seed", values="value")
-    unsure = frame.groupby([*group, "scene"])["uncertainty"].mean().reindex(pivot.index).fillna(0.0)
-    values, uncertainty = pivot.to_numpy(), unsure.to_numpy()
-    scenes = pivot.index.get_level_values("scene").to_numpy()
-    seeded = frame.groupby(group, sort=False)["seeded"].any()
-    places = pivot.groupby(level=group).indices
-    tables = {}
-    for key, has_seeds in seeded.items():
-        chosen = places[key]
-        some = ~np.isnan(values[chosen]).all(axis=0)
-        tables[key] = Table(
-            tuple(scenes[chosen]), values[chosen][:, some], uncertainty[chosen], bool(has_seeds)
+    return [
+        Change(
+            side(metrics[row.metric], row.far), row.scene, row.method, row.metric,
+            size_of_values(metrics[row.metric], row.before, row.after),
         )
-    return tables
+        for row in rows.itertuples()
+    ]  # fmt: skip
 
 
-def _differences(method: str, metric: Metric, one: Table, other: Table) -> pd.DataFrame:
-    """Return for each scene the difference of the later run from the earlier.
+def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
+    """Return for each scene of one method the difference of the later run from the earlier.
 
     before, after: means over seeds. far: the difference on the scale, of logarithms where all values are
     positive, else plain. least: the largest one on that scale that is no change. error: its standard error, 0
     without seeds. freedom: degrees of freedom of the error.
     """
-    before, after = one.values, other.values
+    values, run = rows["value"].to_numpy(), rows["run"].to_numpy()
     relative = metric.name.startswith("relative_excess/")
-    signed = relative or metric.arbitrary_zero
-    positive = not signed and min(np.nanmin(before), np.nanmin(after)) > 0.0
-    scales = [np.log(x) if positive else x for x in (before, after)]
-    far = np.nanmean(scales[1], axis=1) - np.nanmean(scales[0], axis=1)
-    scatter, freedom = _scatter(scales)
-    share = tolerance_of(metric)
-    old, new = np.nanmean(before, axis=1), np.nanmean(after, axis=1)
+    positive = not (relative or metric.arbitrary_zero) and values.min() > 0.0
+    scaled = np.log(values) if positive else values
+    places, scenes = pd.factorize(rows["scene"], sort=True)
+    cells = 2 * places + run
+    counts = np.bincount(cells)
+
+    def means_of(numbers: np.ndarray) -> np.ndarray:
+        """Return (2,scenes): mean over the seeds of either run."""
+        return (np.bincount(cells, numbers) / counts).reshape(-1, 2).T
+
+    (old, new), (before, after) = means_of(values), means_of(scaled)
+    draws = pd.factorize(rows["seed"] * 2 + run)[0]
+    scatter, freedom = _scatter(scaled - np.stack([before, after])[run, places], places, draws)
     median = float(np.median(np.abs(old)))
-    moved = SPREADS * np.hypot(one.uncertainty, other.uncertainty)
+    moved = SPREADS * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
+    share = tolerance_of(metric)
     if positive:
         least = np.maximum(math.log1p(share), np.log1p((FLOOR * median + moved) / old))
     else:
         unit = 100.0 if relative else np.maximum(np.abs(old), median)
         least = np.maximum(np.maximum(share * unit, FLOOR * median), moved)
-    counts = [np.isfinite(x).sum(axis=1) for x in (before, after)]
-    error = scatter * np.sqrt(1.0 / counts[0] + 1.0 / counts[1])
+    error = scatter * np.sqrt((1.0 / counts).reshape(-1, 2).sum(axis=1))
     return pd.DataFrame({
-        "scene": one.scenes, "method": method, "metric": metric.name, "before": old, "after": new,
-        "far": far, "least": least, "error": error, "freedom": freedom,
+        "scene": scenes, "method": rows["method"].iloc[0], "metric": metric.name, "before": old, "after": new,
+        "far": after - before, "least": least, "error": error, "freedom": freedom,
     })  # fmt: skip
 
 
-def _scatter(runs: list[np.ndarray]) -> tuple[np.ndarray, float]:
+def _scatter(residuals: np.ndarray, places: np.ndarray, draws: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the standard deviation over seeds in each scene, at least the pooled one, and its freedom.
+
+    Args:
+        residuals: (N,) values less the mean over the seeds of their scene and run.
+        places: (N,) numbers of their scenes.
+        draws: (N,) numbers of their trainings, each a seed of a run.
 
     A seed may move all scenes alike. With correlation rho between S scenes, the pooled variance has
     1 + (S - 1) rho^2 times fewer degrees of freedom than with independent scenes.
     """
-    residuals = [x - np.nanmean(x, axis=1, keepdims=True) for x in runs]
-    squares = sum(np.nansum(x**2, axis=1) for x in residuals)
-    freedom = sum(np.isfinite(x).sum(axis=1) - 1 for x in runs)
+    squares, freedom = np.bincount(places, residuals**2), np.bincount(places) - 2
     if not freedom.any() or not squares.any():
         return squares * 0.0, math.inf
     spread = np.sqrt(squares / np.maximum(freedom, 1))
@@ -240,9 +210,9 @@ def _scatter(runs: list[np.ndarray]) -> tuple[np.ndarray, float]:
         pool = freedom > 0
     total = float(freedom[pool].sum())
     pooled = float(squares[pool].sum()) / total
-    residuals = [x[pool] for x in residuals]
-    scenes, seeds = int(pool.sum()), sum(x.shape[1] - 1 for x in runs)
-    common = sum(float((np.nanmean(x, axis=0) ** 2).sum()) for x in residuals) / seeds
+    scenes, kept = int(pool.sum()), pool[places]
+    of_draws = np.bincount(draws[kept], residuals[kept]) / np.maximum(np.bincount(draws[kept]), 1)
+    common = float((of_draws**2).sum()) / (draws.max() - 1)
     rho = (scenes * common / pooled - 1.0) / (scenes - 1) if scenes > 1 else 0.0
     total /= 1.0 + (scenes - 1) * min(max(rho, 0.0), 1.0) ** 2
     return np.maximum(spread, math.sqrt(pooled)), total

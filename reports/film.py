@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,23 +15,31 @@ from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder, replacing
-from reports.rendering import BODY_COLOUR, CLOTH_COLOUR, LIFT, Camera, Surface, camera_axes, views
+from reports.pictures import (
+    BODY_COLOUR,
+    CLOTH_COLOUR,
+    LIFT,
+    Camera,
+    SceneRollOuts,
+    Surface,
+    camera_axes,
+    views,
+)
 
 if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
 
 EXAMPLES = """examples:
-  python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.mp4
+  python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.gif
   python -m reports.film reports/runs/NAME --scene flag --methods simulation,newton-1,xpbd-40 -o flag.gif
-  python -m reports.film reports/runs/NAME --scene tshirt/punch --methods snug,pbns --speed 0.25 -o punch.mp4
+  python -m reports.film reports/runs/NAME --scene tshirt/punch --methods snug,pbns --speed 0.25 -o punch.gif
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods snug -o kick.pc2
 
 A .pc2 is no film: it gives kick_snug.pc2 and kick_body.pc2, the vertices of each method and of the body, with
 an .obj each, in metres, y up, for Blender's Mesh Cache modifier.
 
-An .mp4 needs pip install 'neural-garment-benchmark[film]'; a .gif does not.
 The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.
-exit status: 0 written; 2 the run has no such roll-out, or the extra is missing: one line says why."""
+exit status: 0 written; 2 the run has no such roll-out: one line says why."""
 PAPER, INK = (255, 255, 255), (40, 40, 40)
 PER_ROW = 4
 TALL = 1.25  # height of a view over its width
@@ -41,23 +48,9 @@ MARGIN = 1.25  # around the garment
 MOST_RATE = 50.0  # frames a second of a GIF that browsers show in their time
 
 
-@dataclass(frozen=True)
-class SelectedRollOuts:
-    """Roll-outs of one scene: by method its finite frames and its label; the body where there is one."""
-
-    cloths: dict[str, Trajectory]
-    labels: dict[str, str]
-    body: Trajectory | None
-
-    @property
-    def longest(self) -> Trajectory:
-        """The roll-out with the most frames; its dt is nan where it has one."""
-        return max(self.cloths.values(), key=lambda cloth: cloth.frames)
-
-
 def select_roll_outs(
     folder: RunFolder, scene: str, methods: Sequence[str], seed: int | None = None
-) -> SelectedRollOuts:
+) -> SceneRollOuts:
     """Read roll-outs of a scene.
 
     Args:
@@ -83,12 +76,13 @@ def select_roll_outs(
             reason = "; ".join(run.problems) or f"scenes with roll-outs are {', '.join(dict.fromkeys(kept))}"
             raise ResultsError(f"{folder.path}: no roll-out of '{method}' in {scene}: {reason}")
         cloths[method] = cloth.finite()
-    return SelectedRollOuts(cloths, {name: run.label(name) for name in cloths}, run.roll_outs.body(scene))
+    labels = {name: run.label(name) for name in cloths}
+    return SceneRollOuts(scene, cloths, run.roll_outs.body(scene), labels)
 
 
-def camera_path(selected: SelectedRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
+def camera_path(selected: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
-    cloths = selected.cloths.values()
+    cloths = selected.series.values()
     frames = max(cloth.frames for cloth in cloths)
     seen = [cloth.positions @ axes for cloth in cloths]
     low, high = (
@@ -108,19 +102,19 @@ def drawn(mesh: Trajectory, frame: int, colour: tuple[float, float, float], lift
     return Surface(mesh.positions[min(frame, mesh.frames - 1)], mesh.faces, colour, lift)
 
 
-def draw_frames(selected: SelectedRollOuts, width: int, azimuth: float) -> Iterator[np.ndarray]:
+def draw_frames(selected: SceneRollOuts, width: int, azimuth: float) -> Iterator[np.ndarray]:
     """Yield every frame of the film: all views with their names, and the time."""
     width, height = width - width % 2, round(width * TALL / 2) * 2
     centres, half = camera_path(selected, camera_axes(-azimuth))
     for frame, time in enumerate(selected.longest.times):
         body = drawn(selected.body, frame, BODY_COLOUR) if selected.body else None
-        cloths = [drawn(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in selected.cloths.values()]
+        cloths = [drawn(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in selected.series.values()]
         camera = Camera(centres[frame], 2.0 * half, -azimuth)
         pictures = (255.0 * np.array(views(body, cloths, camera, width, height))).astype(np.uint8)
         yield _composed(selected, pictures, frame, float(time))
 
 
-def _composed(selected: SelectedRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
+def _composed(selected: SceneRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
     """Compose pictures (N,H,W,3) in rows, each under its method's name, with the time [s] below them."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
@@ -133,7 +127,7 @@ def _composed(selected: SelectedRollOuts, pictures: np.ndarray, frame: int, time
     room = 2 * letter
     image = Image.new("RGB", (columns * width, rows * (height + room) + room), PAPER)
     draw = ImageDraw.Draw(image)
-    for place, (method, cloth) in enumerate(selected.cloths.items()):
+    for place, (method, cloth) in enumerate(selected.series.items()):
         x, y = place % columns * width, place // columns * (height + room)
         image.paste(Image.fromarray(pictures[place]), (x, y + room))
         texts = {y + room / 2: selected.labels[method]}
@@ -145,24 +139,6 @@ def _composed(selected: SelectedRollOuts, pictures: np.ndarray, frame: int, time
             draw.text((x + width / 2, line), text, INK, font, anchor="mm")
     draw.text((image.width / 2, image.height - room / 2), f"{time:.2f} s", INK, font, anchor="mm")
     return np.asarray(image)
-
-
-def write_mp4(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
-    """Write H.264 at `rate` frames a second."""
-    from fractions import Fraction
-
-    import av
-
-    with av.open(str(path), "w") as container:
-        stream = None
-        for picture in frames:
-            if stream is None:
-                stream = container.add_stream("libx264", rate=Fraction(rate).limit_denominator(1000))
-                stream.height, stream.width = picture.shape[:2]
-                stream.pix_fmt, stream.options = "yuv420p", {"crf": "18", "threads": "1"}
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        if stream is not None:
-            container.mux(stream.encode())
 
 
 def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
@@ -189,22 +165,17 @@ def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
 
 
-def write_point_caches(path: Path, selected: SelectedRollOuts) -> None:
+def write_point_caches(path: Path, selected: SceneRollOuts) -> None:
     """Write the vertices of each method, and of the body, as NAME_METHOD.pc2 with an .obj beside it."""
     from reference_sim.trajectory import write_point_cache
 
-    for name, mesh in (selected.cloths | ({"body": selected.body} if selected.body else {})).items():
+    for name, mesh in ({**selected.series, **({"body": selected.body} if selected.body else {})}).items():
         write_point_cache(path.with_stem(f"{path.stem}_{name.replace('/', '-')}"), mesh)
-
-
-WRITERS = {".mp4": write_mp4, ".gif": write_gif}
 
 
 @command("reports.film")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    from importlib.util import find_spec
-
     parser = Parser(
         prog="python -m reports.film",
         description="A film of methods side by side in a scene of a run.",
@@ -218,15 +189,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--width", type=int, default=480, help="of a view [pixels] (default 480)")
     parser.add_argument("--azimuth", type=float, default=25.0, metavar="DEGREES",
         help="of the camera, from the front to the body's left (default 25; 180: from behind)")  # fmt: skip
-    parser.add_argument("-o", "--out", required=True, metavar="FILE", help="x.mp4, x.gif or x.pc2")
+    parser.add_argument("-o", "--out", required=True, metavar="FILE", help="x.gif or x.pc2")
     options = parser.parse_args(arguments)
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
     if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
         raise ValueError("--speed is 0.01 to 10, --width 64 to 2000")
-    if path.suffix not in (".pc2", *WRITERS):
-        raise ValueError(f"{path}: a film ends in .mp4 or .gif, point caches in .pc2")
-    if path.suffix == ".mp4" and find_spec("av") is None:
-        raise ValueError(f"{path}: needs pip install 'neural-garment-benchmark[film]'; a .gif does not")
+    if path.suffix not in (".gif", ".pc2"):
+        raise ValueError(f"{path}: a film ends in .gif, point caches in .pc2")
     demand_writable_folder(path.parent)
     selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
     if path.suffix == ".pc2":
@@ -235,7 +204,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         dt = selected.longest.dt
         rate = options.speed / dt if dt > 0.0 else 1.0
         with replacing(path) as temporary:
-            WRITERS[path.suffix](temporary, draw_frames(selected, options.width, options.azimuth), rate)
+            write_gif(temporary, draw_frames(selected, options.width, options.azimuth), rate)
     print(path)
     return 0
 

@@ -24,7 +24,6 @@ from reports.statistics.paper_claims import counts, in_words, judged
 from reports.statistics.pareto import NETWORK, compared_scenes, indistinct, run_time
 from reports.statistics.relative_excess import (
     RELATIVE_EXCESS,
-    TOTAL,
     Excess,
     excess_of,
     with_relative_excess,
@@ -53,7 +52,7 @@ def _measured(run: Run) -> dict[str, str]:
 
 def nearness(run: Run, worn: pd.DataFrame) -> str:
     """Say which relative excess each network of page one has in these rows, and in its worst motion."""
-    names = [n for n in leads(run, worn, by=(TOTAL,)) if run.methods[n].role in (*LEARNED, EXTERNAL)]
+    names = [n for n in leads(run, worn) if run.methods[n].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not known:

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
@@ -67,6 +67,10 @@ class Mean:
         return "" if self.complete else f" ({len(self.cells)} of {self.asked} roll-outs)"
 
 
+# Columns that means are made of; a frame may lack the last two.
+READ = ["scene", "seed", "status", "usable", "value", "seeded", "pairing_group", "uncertainty", "moved"]
+
+
 def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     """Compute a Mean for each group of the usable rows, in the order of the rows.
 
@@ -80,8 +84,9 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     )
     asked: dict[Any, set[str]] = defaultdict(set)
     failed: dict[Any, set[int]] = defaultdict(set)
-    groups: dict[tuple, list[_Line]] = defaultdict(list)
-    for key, line in zip(zip(*(frame[name].tolist() for name in names)), _lines(frame)):
+    groups: dict[tuple, list[Any]] = defaultdict(list)
+    rows = frame.reindex(columns=READ)
+    for key, line in zip(zip(*(frame[name].tolist() for name in names)), rows.itertuples(index=False)):
         if line.status == "skipped":
             continue
         asked[place(key)].add(line.scene)
@@ -96,30 +101,7 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     return pd.Series(made, index=index, dtype=object)
 
 
-class _Line(NamedTuple):
-    """A row as far as means need it; uncertainty: NaN and moved: empty where the frame has no such column."""
-
-    scene: str
-    seed: int
-    status: str
-    usable: bool
-    value: float
-    seeded: bool
-    pairing_group: str
-    uncertainty: float
-    moved: tuple[tuple[str, float], ...]
-
-
-def _lines(frame: pd.DataFrame) -> Iterable[_Line]:
-    without = {"uncertainty": math.nan, "moved": ()}
-    columns = (
-        frame[name].tolist() if name in frame or name not in without else [without[name]] * len(frame)
-        for name in _Line._fields
-    )
-    return map(_Line._make, zip(*columns))
-
-
-def _mean(lines: Sequence[_Line], scenes: int, failed: Set[int]) -> Mean:
+def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:
     """Return the mean of usable rows; scenes: how many should have it, failed: seeds with a failed cell."""
     by_seed: dict[int, list[float]] = {}
     for line in lines:
@@ -140,7 +122,11 @@ def _mean(lines: Sequence[_Line], scenes: int, failed: Set[int]) -> Mean:
         cells={(line.scene, line.seed): line.value for line in lines},
         pairing_group=lines[0].pairing_group,
         uncertainty=fmean(uncertainties) if uncertainties else None,
-        moved={(line.scene, line.seed): dict(line.moved) for line in lines if line.moved},
+        moved={
+            (line.scene, line.seed): dict(line.moved)
+            for line in lines
+            if isinstance(line.moved, tuple) and line.moved
+        },
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run, read_run
 from reports.statistics.effects import EXCESS, off_scale, on_scale, recording_of
-from reports.statistics.means_and_spreads import mean_of, shared_scenes
 from reports.statistics.pareto import NETWORK
 from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
 
@@ -90,29 +89,18 @@ LEARNED = ("network", "ablation")
 RIVAL = "pbns"  # the network that the paper compares SNUG with
 EXTERNAL = "external"  # role of roll-outs from files and programs
 MOST_EXTERNAL = 3  # of these that page one shows
-BEST_BY = ("step/distance", "gap/energy", "curvature/error", "energy/total")
 
 
-def leads(
-    run: Run, rows: pd.DataFrame, among: Iterable[str] | None = None, by: Sequence[str] = BEST_BY
-) -> list[str]:
-    """Choose the methods of page one: reference, subjects, another network, the first baseline.
+def leads(run: Run, rows: pd.DataFrame) -> list[str]:
+    """Choose the methods of page one that these rows have: reference, subjects, another network, a baseline.
 
-    The other network is the paper's rival of SNUG, or the best one where that did not run.
-
-    Args:
-        run: the run.
-        rows: of it, in which a method must have a usable number.
-        among: methods to choose from; all by default.
-        by: metrics; the best network has the lowest of the first that any of them has.
-
-    Ablations count as networks where a run has no others.
+    The other network is the paper's rival of SNUG, or the first where that did not run. Ablations count as
+    networks where a run has no others.
     """
-    usable = set(rows[rows["usable"]]["method"])
-    have = usable if among is None else usable & set(among)
+    have = set(rows[rows["usable"]]["method"])
     first = subjects(run, have)
     others = [name for name in _networks(run, have) if name not in first]
-    other = RIVAL if RIVAL in others else _best(rows, others, by)
+    other = RIVAL if RIVAL in others else next(iter(others), "")
     baseline = next((name for name in run.with_role("baseline") if name in have), "")
     return [name for name in (run.reference, *first, other, baseline) if name in have]
 
@@ -132,19 +120,6 @@ def subjects(run: Run, have: Collection[str]) -> list[str]:
 def _networks(run: Run, have: Collection[str]) -> list[str]:
     learned = [name for name in run.with_role(*LEARNED) if name in have]
     return [name for name in learned if not run.methods[name].base] or learned
-
-
-def _best(rows: pd.DataFrame, names: Sequence[str], by: Sequence[str]) -> str:
-    """Return the best over the scenes shared by the methods that came through most of them."""
-    for metric in by:
-        all_means = {name: mean for name in names if (mean := mean_of(rows, name, metric)) is not None}
-        most = max((len(mean.cells) for mean in all_means.values()), default=0)
-        whole = [name for name, mean in all_means.items() if len(mean.cells) == most]
-        scenes = shared_scenes(rows, whole, metric)
-        means = {name: mean for name in whole if (mean := mean_of(rows, name, metric, scenes)) is not None}
-        if means:
-            return min(means, key=lambda name: means[name].value)
-    return next(iter(names), "")
 
 
 PUBLISHED = Path(__file__).resolve().parents[1] / "published"

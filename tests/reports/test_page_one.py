@@ -6,13 +6,10 @@ import dataclasses
 import json
 import re
 
-from reports.blocks import TableBlock
 from reports.pdf import content
 from reports.sentences import endings, headline
 from reports.statistics.outcomes import leads
 from reports.tables import make_tables
-from reports.tables.page_one import ROWS
-from reports.tables.table import Column, Table
 from tests.reports.report_folder import SCENES, all_rows, report_of, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes
 
@@ -87,64 +84,13 @@ def test_page_one_counts_every_kind_of_ending():
     assert endings(run) == "Of 1 cells all ended well; 1 files could not be read."
 
 
-def test_page_one_shows_the_network_the_papers_rival_or_the_best_of_others_and_a_baseline():
+def test_page_one_shows_the_network_the_papers_rival_or_another_and_a_baseline():
     run = run_of(all_rows())
     assert leads(run, run.garment_rows) == ["simulation", "snug", "pbns", "skinning"]
-    best = [row(s, "supervised", "curvature/error", 0.1, unit="1/m") for s in SCENES]
-    better = run_of([*all_rows(), *best])
-    assert leads(better, better.garment_rows)[2] == "pbns"
-    without = better.garment_rows[better.garment_rows["method"] != "pbns"]
-    assert leads(better, without)[2] == "supervised"
-    assert leads(run, run.garment_rows, ["pbns", "simulation"]) == ["simulation", "pbns"]
-
-
-def test_roll_outs_of_the_user_are_on_page_one_beside_snug_or_alone():
-    mine = [
-        dataclasses.replace(r, role="external", seeded=False, pairing_group="")
-        for r in on_two_scenes("mine", 3.0, 9.0)
-    ]
-    alone, beside = run_of([*BESIDE, *mine]), run_of([*all_rows(), *mine])
+    mine = [dataclasses.replace(r, role="external", seeded=False) for r in on_two_scenes("mine", 3.0, 9.0)]
+    alone = run_of([*BESIDE, *mine])
     assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
-    assert leads(beside, beside.garment_rows)[:3] == ["simulation", "snug", "mine"]
     assert "is: mine " in said("How near", [*BESIDE, *mine])
-    assert "mine" in {line[0] for line in make_tables(alone)["overview"].rows}
-
-
-def test_the_table_of_page_one_stays_short_and_has_the_last_of_a_family_of_networks():
-    many = [row(scene, f"mine-{k}", "energy/total", 1.0 + k) for k in range(20) for scene in SCENES]
-    made = make_tables(run_of([*all_rows(), *many]))
-    methods = [line[0] for line in made["overview"].rows]
-    assert len(methods) <= ROWS and {"simulation", "snug", "skinning"} < set(methods)
-    handles = [
-        dataclasses.replace(r, family="handles", level=level)
-        for level, above in ((40.0, 3.0), (80.0, 2.0))
-        for r in on_two_scenes(f"handles-{level:.0f}", 0.5 + above, 7.0 + above)
-    ]
-    methods = [line[0] for line in make_tables(run_of([*SNUG, *BESIDE, *handles]))["overview"].rows]
-    assert "handles-80" in methods and "handles-40" not in methods
-
-
-def test_a_shortened_table_has_rows_of_each_garment_and_leaves_out_what_went_well():
-    columns = (Column("garment", "Garment", text=True), Column("method", "Method", text=True))
-    lines = tuple((garment, f"{garment}-{k}") for garment in ("shirt", "tunic") for k in range(8))
-    table = Table("energies", columns, lines, grouped_by=("garment",))
-    short = TableBlock("energies").printed(table)
-    assert short.rows == (*lines[:6], *lines[8:14])
-    assert short.note == "4 more rows are in tables/energies.csv."
-    assert TableBlock("energies", left_out=("shirt",)).printed(table).rows == lines[8:]
-
-
-def test_sections_exist_only_for_what_ran():
-    check = row("falls", "simulation", "check", 0.5, suite="validation", expected=0.0, tolerance=1.0)
-    failed = dataclasses.replace(check, scene="sag", status="failed", reason="off")
-    report = report_of([check, failed], workers=4)
-    made = content(report)
-    endings_title = "How cells, checks and stress tests ended"
-    assert [section["title"] for section in made["sections"]] == ["Validation", endings_title]
-    assert made["first"] == made["definitions"] == [] and set(report.tables) == {"validation", "endings"}
-    (block,) = made["sections"][0]["blocks"]
-    assert [line[0]["text"] for line in block["groups"][0]["rows"]] == ["sag"]  # what passes is in the CSV
-    assert made["workers"] == "up to 4 side by side"
 
 
 def test_every_metric_of_a_printed_table_is_defined_and_no_number_is_infinite_or_nan():

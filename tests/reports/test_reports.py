@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from benchmarks.provenance import digest_of_file
-from benchmarks.results.row import COLUMNS
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build
 from reports.blocks import FIGURES
@@ -116,12 +115,11 @@ def test_failed_cells_are_listed_once_with_their_reason(made):
     ]
 
 
-@pytest.mark.parametrize("what", ["absent", "empty", "broken config", "broken rows", "no rows"])
+@pytest.mark.parametrize("what", ["absent", "broken config", "broken rows"])
 def test_no_run_folder_is_one_line_and_status_2(tmp_path, refused, what):
     run = RunFolder(tmp_path / "run")
     if what != "absent":
         run.path.mkdir()
-    if what not in ("absent", "empty"):
         run.write_config({"format": FORMAT})
         run.write_rows([])
     if what == "broken config":
@@ -166,18 +164,6 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     run.write_rows(all_rows()[:-1])
     sentence = changed_files(read_run(run))
     assert sentence.startswith("Not as the run wrote them: results.csv.")
-
-
-def test_a_run_of_an_earlier_version_is_refused_with_what_to_do(tmp_path, refused):
-    run = RunFolder(tmp_path)
-    run.write_rows(all_rows())
-    run.config_path.write_text("{}", encoding="utf-8")
-    refused("run the benchmark again", build.main, [str(tmp_path)])
-    run.write_config({"format": FORMAT})
-    lines = run.rows_path.read_text(encoding="utf-8").splitlines()
-    old = COLUMNS.index("garment")
-    run.rows_path.write_text("\n".join(",".join(line.split(",")[:old]) for line in lines), encoding="utf-8")
-    assert str(run.rows_path) in refused("the columns should be", build.main, [str(tmp_path)])
 
 
 def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):

@@ -1,13 +1,12 @@
-"""Styles of methods and figures of the report."""
+"""Styles of methods, figures of the report, and curves of the plane of run time and error."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from reports.figures import plotting
-from reports.figures.charts import dots
-from reports.figures.plotting import file_name, printable
+from reports.figures.charts import curves_of, dots, draw_points
+from reports.figures.plotting import new_figure
 from reports.finished_run import shown_seeds
+from reports.statistics.pareto import Point
 from tests.reports.report_folder import row, run_of
 
 
@@ -37,12 +36,6 @@ def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
     assert plotting.style(alone, "snug+cleanup").label == "SNUG, cleaned up"
 
 
-def test_a_roll_out_of_the_user_is_shown_where_there_is_no_room_for_all():
-    rows = [row(method=f"solver-{k}", role="solver") for k in range(plotting.ROOM)]
-    run = run_of([*rows, row(method="mine", role="external"), row(method="simulation")])
-    assert plotting.leading(run, run.methods) == ["simulation", "mine"]
-
-
 def test_a_panel_of_curves_shows_five_methods_the_reference_and_the_users_among_them():
     names = ("skinning", "untrained", "snug", "supervised", "pbns", "snug+cleanup", "simulation")
     run = run_of([*(row(method=name) for name in names), row(method="mine", role="external")])
@@ -63,42 +56,43 @@ def test_a_dot_stands_for_each_motion_and_seed():
     assert list(dots(run_of([row("flag", garment="")]))) == []
 
 
-def test_a_metric_that_no_leading_method_has_takes_no_panel_of_dots():
-    solvers = [f"solver-{k}" for k in range(plotting.ROOM)]
-    rows = [row("tshirt/a", m, "curvature/error", 1.0, role="solver") for m in solvers]
-    rows += [row("tshirt/a", m, "energy/total", 2.0) for m in ("simulation", "snug")]
-    (drawing,) = dots(run_of(rows))
-    assert [axes.get_xlabel() for axes in drawing.canvas.axes] == ["Total [J]"]
-
-
-def test_dots_of_relative_excess_stand_on_a_logarithmic_axis_on_both_sides_of_zero():
-    values = {"simulation": (1.0, 1.0), "skinning": (2.0, 2.0), "snug": (0.9, 41.0)}
-    rows = [
-        row(scene, method, "energy/total", value)
-        for method, of_scenes in values.items()
-        for scene, value in zip(("tshirt/a", "tshirt/b"), of_scenes)
-    ]
-    (drawing,) = dots(run_of(rows))
-    axes = drawing.canvas.axes[0]
-    assert (axes.get_xlabel(), axes.get_xscale()) == ("Relative excess [%]", "asinh")
-    lines = {float(np.mean(line.get_ydata())): line.get_xdata() for line in axes.get_lines()[::2]}
-    assert np.allclose(sorted(lines[2.0]), [-10.0, 4000.0]) and np.allclose(lines[1.0], 100.0)
-    bar = axes.get_lines()[5].get_xdata()[0]
-    assert np.isclose(bar, np.sinh((np.arcsinh(-10.0) + np.arcsinh(4000.0)) / 2.0))
-    low, high = axes.get_xlim()
-    assert low < -10.0 and high > 4000.0 and list(axes.get_xticks()) == [0.0, 10.0, 1000.0, -10.0]
-
-
-def test_names_in_any_letters_give_files_that_the_report_finds():
-    assert (
-        file_name("tshirt/跳跃@clip")
-        == "tshirt-U-8DF3U-8DC3-clip"
-        == file_name(printable("tshirt/跳跃@clip"))
-    )
-
-
 def test_the_first_seed_that_came_to_its_end_is_shown():
     bad = [row(value=None, status="diverged", reason="no end", method=m) for m in ("snug", "pbns")]
     rows = [*bad, row(seed=2), row(seed=1), row(method="skinning")]
     seeds = shown_seeds(run_of(rows).frame).loc["tshirt/walk"]
     assert seeds.to_dict() == {"snug": 1, "pbns": 0, "skinning": 0}
+
+
+# method: run time, error
+POINTS = {
+    "snug": (0.2, 0.02), "skinning": (0.1, 0.6), "lbfgs-5": (8.0, 0.016), "lbfgs-20": (13.0, 0.0018),
+    "newton-1": (10.0, 0.26), "newton-4": (24.0, 0.0008), "snug+lbfgs-1": (7.0, 0.015),
+    "snug+lbfgs-4": (7.5, 0.014), "simulation-perturbed-1e-4": (40.0, 1e-9),
+}  # fmt: skip
+
+
+def curves(*methods: str):
+    run = run_of([row(method=name) for name in methods])
+    return curves_of(run, [Point(name, *POINTS[name]) for name in methods])
+
+
+def test_solvers_stopped_early_are_one_curve_and_variants_of_the_reference_stand_alone_or_not_at_all():
+    *alone, solvers, started = curves(*POINTS)
+    assert [curve.look.label for curve in alone] == ["SNUG", "Skinning alone"]
+    assert [p.method for p in solvers.points] == ["lbfgs-5", "lbfgs-20", "newton-4"]
+    assert [p.method for p in solvers.aside] == ["newton-1"]
+    assert [p.method for p in started.points] == ["snug+lbfgs-1", "snug+lbfgs-4"]
+    assert started.look.colour == alone[0].look.colour != solvers.look.colour
+    assert started.look.label == "SNUG + solver"
+    assert len(curves("simulation-perturbed-1e-4")) == 1
+
+
+def test_points_at_or_below_the_simulation_are_on_the_edge_not_lost():
+    axes = new_figure(3, 3).subplots()
+    run = run_of([row(method=method) for method in ("snug", "newton-8")])
+    points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
+    drawn = draw_points(axes, run, curves_of(run, points), 20.0, band=0.0)
+    assert drawn.below == {"newton-8"}
+    low, high = axes.get_ylim()
+    heights = [line.get_ydata()[0] for line in axes.get_lines() if line.get_marker() not in ("", "None")]
+    assert len(heights) == 2 and all(low < height < high for height in heights)

@@ -27,7 +27,7 @@ ROLES = {
     "simulation": "reference", "skinning": "baseline", "nearest-poses": "baseline",
     "pose-regression": "baseline", **dict.fromkeys(
         ("snug", "supervised", "pbns", "ncs", "handles-20", "handles-40", "handles-80", "snug+cleanup",
-         "snug-springs", "tailornet"), "network"),
+         "snug-springs", "tailornet", "santesteban2019"), "network"),
 }  # fmt: skip
 LABELS = {
     "skinning": "Skinning alone", "nearest-poses": "Nearest poses",

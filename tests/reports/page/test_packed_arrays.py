@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.metrics import curvature
-from reports.page.embedded_roll_outs import Pack, depth, distance, mean_curvature, skin_of
+from reports.page.embedded_roll_outs import Pack, depth, distance, skin_of
 from tests.reports.page.page_by_hand import block, unpacked
 from tests.reports.report_folder import sheet
 
@@ -37,22 +36,6 @@ def test_values_are_off_by_less_than_a_hundredth_and_finer_where_small():
     assert np.abs(approximation - values).max() <= full / 100
     small = np.abs(values) < 0.01 * full
     assert np.abs(approximation - values)[small].max() <= full / 1000
-
-
-def test_curvature_is_that_of_a_sphere_and_of_the_metric():
-    around, down = np.meshgrid(np.arange(40) * np.pi / 20, np.linspace(0.3, np.pi - 0.3, 40))
-    ring = [np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)]
-    globe = 0.5 * np.stack(ring, axis=-1).reshape(1, -1, 3)
-    line, column = np.meshgrid(np.arange(39), np.arange(40), indexing="ij")
-    a, b = (40 * line + column).ravel(), (40 * line + (column + 1) % 40).ravel()
-    faces = np.concatenate([np.stack([a, b, a + 40], axis=1), np.stack([b, b + 40, a + 40], axis=1)])
-    curvatures = mean_curvature(globe, faces)[0]
-    inner = curvatures > 0.0
-    assert inner.sum() == 38 * 40
-    assert np.abs(curvatures[inner] - 2.0).max() < 0.05
-    crumpled = globe + np.random.default_rng(3).normal(scale=0.02, size=(2, *globe.shape[1:]))
-    declared = np.stack([curvature.mean_curvature(x, faces)[0] for x in crumpled])
-    np.testing.assert_allclose(mean_curvature(crumpled, faces)[:, inner], declared[:, inner], rtol=1e-9)
 
 
 def test_distance_and_depth_have_their_known_values():

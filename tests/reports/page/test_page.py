@@ -125,14 +125,6 @@ def test_names_with_markup_stay_text(folder):
     assert content_of(folder)["methods"][NASTY]["label"] == NASTY
 
 
-def test_tables_sort_by_numbers_and_define_their_columns(folder):
-    table = next(t for t in content_of(folder)["tables"] if t["name"] == "energies")
-    total = table["columns"][-1]
-    assert total["definition"] == "definition of energy/total; lower is better"
-    values = [line[-1] for line in table["rows"] if line[0] == "tshirt"]
-    assert [value[:2] for value in values] == [[f"{2 + k:.2f}", 2.0 + k] for k in range(len(METHODS))]
-
-
 def test_a_roll_out_that_broke_is_shown_up_to_there_and_a_broken_file_is_named(tmp_path):
     run = make_folder(tmp_path)
     cloth, faces = moving(0.0)

@@ -1,4 +1,4 @@
-"""Points of run time and error: fronts, what beats what, and how run times scatter."""
+"""Points of run time and error: fronts, what beats what, how run times scatter, break-even."""
 
 from __future__ import annotations
 
@@ -6,13 +6,19 @@ import dataclasses
 
 import pytest
 
+from reports.figures.charts import break_even, error_of_page_one
 from reports.statistics.pareto import (
+    Cost,
     Point,
     beaten_by,
+    cost_of,
+    crossing,
     fastest,
     front,
     indistinct,
     points_of,
+    rivals,
+    run_time,
     solvers,
     truncated,
 )
@@ -94,3 +100,60 @@ def test_the_uncertainty_of_an_error_is_of_two_members_of_the_ensemble_that_conv
     rows = [row(SCENES[0], "simulation-perturbed-1e-4", "distance/rms", 3.0, "mm")]
     rows.append(row(SCENES[0], "simulation-1e-8", "distance/rms", 90.0, "mm", status="stalled", reason="?"))
     assert indistinct(run_of(rows), run_of(rows).frame, "distance/rms") == 0.0
+
+
+def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_path):
+    rows = all_rows()
+    frame_times = [r for r in rows if r.metric == "cost/frame"]
+    whole = [dataclasses.replace(r, metric="cost/whole", value=r.value + 2.0) for r in frame_times]
+    rows.append(row(SCENES[0], "skinning", "cost/spread", 50.0, "%"))
+    for added, shift in ((whole, 2.0), (whole[1:], 0.0), ([], 0.0)):
+        run = run_of([*rows, *added])
+        cells = run.cells("speed")
+        scene = cells[cells["scene"] == SCENES[0]]
+        (point,) = (
+            p
+            for p in points_of(run, scene, SCENES[:1], "gap/energy", run_time(scene))
+            if p.method == "skinning"
+        )
+        assert point.time == pytest.approx(0.1 + shift) and point.time_spread == pytest.approx(0.05)
+        assert run_time(scene) == ("cost/whole" if shift else "cost/frame")
+        assert list(error_of_page_one(run))
+
+
+def test_a_caption_speaks_of_a_grey_band_only_where_one_is_seen():
+    unknown = [r for r in all_rows() if not r.method.startswith("simulation-") and r.metric != "gap/refrozen"]
+    tiny = [*unknown, row(SCENES[0], "simulation", "gap/refrozen", 1e-9, "J")]  # below the panel
+    for rows, grey in ((all_rows(), True), (unknown, False), (tiny, False)):
+        (drawing,) = error_of_page_one(run_of(rows))
+        assert ("Grey: within the reference's uncertainty." in drawing.caption) == grey
+
+
+def test_break_even_is_where_the_total_costs_cross():
+    network, solver = Cost("snug", 200.0, 0.001), Cost("simulation", 0.0, 0.101)
+    frames = crossing(network, solver)
+    assert frames == pytest.approx(2000.0)
+    assert network.total(frames) == pytest.approx(solver.total(frames))
+    assert crossing(solver, network) is None
+    assert crossing(Cost("snug", 200.0, 0.2), solver) is None
+
+
+def test_what_comes_before_the_first_frame_is_data_making_ready_and_training():
+    costs = {"cost/data": 5.0, "cost/setup": 20.0, "cost/train": 200.0}
+    rows = [row("tshirt/walk", "supervised", metric, value, "s") for metric, value in costs.items()]
+    rows.append(row("tshirt/walk", "supervised", "cost/frame", 2.0, "ms"))
+    assert cost_of(run_of(rows).frame, "supervised", ("tshirt/walk",)) == Cost("supervised", 225.0, 0.002)
+
+
+def test_rivals_are_the_fastest_solvers_as_accurate():
+    run = run_of(all_rows())
+    reasons = rivals(run, run.cells("speed"), list(SCENES))
+    assert reasons == {"simulation": "converged", "lbfgs-20": "energy gap", "lbfgs-5": "curvature error"}
+
+
+def test_a_training_whose_data_nobody_can_price_has_no_break_even():
+    rows = [r for r in all_rows() if r.metric != "cost/data"]
+    run = run_of(rows)
+    frame = run.cells("speed")
+    assert cost_of(frame, "snug", SCENES) is None and cost_of(frame, "newton-1", SCENES) is not None
+    assert list(break_even(run)) == []

@@ -1,6 +1,8 @@
-"""Films: one camera for all cloths, names, the right length, and one line where none is made."""
+"""Pictures of garments and films: what is rendered, at which frame, by one camera."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +12,55 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
-from reports import film
-from reports.rendering import camera_axes
-from tests.reports.report_folder import row, run_folder, sheet, write_mesh
+from reports import film, pictures
+from reports.pictures import SceneRollOuts, camera_axes, draw_side_by_side, failures, worst_failures
+from tests.reports.report_folder import FRAMES, Stored, mesh, row, run_folder, run_of, sheet, write_mesh
+
+
+def scene_of(methods, height=0.1):
+    cloth, faces = sheet(height)
+    inertia = {"energy/inertia": np.array([0.0, 0.0, 1.0, 5.0, 2.0])}
+    series = {
+        method: mesh(cloth[:frames], faces, {name: values[:frames] for name, values in inertia.items()})
+        for method, frames in methods.items()
+    }
+    return SceneRollOuts("tshirt/a", series, mesh(*sheet(0.0), {}))
+
+
+def test_what_ended_early_moves_nobody_elses_picture():
+    shown = scene_of({"simulation": FRAMES, "snug": FRAMES, "lbfgs-5": 2})
+    run = run_of([row(method=method) for method in shown.series])
+    drawing = draw_side_by_side(run, shown, ["simulation", "snug"])
+    assert "frame 3 " in drawing.caption
+    assert drawing.caption.endswith("want of room: L-BFGS, 5 iterations.")
+
+
+def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
+    cloth, faces = sheet(0.1)
+    camera = pictures.camera_for([cloth[0]], 0.0, 1.0)
+    body = pictures.Surface(cloth[0] * [1.0, 1.0, 0.0], faces, (0.0, 0.0, 1.0))
+    front = pictures.Surface(cloth[0], faces, (1.0, 0.0, 0.0))
+    image, other = pictures.views(
+        body, [front, pictures.Surface(cloth[0] - [0, 0, 0.2], faces, (0, 1, 0))], camera, 60, 60
+    )
+    assert image.shape == (60, 60, 3) and image[0, 0].min() == 1.0  # white around
+    assert image[30, 30, 0] > 0.3 > image[30, 30, 2] and other[30, 30, 2] > 0.3 > other[30, 30, 1]
+    # A corner of the mesh comes to where the camera says that it is.
+    x, y, _ = camera.seen(cloth[0])[0]
+    column, line = int(30 + 60 * x / camera.height), int(30 - 60 * y / camera.height)
+    assert image[line - 2, column + 2].max() < 1.0 or image[line - 2, column + 2, 2] < 0.9
+
+
+def test_a_failure_is_shown_at_its_worst_frame():
+    rows = [row("tshirt/a", m, "energy/strain", v) for m, v in (("simulation", 0.1), ("snug", 2.0))]
+    run = run_of(rows)
+    cloth, faces = sheet(0.1)
+    strain = {"energy/strain": np.array([0.0, 9.0, 1.0, 1.0, 1.0])}
+    assert list(failures(run)) == []
+    stored = replace(run, roll_outs=Stored(stored=mesh(cloth, faces, strain)))
+    (drawing,) = failures(stored)
+    assert drawing.name == "failures" and worst_failures(stored)[0].frame == 1
+
 
 SCENE = "tshirt/walk"
 
@@ -68,22 +116,13 @@ def test_a_gif_takes_its_time_and_no_frame_less_than_browsers_show(tmp_path, rat
     assert sum(lasted) == pytest.approx(1000 * 120 / rate, abs=10)
 
 
-def test_an_mp4_has_every_frame(run, tmp_path):
-    av = pytest.importorskip("av", reason="the extra [film] is not installed")
-    assert filmed(run, tmp_path / "x.mp4") == 0
-    with av.open(str(tmp_path / "x.mp4")) as container:
-        frames = list(container.decode(video=0))
-        assert len(frames) == 5 and container.streams.video[0].average_rate == 30
-        assert frames[0].width == 200
-
-
 def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run):
     selected = film.select_roll_outs(run, SCENE, ["simulation", "snug"])
     frames = [np.asarray(frame, int) for frame in film.draw_frames(selected, 100, 25.0)]
     assert len(frames) == 5 and list(selected.labels.values()) == ["Simulation", "SNUG"]
     foot = slice(-4 * 12, -2 * 12)  # the last line of a view: letters are 12 pixels high
     assert [(frame[foot, 100:] == film.INK[0]).any() for frame in frames] == [False, False, True, True, True]
-    cloth = selected.cloths["snug"]
+    cloth = selected.series["snug"]
     assert np.array_equal(cloth.positions[-1], film.drawn(cloth, 4, (0.0, 0.0, 0.0)).positions)
 
 
@@ -100,10 +139,10 @@ def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp
         assert np.array_equal(first.faces, mesh.faces)
 
 
-def kept_of(*positions: np.ndarray) -> film.SelectedRollOuts:
+def kept_of(*positions: np.ndarray) -> film.SceneRollOuts:
     faces = np.array([[0, 1, 2]])
     cloths = {str(k): Trajectory(x, faces, np.arange(len(x)) / 30.0) for k, x in enumerate(positions)}
-    return film.SelectedRollOuts(cloths, {}, None)
+    return film.SceneRollOuts("", cloths)
 
 
 def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
@@ -128,7 +167,7 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
             ["--methods", "snug,simulatoin"],
             "no roll-out of 'simulatoin' in tshirt/walk: scenes",
         ),
-        (["-o", "x.avi"], "x.avi: a film ends in .mp4 or .gif, point caches in .pc2"),
+        (["-o", "x.avi"], "x.avi: a film ends in .gif, point caches in .pc2"),
         (["--speed", "0"], "--speed is 0.01 to 10"),
         (["--speed", "nan"], "--speed is 0.01 to 10"),
         (["--width", "7"], "--width 64 to 2000"),
@@ -137,8 +176,3 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
 def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, hint):
     monkeypatch.chdir(tmp_path)
     assert refused(hint, filmed, run, "x.gif", *change).startswith("reports.film: ")
-
-
-def test_without_the_extra_it_says_what_to_install(run, tmp_path, monkeypatch, refused):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    refused("pip install 'neural-garment-benchmark[film]'", filmed, run, tmp_path / "x.mp4")

@@ -1,0 +1,137 @@
+"""Results as text: tables of documents, page one in a terminal, generated parts of documents."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import pytest
+
+from benchmarks.external.roll_out_files import KEYS
+from benchmarks.method import MethodEntry
+from benchmarks.results.row import COLUMNS, Row
+from benchmarks.scene import BuiltScene
+from reports.docs import documents, main
+from reports.finished_run import make_run
+from reports.statistics.effects import EXCESS, Effect
+from reports.statistics.means_and_spreads import Mean
+from reports.tables import make_tables
+from reports.tables.table import METHOD, Column, Table
+from reports.text.code_parts import attribute_rows, docstring_rows
+from reports.text.published_parts import BEGIN, END, fill, published_part
+from reports.text.text_table import MOST_METHODS, answer, remarks_on, text_rows
+from snug.body.smpl_files import SYNONYMS
+from snug.motion.files import ARRAY_NAMES
+from tests.reports.report_folder import DECLARED, row, run_of
+
+RUN = make_run({"methods": DECLARED}, [Row("garments", "a/b", "snug", 0, "energy/total", "J", 1.0)])
+
+
+def small_table() -> Table:
+    effect = Effect(value=1.5, scale=EXCESS, second=0.0, error=0.2, motions=20)
+    mean = Mean(value=0.25, spread=0.01, seeds=3, asked=0)
+    columns = (METHOD, Column("excess", "Excess", "%"), Column("total", "Total", "J"), Column("none", "None"))
+    return Table("t", columns, (("snug", effect, mean, None), ("skinning", None, None, None)))
+
+
+def test_an_interval_has_a_column_of_its_own_and_empty_columns_are_left_out():
+    head, snug, skinning = text_rows(RUN, small_table())
+    assert head == ["Method", "Excess [%]", "Interval", "Total [J]"]
+    assert snug[0] == "SNUG" and " to " in snug[2] and "±" not in snug[3] and snug[3] == "0.250"
+    assert skinning == ["skinning", "–", "–", "–"]
+
+
+def test_a_mean_over_fewer_roll_outs_is_marked_and_the_mark_explained():
+    fewer = replace(small_table(), rows=(("snug", None, Mean(0.25, None, seeds=3, asked=3), None),))
+    rows = text_rows(RUN, fewer)
+    assert rows[1] == ["SNUG", "0.250*"]
+    assert remarks_on(rows).startswith("* A mean over fewer") and remarks_on(rows[:1]) == ""
+
+
+TOTALS = {
+    "simulation": 1.0,
+    "skinning": 9.0,
+    "snug": 2.0,
+    "supervised": 30.0,
+    "pbns": 3.0,
+    "snug+cleanup": 1.5,
+}
+
+
+def test_the_answer_is_a_table_of_few_methods_and_one_line_below():
+    totals = TOTALS | {"another": 4.0}
+    rows = [
+        row(scene, method, "energy/total", value * size)
+        for scene, size in (("tshirt/a", 1.0), ("tshirt/b", 2.0), ("tshirt/c", 3.0))
+        for method, value in totals.items()
+    ]
+    run = run_of(rows)
+    head, *lines, last = answer(run, make_tables(run)).splitlines()
+    assert head.split()[:3] == ["Method", "Relative", "excess"] and len(lines) == MOST_METHODS
+    assert not [line for line in lines if line.startswith("SNUG, cleaned up")]
+    assert last.startswith(
+        "On 3 unseen motions the relative excess is: SNUG 12 % (pooled 12 %) and PBNS 25 %"
+    )
+    assert last.endswith("The report also has SNUG, cleaned up.")
+
+
+@pytest.mark.parametrize(
+    ("path", "names"),
+    [
+        ("benchmarks.results.row.Row", COLUMNS),
+        ("benchmarks.method.MethodEntry", [field.name for field in fields(MethodEntry)]),
+        ("benchmarks.scene.BuiltScene", [field.name for field in fields(BuiltScene)]),
+    ],
+)
+def test_the_table_of_a_class_has_each_of_its_fields_once(path, names):
+    listed = [name.strip("`") for cell, _ in attribute_rows(path)[1:] for name in cell.split(", ")]
+    assert sorted(listed) == sorted(names)
+    assert all(text and not text.endswith(".") for _, text in attribute_rows(path))
+
+
+@pytest.mark.parametrize(
+    ("module", "names"),
+    [
+        ("snug.body.smpl_files", [name for names in SYNONYMS.values() for name in names]),
+        ("snug.motion.files", ARRAY_NAMES),
+        ("benchmarks.external.roll_out_files", KEYS),
+    ],
+)
+def test_tables_of_files_have_every_array_that_is_read(module, names):
+    table = " ".join(cell for row in docstring_rows(module) for cell in row)
+    assert not [name for name in names if f"`{name}`" not in table]
+
+
+def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys):
+    part = published_part("table overview of quick; method, relative_excess")
+    (tmp_path / "docs").mkdir()
+    readme = tmp_path / "README.md"
+    right = f"A\n{BEGIN.format('table overview of quick; method, relative_excess')}\n{part}\n{END}\nB\n"
+    readme.write_text(right.replace("| Skinning alone | 100 ", "| Skinning alone | 99 "), encoding="utf-8")
+    assert readme.read_text(encoding="utf-8") != right
+    (document,) = documents(tmp_path)
+    assert document == (readme, readme.read_text(encoding="utf-8"), right)
+
+
+def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="needs an"):
+        fill(BEGIN.format("front of quick"), lambda request: "")
+    with pytest.raises(ValueError, match="known: docstring"):
+        published_part("everything of quick")
+    for request in (
+        "table nothing of quick", "table overview of quick; colour", "options of benchmarks.run; --seed",
+        "table overview of quick, paper_text; method; snug, nobody",
+        "table energies of quick; method; snugg", "table paper_table_1 of quick",
+    ):  # fmt: skip
+        with pytest.raises(KeyError):
+            published_part(request)
+
+
+def test_the_command_checks_and_says_so(monkeypatch, tmp_path, capsys):
+    page, other = tmp_path / "page.md", tmp_path / "other.md"
+    same = (other, "text", "text")
+    monkeypatch.setattr("reports.docs.documents", lambda: iter([(page, "text", "text"), same]))
+    assert main(["--check"]) == 0 and capsys.readouterr().err == ""
+    monkeypatch.setattr("reports.docs.documents", lambda: iter([(page, "text", "text\n"), same]))
+    assert main(["--check"]) == 1 and not page.exists()
+    assert capsys.readouterr().err.startswith(f"{page}: not what the published runs give")
+    assert main([]) == 0 and page.read_text(encoding="utf-8") == "text\n" and not other.exists()
