@@ -187,12 +187,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def print_summary(model: TrainedModel) -> None:
-    """Print the last losses, the best validation and the size of a model."""
+    """Print the last losses, high windows, the best validation and the size of a model."""
     terms = [f"{name} {value:.4g}" for name, value in model.history[-1].items()
              if name not in ("step", "seconds")]  # fmt: skip
-    high = model.summary["high_windows"]
-    print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames, {high} high windows")
+    print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
     print(f"last steps, {model.unit}, mean over frames: " + "  ".join(terms))
+    for window in model.summary["named_windows"][:5]:
+        print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     if validation := model.summary.get("validation"):
         print("validation {best:.4g} at step {best_step}, whose weights are kept".format(**validation))
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "

@@ -68,9 +68,8 @@ class NearestPoses(GarmentNetwork):
         """Return none: no layer has been drawn at random."""
         return ()
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self.input_mean, self.input_std)
         plan.add_nearest(self.poses, self.frames, x, NEIGHBOURS, NEAR)
 
 

@@ -1,7 +1,7 @@
 """One frame of a network and skinning, laid out for the compiled call of snug.kernels.one_frame.
 
-Each network adds its operations by `lay_out(plan)`, in terms of its own modules: its `forward` for one frame.
-All numbers of a frame, the state included, lie in one array. tests/snug/networks/test_frame_layout.py
+Each network adds its operations by `lay_out(plan, x)`, in terms of its own modules: its `forward` for one
+frame. All numbers of a frame, the state included, lie in one array. tests/snug/networks/test_frame_layout.py
 compares every kind with its `forward`.
 """
 

@@ -109,8 +109,8 @@ class GarmentNetwork(nn.Module):
         basis = torch.cat([layer.weight for layer in layers], dim=1)
         return self.output_scale * basis.detach(), self.output_scale * centre.detach()
 
-    def lay_out(self, plan: FramePlan) -> None:
-        """Add the operations of `forward` for one frame to the plan."""
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
+        """Add the operations of `forward` for one frame to the plan, of normalised features at x."""
         raise NotImplementedError
 
     @property

@@ -30,21 +30,17 @@ from snug.networks.garment_network import GarmentNetwork, perceptron
 REACH = 2.5  # covering radii
 
 
-class HandleError(ValueError):
-    """A number of handles that a garment cannot have; the message names both."""
-
-
 def shape_functions(garment: Garment, handles: int) -> np.ndarray:
     """Return the four functions of each handle at the vertices, (V, handles, 4) float64; zero at pins.
 
     The first three are w_b (r - c_b) / h, the last is w_b [1].
 
     Raises:
-        HandleError: no handle, or as many as the garment has vertices.
+        ValueError: no handle, or as many as the garment has vertices.
     """
     rest = np.asarray(garment.rest_positions, dtype=np.float64)
     if not 1 <= handles < len(rest):
-        raise HandleError(f"{handles} handles: a garment of {len(rest)} vertices has 1 to {len(rest) - 1}")
+        raise ValueError(f"{handles} handles: a garment of {len(rest)} vertices has 1 to {len(rest) - 1}")
     centres = farthest_points(rest, handles)
     away = rest[:, None] - rest[centres]
     distances = np.linalg.norm(away, axis=2)
@@ -107,7 +103,7 @@ class HandleNetwork(GarmentNetwork):
         self.functions = nn.Parameter(torch.zeros(self.vertices, self.handles, 4), requires_grad=False)
 
     def wear(self, garment: Garment) -> None:
-        """Place the handles on the garment. Raises HandleError where it cannot have as many."""
+        """Place the handles on the garment. Raises ValueError where it cannot have as many."""
         self.functions.data.copy_(torch.from_numpy(shape_functions(garment, self.handles)))
 
     def moved(self, activations: Tensor) -> Tensor:
@@ -141,9 +137,9 @@ class StaticHandles(HandleNetwork):
         """Return offsets (N, T, V, 3) [m] and no state."""
         return self.moved(self.activations(self.normalise(features))), None
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_layers(self.activations, plan.add_normalised(self.input_mean, self.input_std))
+        x = plan.add_layers(self.activations, x)
         plan.add_handles(self.functions, plan.add_linear(self.numbers, x))
 
 
@@ -164,9 +160,9 @@ class DynamicHandles80(HandleNetwork):
         hidden, state = run_gru(self.gru, self.normalise(features), state, closed_form=self.closed_form)
         return self.moved(hidden), state
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        hidden = plan.add_gru(self.gru, plan.add_normalised(self.input_mean, self.input_std))
+        hidden = plan.add_gru(self.gru, x)
         plan.add_handles(self.functions, plan.add_linear(self.numbers, hidden))
 
 

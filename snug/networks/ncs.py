@@ -117,11 +117,9 @@ class StaticBranch(GarmentNetwork):
         """Return offsets (N, T, V, 3) [m] and no state."""
         return self.decode(self.static_code(features)), None
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        self._lay_out_decoder(
-            plan, self._lay_out_static(plan, plan.add_normalised(self.input_mean, self.input_std))
-        )
+        self._lay_out_decoder(plan, self._lay_out_static(plan, x))
 
     def _lay_out_static(self, plan: FramePlan, x: slice) -> slice:
         return plan.add_layers(self.static_encoder, slice(x.start, x.start + POSE_NUMBERS))
@@ -168,9 +166,8 @@ class TwoBranches(StaticBranch):
         early, late = offsets[:count].tensor_split([JUDGED_BY_INERTIA], dim=1)
         return torch.cat([torch.cat([early, late.detach()], 1), offsets[count:]]), after
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self.input_mean, self.input_std)
         motion = slice(x.start + POSE_NUMBERS, x.stop)
         for layer in self.joint_encoder:
             if isinstance(layer, nn.Linear):

@@ -36,7 +36,7 @@ class PoseSpaceDeformation(GarmentNetwork):
         flat = self.output_scale * run_linear(self.offsets, hidden)
         return flat.unflatten(-1, (self.vertices, 3)), None
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_layers(self.activations, plan.add_normalised(self.input_mean, self.input_std))
+        x = plan.add_layers(self.activations, x)
         plan.add_offsets((self.offsets, x))

@@ -34,8 +34,6 @@ class Regressor(GarmentNetwork):
         flat = self.output_scale * run_linear(self.offsets, hidden, closed_form=self.closed_form)
         return flat.unflatten(-1, (self.vertices, 3)), state
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        plan.add_offsets(
-            (self.offsets, plan.add_gru(self.gru, plan.add_normalised(self.input_mean, self.input_std)))
-        )
+        plan.add_offsets((self.offsets, plan.add_gru(self.gru, x)))

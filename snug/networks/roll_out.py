@@ -182,7 +182,7 @@ class CompiledFrame:
         plan = FramePlan(order, unposed.shape[1])
         if network is not None:
             plan = FramePlan(order, unposed.shape[1], pins=network.pins, scale=network.output_scale)
-            network.lay_out(plan)
+            network.lay_out(plan, plan.add_normalised(network.input_mean, network.input_std))
         self._operations = None if network is None else plan.operations()
         self._skinning = unposed, *joints, order
         self._size = plan.size

@@ -49,9 +49,8 @@ class FitAndWrinkles(GarmentNetwork):
         """Return the layers whose sum the offsets are."""
         return cast(nn.Linear, self.fit[-1]), self.offsets
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self.input_mean, self.input_std)
         first, drape = cast(nn.Linear, self.fit[0]), cast(nn.Linear, self.fit[2])
         shape = plan.add_linear(first, slice(x.stop - SHAPES, x.stop), nn.ReLU)
         plan.add_offsets((drape, shape), (self.offsets, plan.add_gru(self.gru, x)))

@@ -75,8 +75,7 @@ class FrequencyMixture(GarmentNetwork):
         """Return the layers whose sum the offsets are."""
         return self.low.last, self.high.last
 
-    def lay_out(self, plan: FramePlan) -> None:
+    def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
-        x = plan.add_normalised(self.input_mean, self.input_std)
         pose = slice(x.start, x.stop - SHAPES)
         plan.add_offsets(self.low.lay_out(plan, x), self.high.lay_out(plan, pose))

@@ -34,7 +34,7 @@ from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.tailornet import FrequencyMixture
-from snug.training.training_set import Batch, TrainingSet
+from snug.training.training_set import Batch, TrainingError, TrainingSet
 
 if TYPE_CHECKING:
     from snug.body.parametric_body import Body
@@ -141,10 +141,6 @@ SMOOTHING_SHARE = 0.15  # of the way to the neighbours' mean, in one sweep
 SMOOTHING_SWEEPS = 80  # at 1000 vertices
 
 
-class TargetError(ValueError):
-    """Simulated vertices that do not fit the motions: the message names the motion and what differs."""
-
-
 def vertex_loss(x: Tensor, target: Tensor) -> Tensor:
     """Return the mean squared distance (N, T) [cm^2] of vertices (N, T, V, 3) [m] from their targets."""
     return CM2_PER_M2 * (x - target).square().sum(-1).mean(-1)
@@ -165,7 +161,7 @@ class VertexTargets:
         weights: skinning weights (V, J) of the prediction, on the device of the set.
 
     Raises:
-        TargetError: for a motion without a fitting trajectory.
+        TrainingError: for a motion without a fitting trajectory.
     """
 
     def __init__(
@@ -246,20 +242,20 @@ def relative_vertices(
     """Return the simulated vertices of all frames of all motions, (F, V, 3) [m], relative to the pelvis.
 
     Raises:
-        TargetError: for a missing or unfit trajectory, or a number that is not finite.
+        TrainingError: for a missing or unfit trajectory, or a number that is not finite.
     """
     if not trajectories:
-        raise TargetError("supervised training needs trajectories: a simulation of each training motion")
+        raise TrainingError("supervised training needs trajectories: a simulation of each training motion")
     relative = []
     for motion in motions:
         trajectory = f"simulated trajectory of motion {motion.name!r}"
         if motion.name not in trajectories:
-            raise TargetError(f"no {trajectory}: simulate it, or leave it out")
+            raise TrainingError(f"no {trajectory}: simulate it, or leave it out")
         positions = np.asarray(trajectories[motion.name])
         expected = (motion.frames, dressed.vertices, 3)
         if positions.shape != expected:
-            raise TargetError(f"{trajectory} has shape {positions.shape}, expected {expected}")
+            raise TrainingError(f"{trajectory} has shape {positions.shape}, expected {expected}")
         if not (finite := np.isfinite(positions).all(axis=(1, 2))).all():
-            raise TargetError(f"{trajectory} is not finite at frame {int(np.argmin(finite))}")
+            raise TrainingError(f"{trajectory} is not finite at frame {int(np.argmin(finite))}")
         relative.append(torch.as_tensor(positions - dressed.pelvis(motion)[:, None]).float())
     return torch.cat(relative)

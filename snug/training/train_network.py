@@ -223,7 +223,7 @@ def train_network(
         The trained model.
 
     Raises:
-        ValueError: TrainingError, TargetError, RecipeError, DeviceError or TensorFileError, naming what is
+        ValueError: TrainingError, RecipeError, DeviceError or TensorFileError, naming what is
             missing or diverged.
 
     >>> model = train_network("snug", dressed, motions, steps=2000, seed=0)  # doctest: +SKIP

@@ -15,7 +15,6 @@ from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
 from snug.training.augmentation import augment
 from snug.training.optimisation_step import Trainer
-from snug.training.simulated_data import TargetError
 from snug.training.train_network import train_network, untrained_model
 from snug.training.training_set import TrainingError, TrainingSet
 from tests.snug.training.dressing import leaning, swaying, tube_dress
@@ -87,14 +86,14 @@ def test_broken_model_files_are_named(tmp_path, trained, monkeypatch):
 def test_supervised_names_unfit_targets():
     dressed, motion = tube_dress(), swaying(30)
     good = dressed.skinned(motion)
-    with pytest.raises(TargetError, match="needs trajectories"):
+    with pytest.raises(TrainingError, match="needs trajectories"):
         short("supervised")
-    with pytest.raises(TargetError, match="'sway'"):
+    with pytest.raises(TrainingError, match="'sway'"):
         short("supervised", trajectories={"walk": good})
-    with pytest.raises(TargetError, match=r"shape \(29, 150, 3\), expected \(30, 150, 3\)"):
+    with pytest.raises(TrainingError, match=r"shape \(29, 150, 3\), expected \(30, 150, 3\)"):
         short("supervised", trajectories={"sway": good[:-1]})
     good[17, 3] = np.nan
-    with pytest.raises(TargetError, match="frame 17"):
+    with pytest.raises(TrainingError, match="frame 17"):
         short("supervised", trajectories={"sway": good})
 
 
