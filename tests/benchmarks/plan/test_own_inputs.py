@@ -48,8 +48,8 @@ def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, 
         return Schedule(plan).cell(plan.cells[0]).inputs
 
     first = inputs()
-    (tmp_path / "silk.json").write_text('{"density": 300.0}')
-    assert first not in (inputs(",shift=0 0.001 0"), inputs(f",material={tmp_path}/silk.json"))
+    (tmp_path / "silk.toml").write_text("density = 300.0\n")
+    assert first not in (inputs(",shift=0 0.001 0"), inputs(f",material={tmp_path}/silk.toml"))
     path.write_text(path.read_text() + "# a remark\n")
     assert inputs() == first  # the garment as read is what counts
     saved(tmp_path, tube, positions=1.001 * tube.rest_positions)
