@@ -21,9 +21,6 @@ EXAMPLES = """examples:
   python -m snug.check shirt.obj,units=cm,up=z
   python -m snug.check shirt.obj,rest=uv                      its UV chart as rest shape
 
-beside a mesh: <name>.weights.npz with an array "weights" (V, 24) has skinning weights, which are kept as
-they are.
-
 exit status: 0 all can be used, 1 one cannot"""
 
 
@@ -62,8 +59,6 @@ def describe(garment: Garment, body: Body) -> Iterator[tuple[str, str]]:
         yield "UV chart", f"stretched by up to {strain:.0%} on the mesh"
     yield "openings", ", ".join(f"{name} ({len(loop)} vertices)" for name, loop in garment.loops.items())
     yield "pinned", f"{len(garment.pins)} vertices"
-    material = garment.material
-    yield "material", f"{material.areal_density:.3g} kg/m^2, {material.membrane_modulus:.3g} N/m"
 
 
 @command(PROGRAM)

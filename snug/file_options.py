@@ -19,8 +19,8 @@ up (y, z), shift='0 0.1 0' [m] where the body stood elsewhere, rest=uv where the
 uv_scale (metres per unit of the chart), material (.toml of young_modulus [Pa], poisson_ratio,
 thickness [m], density [kg/m^3], bending_stiffness [J])"""
 MOTION_WORDS = """behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none),
-joint_map (TOML, a name of our joints = a name of a BVH file), repair (interpolate over recording errors:
-numbers that are not finite, joints faster than 3600 degrees/s, a root faster than 10 m/s)"""
+repair (interpolate over recording errors: numbers that are not finite, joints faster than 3600 degrees/s, a
+root faster than 10 m/s)"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,17 +66,6 @@ class GarmentFile:
         """Name in scenes and of networks."""
         return self.path.stem
 
-    @property
-    def weights(self) -> Path:
-        """Place of authored skinning weights: array "weights" (V, 24) of <name>.weights.npz."""
-        return self.path.with_name(f"{self.name}.weights.npz")
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All files that it is read from."""
-        weights = [self.weights] if self.weights.is_file() else []
-        return (self.path, *weights, *([self.material] if self.material else []))
-
 
 @dataclass(frozen=True, kw_only=True)
 class MotionFileOptions:
@@ -85,7 +74,6 @@ class MotionFileOptions:
     Attributes:
         up: vertical axis of the file, "y" or "z"; empty: found from the motion.
         fps: frames per second of a file that states none [1/s].
-        joint_map: a TOML file, names of our joints = names of a BVH file's.
         repair: interpolate over recording errors instead of refusing them.
 
     Raises:
@@ -94,7 +82,6 @@ class MotionFileOptions:
 
     up: str = ""
     fps: float | None = None
-    joint_map: Path | None = None
     repair: bool = False
 
     def __post_init__(self) -> None:
@@ -162,7 +149,7 @@ def _made(kind: Any, words: Mapping[str, Any], text: str) -> Any:
     for name in words:
         if name not in known:
             raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(known)}")
-    places = {name: words[name] for name in ("path", "material", "joint_map") if name in words}
+    places = {name: words[name] for name in ("path", "material") if name in words}
     for name, place in places.items():
         if not (isinstance(place, str) and place):
             raise ValueError(f"{text}: {name}={place}: give a path")

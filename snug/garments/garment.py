@@ -55,7 +55,6 @@ class Garment:
         material: of the cloth.
         rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one; else
             rest_positions is its rest shape too.
-        authored_weights: whether somebody made the weights for this garment, so that no recipe smooths them.
     """
 
     name: str
@@ -68,7 +67,6 @@ class Garment:
     parameters: Mapping[str, float] = field(default_factory=dict)
     material: Material = field(default_factory=Material)
     rest_uv: Array | None = None
-    authored_weights: bool = False
 
     def cloth(self, material: Material | None = None) -> Cloth:
         """Return the rest state of simulator, loss and metrics, with the garment's own material or another.
@@ -140,20 +138,17 @@ COVERED = 0.05  # share of a limb's skin within a garment, from which the garmen
 BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both legs follows neither
 
 
-def find_weights(
-    body: Body, positions: Array, faces: Index, *, legs: bool, authored: Array | None
-) -> tuple[Array, Index]:
+def find_weights(body: Body, positions: Array, faces: Index, *, legs: bool) -> tuple[Array, Index]:
     """Find the skinning weights of a garment on the unposed body.
 
-    They are the authored ones, or blended from the three corners of the closest face of the skin, among the
-    limbs that the garment encloses. One tube around both legs is smoothed below the hips as a skirt is.
+    They are blended from the three corners of the closest face of the skin, among the limbs that the garment
+    encloses. One tube around both legs is smoothed below the hips as a skirt is.
 
     Args:
         body: that the garment was made for.
         positions: (V,3) [m].
         faces: (F,3), wound outward.
         legs: whether each leg has its own opening.
-        authored: (V,24), or None.
 
     Returns:
         Weights (V,24), and nearest vertices of the body (V,).
@@ -165,8 +160,6 @@ def find_weights(
     closest = search.nearest(positions)
     corners = skin[closest.faces]
     nearest = corners[np.arange(len(corners)), closest.barycentric.argmax(axis=1)]
-    if authored is not None:
-        return authored, nearest
     weights = np.einsum("va,vaj->vj", closest.barycentric, body.skinning_weights[corners])
     below = joint_position(body, "left_hip")[1] - positions[:, 1]
     if not legs and below.max() > BELOW_HIPS:

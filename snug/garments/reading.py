@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_sim.cloth import Cloth, MeshError
-from reference_sim.files.array_file import ArrayFileError, read_arrays
 from reference_sim.files.mesh_files import METRES, Surface, join_seams, read_mesh, rest_chart, to_metres_y_up
 from reference_sim.material import Material, MaterialError
 from reference_sim.obstacle import Obstacle
@@ -59,19 +58,16 @@ def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
         material = Material.from_file(file.material) if file.material else Material()
     except (MeshError, MaterialError) as error:
         raise GarmentError(str(error)) from None
-    authored = read_weights(file.weights, len(raw.positions)) if file.weights.is_file() else None
     try:
-        return _make_garment(file, body, raw, material, authored)
+        return _make_garment(file, body, raw, material)
     except ValueError as error:
         raise GarmentError(f"{file.path}: {error}") from None
 
 
-def _make_garment(
-    file: GarmentFile, body: Body, raw: Surface, material: Material, authored: Array | None
-) -> Garment:
+def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Material) -> Garment:
     """Return the garment of a surface as it is in the file. Raises ValueError: problem, remedy."""
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
-    surface, kept = join_seams(replace(raw, positions=positions))
+    surface, _ = join_seams(replace(raw, positions=positions))
     skin = Obstacle(body.template, body.faces)
     _check_place(file, body, skin, raw.positions, surface.positions)
     chart = None
@@ -93,9 +89,8 @@ def _make_garment(
     loops = name_openings(body, positions, faces)
     if not loops:
         raise ValueError("it has no opening, the surface is closed: cut where head and limbs come out")
-    authored = None if authored is None else authored[kept]
     legs = "left_leg" in loops or "right_leg" in loops
-    weights, nearest = find_weights(body, positions, faces, legs=legs, authored=authored)
+    weights, nearest = find_weights(body, positions, faces, legs=legs)
     # A garment without neck and sleeves hangs from its waist, and contact without friction does not hold it.
     hangs = any(name in loops for name in ("neck", "left_sleeve", "right_sleeve"))
     pins = np.empty(0, dtype=np.int64) if hangs else np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
@@ -109,34 +104,7 @@ def _make_garment(
         pins=pins,
         material=material,
         rest_uv=chart,
-        authored_weights=authored is not None,
     )
-
-
-def read_weights(path: Path, count: int) -> Array:
-    """Return the authored skinning weights (count, 24) of a file, a row for each vertex of the mesh file.
-
-    Raises:
-        GarmentError: no array "weights", another shape, negative, or rows that do not sum to one.
-    """
-    try:
-        weights = read_arrays(path, ("weights",)).get("weights", np.empty(0))
-    except ArrayFileError as error:
-        raise GarmentError(str(error)) from None
-    joints = len(Body.joint_names)
-    if weights.shape != (count, joints) or weights.dtype.kind not in "fiu":
-        raise GarmentError(
-            f"{path}: array 'weights' is {weights.dtype} {weights.shape}: expected numbers "
-            f"({count}, {joints}), a row for each vertex of the mesh file"
-        )
-    weights = weights.astype(np.float64)
-    sums = weights.sum(axis=1)
-    good = np.isfinite(sums) & (weights.min(axis=1) >= -1e-6) & (np.abs(sums - 1) < 1e-3)
-    for row in np.flatnonzero(~good)[:1]:
-        raise GarmentError(
-            f"{path}: weights of vertex {row} are negative or sum to {sums[row]:.4g} instead of 1"
-        )
-    return np.maximum(weights, 0.0) / np.maximum(weights, 0.0).sum(axis=1, keepdims=True)
 
 
 def _check_place(file: GarmentFile, body: Body, skin: Obstacle, raw: Array, positions: Array) -> None:

@@ -50,7 +50,7 @@ def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
     joints, frames, stated = read_clip(path)
     fps = frame_rate(path, len(frames), stated, options)
     parents = [joint.parent for joint in joints]
-    matches = match_joints(path, [joint.name for joint in joints], parents, options.joint_map)
+    matches = match_joints(path, [joint.name for joint in joints], parents)
     places = np.zeros((len(parents), 3))
     for index, joint in enumerate(joints):
         places[index] = joint.offset + (places[joint.parent] if joint.parent >= 0 else 0.0)

@@ -16,6 +16,7 @@ never meets. Shape coefficients and soft tissue are left out: shape is the calle
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fnmatch import fnmatch
@@ -116,9 +117,11 @@ READERS: dict[str, Callable[[Path, MotionFileOptions], RawMotion]] = {
 HAND_DAMPING = 0.1
 HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand")]
 
-MAX_NAME_BYTES = 100  # bytes of a motion's name
+NAME = re.compile(
+    r"\w[\w.+()-]*( [\w.+()-]+)*"
+)  # of a motion: rows of CSV files and lists in options hold it
+MAX_NAME_BYTES = 100
 SHAPE_FILES = ("shape.npz", "*_stagei.npz")  # of a subject: AMASS keeps them beside its clips
-FORMULA = ("=", "+", "-", "@")  # what begins with one of these is a formula to programs that open CSV files
 
 
 def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) -> list[Motion]:
@@ -159,13 +162,10 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
 def read_motion(file: Path, options: MotionFileOptions) -> Motion:
     """Read one clip as recorded, at its rate, y up and without recording errors. Raises MotionError."""
     name = file.stem
-    # Rows of CSV files and lists in options hold names: no commas, no formulas, no spaces side by side.
-    plain = name.isprintable() and "," not in name and name == " ".join(name.split())
-    if not plain or name.startswith(FORMULA) or len(name.encode(errors="replace")) > MAX_NAME_BYTES:
+    if not NAME.fullmatch(name) or len(name.encode(errors="replace")) > MAX_NAME_BYTES:
         raise MotionError(
-            f"{str(file)[:200]!a}: files are named after a motion; give this one a name of at most "
-            f"{MAX_NAME_BYTES} printable bytes without a comma, without spaces side by side or at the ends, "
-            f"that begins with none of {' '.join(FORMULA)}"
+            f"{str(file)[:200]!a}: a motion is named after its file; give it a name of at most "
+            f"{MAX_NAME_BYTES} bytes: letters, digits, single spaces"
         )
     reader = READERS.get(file.suffix.lower())
     if reader is None:

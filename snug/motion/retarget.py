@@ -5,17 +5,15 @@ resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t
 twisted about itself follows from its hinge where the file has one. Else A_j is the smallest turn, and the
 zero pose must be a T or A pose.
 
-Joints are matched with ours by a user's file, or guessed from common names: limbs by name; pelvis, spine and
-neck by place, since the pelvis is where the legs meet, the spine leads from there to where the arms meet, and
-the neck from there to the head.
+Joints are matched with ours by common names: limbs by name; pelvis, spine and neck by place. The pelvis is
+where the legs meet, the spine leads from there to where the arms meet, and the neck from there to the head.
 """
 
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
-from itertools import pairwise, product
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -131,62 +129,25 @@ SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
-def match_joints(
-    path: Path, names: Sequence[str], parents: Sequence[int], given: Path | None
-) -> dict[str, int]:
+def match_joints(path: Path, names: Sequence[str], parents: Sequence[int]) -> dict[str, int]:
     """Return our joint names with the indices of their joints; optional ones that they lack are left out.
 
     Args:
         path: of the motion, for messages.
         names: of their joints, empty for end sites.
         parents: indices, -1 for the root, parents first.
-        given: a TOML file, our name = theirs, which goes before all guesses.
 
     Raises:
-        MotionError: a needed joint is missing or hangs elsewhere; names the joint.
+        MotionError: a needed joint is missing; names it.
     """
-    matches = _limbs(names) | _given(given, path, names)
+    matches = _limbs(names)
     for ours in (f"{side}_{joint}" for side in SIDES for joint in NEEDED):
         if ours not in matches:
             known = ", ".join(filter(None, names))
             raise MotionError(
-                f"{path}: no joint is known as '{ours}'; name it in a joint_map (there are {known[:300]})"
+                f"{path}: no joint is known as '{ours}'; rename it in the file (there are {known[:300]})"
             )
-    matches = _trunk(path, names, parents, matches) | matches
-    above = {
-        f"{side}_{joint}": f"{side}_{before}"
-        for side in SIDES
-        for limb in LIMB_CHAINS
-        for before, joint in pairwise(limb)
-    }
-    for ours, theirs in matches.items():
-        upper = above.get(ours, "pelvis")
-        if upper in matches and ours != "pelvis" and matches[upper] not in way_up(parents, theirs)[1:]:
-            raise MotionError(
-                f"{path}: '{names[theirs]}' taken for {ours} does not hang below '{names[matches[upper]]}' "
-                f"taken for {upper}; name them in a joint_map"
-            )
-    return matches
-
-
-def _given(file: Path | None, path: Path, names: Sequence[str]) -> dict[str, int]:
-    """Return the joints that a file names, by ours."""
-    if file is None:
-        return {}
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as problem:
-        reason = " ".join(str(problem).split())[:200]
-        raise MotionError(f'{file}: not a TOML file ({reason}); write lines as left_hip = "LHip"') from None
-    for ours, theirs in table.items():
-        if ours not in JOINT_NAMES:
-            known = ", ".join(JOINT_NAMES)
-            raise MotionError(f"{file}: '{ours[:40]}' is none of our joints; they are {known}")
-        if not theirs or theirs not in names:
-            raise MotionError(
-                f"{file}: {path.name} has no joint '{str(theirs)[:40]}' for {ours}; look into its hierarchy"
-            )
-    return {ours: names.index(theirs) for ours, theirs in table.items()}
+    return _trunk(path, names, parents, matches) | matches
 
 
 def _limbs(names: Sequence[str]) -> dict[str, int]:
@@ -225,12 +186,11 @@ def _trunk(
     path: Path, names: Sequence[str], parents: Sequence[int], matches: Mapping[str, int]
 ) -> dict[str, int]:
     """Match pelvis, spine, neck and head by their places; the spine may have one or any number of joints."""
-    pelvis = matches.get("pelvis", _meet(parents, matches["left_hip"], matches["right_hip"]))
+    pelvis = _meet(parents, matches["left_hip"], matches["right_hip"])
     chest = _meet(parents, matches["left_shoulder"], matches["right_shoulder"])
-    heads = [index for index, name in enumerate(names) if _side(name)[1].endswith("head")]
-    head = matches.get("head", heads[0] if heads else None)
+    head = next((index for index, name in enumerate(names) if _side(name)[1].endswith("head")), None)
     if head is None:
-        raise MotionError(f"{path}: no joint is known as 'head'; name it in a joint_map")
+        raise MotionError(f"{path}: no joint is known as 'head'; rename it in the file")
     trunk = {"pelvis": pelvis, "head": head}
     spine = [joint for joint in reversed(way_up(parents, chest)) if pelvis in way_up(parents, joint)[1:]]
     if spine:

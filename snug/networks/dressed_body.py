@@ -45,8 +45,6 @@ class DressedBody:
     def weights(self, smoothing: int) -> Tensor:
         """Return skinning weights (V, 24), borrowed from the body and averaged over neighbours.
 
-        Weights that somebody made for this garment stay as they are.
-
         Args:
             smoothing: sweeps on a garment of 1000 vertices. A sweep reaches as far as an edge is long, so
                 other garments get sweeps in proportion to their vertices and are smoothed over the same
@@ -55,7 +53,7 @@ class DressedBody:
         """
         if smoothing not in self._weights:
             borrowed = weights = np.asarray(self.garment.skinning_weights)
-            if smoothing and not self.garment.authored_weights:
+            if smoothing:
                 sweeps = max(1, round(smoothing * self.vertices / 1000))
                 weights = smooth_weights(weights, self.garment.faces, sweeps)
                 weights[self.garment.pins] = borrowed[self.garment.pins]  # where the simulator's handles are

@@ -37,7 +37,7 @@ from reference_sim.trajectory import read_point_cache, write_obj, write_point_ca
 from snug.body.parametric_body import Body
 from snug.body.skeleton import BodyError
 from snug.body.smpl_files import read_body
-from snug.file_options import GarmentFile, MotionFileOptions
+from snug.file_options import GarmentFile
 from snug.garments.garment import GarmentError
 from snug.garments.reading import read_garment
 from snug.garments.templates import find_template
@@ -168,11 +168,6 @@ def read_material(path: Path) -> None:
     read_garment(GarmentFile(path=path.with_suffix(".obj"), material=path), Body.load())
 
 
-def read_joints(path: Path) -> None:
-    path.with_suffix(".bvh").write_text(bvh(Y_UP, PATH, 60.0))
-    load_motions(path.with_suffix(".bvh"), options=MotionFileOptions(joint_map=path))
-
-
 def read_amc(path: Path) -> None:
     path.with_suffix(".asf").write_text(cmu_like())
     load_motions(path)
@@ -215,8 +210,6 @@ READERS: tuple[Reader, ...] = (
     Reader("garment", ".obj", write_shirt, lambda path: read_garment(path, Body.load()), GarmentError),
     Reader("material", ".toml", lambda path: path.write_text(
         "young_modulus = 1e5\npoisson_ratio = 0.3\nthickness = 5e-4\n"), read_material, GarmentError),
-    Reader("joints", ".toml", lambda path: path.write_text('pelvis = "pelvis"\nspine1 = "spine1"\n'),
-           read_joints, MotionError),
     Reader("BVH", ".bvh", lambda path: path.write_text(bvh(Y_UP, PATH, 60.0)), load_motions, MotionError),
     Reader("roll-out", ".npz", lambda path: np.savez_compressed(path, **ROLL_OUT),
            read_roll_out, RollOutFileError),

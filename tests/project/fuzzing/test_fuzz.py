@@ -18,7 +18,7 @@ from tests.project.fuzzing.fuzz_readers import READERS, problem_of
 HERE = Path(__file__).resolve().parent
 
 
-@pytest.mark.parametrize("name", ["arrays", "AMASS", "body pickle", "joints", "BVH", "amc", "asf"])
+@pytest.mark.parametrize("name", ["arrays", "AMASS", "body pickle", "BVH", "amc", "asf"])
 def test_some_mutated_files_are_refused_in_one_line(name, tmp_path):
     (reader,) = (reader for reader in READERS if reader.name == name)
     path, refused = tmp_path / f"mutated{reader.suffix}", 0
@@ -51,6 +51,6 @@ def test_mutated_files_are_refused_in_one_line(tmp_path):
 def test_a_motion_that_no_file_can_be_named_after_is_refused(name, tmp_path):
     path = tmp_path / os.fsdecode(name + b".npz")
     path.write_bytes(b"")
-    with pytest.raises(MotionError, match="a name of at most 100 printable bytes") as refused:
+    with pytest.raises(MotionError, match="a name of at most 100 bytes") as refused:
         load_motions(path)
     assert str(refused.value).isascii() and "\n" not in str(refused.value)

@@ -14,7 +14,7 @@ from benchmarks.assets import Assets, embedded_motions
 from benchmarks.scenes import of_garment
 from reference_sim import Trajectory, simulate
 from snug.body.parametric_body import Body
-from snug.body.skeleton import JOINT, PARENTS
+from snug.body.skeleton import PARENTS
 from snug.body.smpl_files import read_body
 from snug.garments.garment import Garment
 
@@ -95,23 +95,6 @@ def with_hands(arrays: dict[str, np.ndarray], face: bool) -> dict[str, np.ndarra
             shares += [weights[:, hand] / 15] * 3
     table = np.stack([np.array(parents), np.arange(len(parents))]).astype(np.uint32)
     return {**arrays, "J_regressor": np.stack(joints), "weights": np.stack(shares, 1), "kintree_table": table}
-
-
-def lowered(body: Body, degrees: float) -> Body:
-    """In an A pose, by skinning: template and joints with both arms lowered. Its shapes are left out."""
-    poses = np.zeros((1, 24, 3))
-    poses[0, JOINT["left_shoulder"], 2] = -np.radians(degrees)
-    poses[0, JOINT["right_shoulder"], 2] = np.radians(degrees)
-    still = np.zeros((1, 3))
-    transforms = body.transforms(poses, still)[0]
-    joints = np.einsum("jab,jb->ja", transforms[:, :, :3], body.joint_template) + transforms[:, :, 3]
-    return dataclasses.replace(
-        body,
-        template=body.vertices(poses, still)[0],
-        joint_template=joints,
-        shape_directions=body.shape_directions[..., :0],
-        joint_directions=body.joint_directions[..., :0],
-    )
 
 
 def plain_arrays(body: Body) -> dict[str, np.ndarray]:

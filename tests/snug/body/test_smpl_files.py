@@ -8,10 +8,9 @@ import pytest
 from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import BodyError
+from snug.body.skeleton import JOINT, BodyError
 from snug.body.smpl_files import read_body
 from tests.snug.body.other_bodies import (
-    lowered,
     other_mesh,
     plain_arrays,
     smpl_arrays,
@@ -131,11 +130,9 @@ def moved_joint(regressor):
     ("change", "says"),
     [
         (lambda a: {k: v for k, v in a.items() if k != "weights"}, "no array weights or blend_weights"),
-        (changed("weights", lambda w: w[:, :22]), "expected numbers of shape (1000, 24)"),
         (changed("weights", lambda w: 2 * w), "sum to one"),
         (changed("v_template", lambda v: np.where(v == v[7, 1], np.nan, v)), "v_template[7, 1] is nan"),
         (changed("v_template", lambda v: v * 1000), "in metres"),
-        (changed("v_template", lambda v: v * [1000, 1, 1]), "in metres"),
         (changed("v_template", lambda v: v[:, [0, 2, 1]] * [1, 1, -1]), "in metres"),
         (changed("v_template", lambda v: v * [-1, 1, -1]), "face +z"),
         (changed("v_template", lambda v: v + np.array([0.5, 0, 0])), "beside x = 0"),
@@ -144,14 +141,13 @@ def moved_joint(regressor):
         (lambda a: a | {"J_regressor": np.array([{"sparse": 1}], dtype=object)}, "plain arrays"),
         (changed("J_regressor", moved_joint), "left_elbow"),
         (changed("kintree_table", lambda t: np.full((2, 24), 30)), "hangs on 30"),
-        (changed("kintree_table", lambda t: t[:, :23]), "(2, 23)"),
         (lambda a: a | {"f": a["f"][a["v_template"][a["f"], 1].min(axis=1) > 0.12]}, "a hole at vertex"),
         (changed("f", lambda f: f[:, ::-1]), "inside out"),
         (changed("f", lambda f: f[:, [0, 1, 2, 2]]), "shape (any, 3)"),
         (changed("f", lambda f: f + 1), "vertex 1000"),
         (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
     ],
-    ids=range(20),
+    ids=range(17),
 )
 def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     path = saved(tmp_path / "broken.npz", change(layouts["SMPL"]))
@@ -162,8 +158,10 @@ def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
 
 
 def test_arms_that_hang_down_are_refused(small, tmp_path):
-    path = saved(tmp_path / "low.npz", plain_arrays(lowered(small, 40.0)))
-    with pytest.raises(BodyError, match="left arm is 40 degrees off the T pose"):
+    joints = small.joint_template.copy()
+    joints[JOINT["left_wrist"]] = joints[JOINT["left_shoulder"]] + [0.4, -0.4, 0.0]
+    path = saved(tmp_path / "low.npz", plain_arrays(small) | {"joints": joints})
+    with pytest.raises(BodyError, match="left arm is 45 degrees off the T pose"):
         read_body(path)
 
 

@@ -94,19 +94,12 @@ def test_each_piece_that_is_inside_out_is_turned(tmp_path, body, tube):
     )
 
 
-def test_doubled_vertices_are_joined_and_weights_are_those_of_the_file(tmp_path, body, tube):
+def test_doubled_vertices_are_joined(tmp_path, body, tube):
     front = np.flatnonzero(np.abs(tube.rest_positions[:, 0]) < 1e-3)
     twice, split = doubled_along(tube.rest_positions, tube.faces, front)
-    weights = np.random.default_rng(0).dirichlet(np.ones(24), len(twice))
-    path = saved(tmp_path, tube, positions=twice, faces=split)
-    np.savez(tmp_path / "mine.weights.npz", weights=weights)
-    file = GarmentFile(path=path)
-    read = read_garment(file, body)
+    read = read_garment(saved(tmp_path, tube, positions=twice, faces=split), body)
     np.testing.assert_array_equal(read.faces, tube.faces)
-    assert len(file.files) == 2 and read.authored_weights and len(front)
-    dressed = DressedBody(body, read)
-    for smoothing in (0, 20):
-        np.testing.assert_allclose(dressed.weights(smoothing), weights[: len(tube.rest_positions)], atol=1e-7)
+    assert len(front)
 
 
 def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
@@ -149,10 +142,6 @@ def one_turned(faces):
     return np.where(np.arange(len(faces))[:, None] == 9, faces[:, ::-1], faces)
 
 
-def weights(columns, value):
-    return lambda shirt: {"weights": np.full((len(shirt.rest_positions), columns), value)}
-
-
 REFUSED = [
     (
         lambda s: {"positions": 100 * s.rest_positions},
@@ -167,9 +156,6 @@ REFUSED = [
     (lambda s: {"faces": np.concatenate([s.faces, s.faces[5:6]])}, "a cloth is manifold"),
     (lambda s: {"faces": one_turned(s.faces)}, "same way"),
     (lambda s: {"faces": closed(s)}, "no opening, the surface is closed"),
-    (weights(24, 1.0), "weights of vertex 0 are negative or sum to 24"),
-    (weights(20, 0.05), r"expected numbers \(\d+, 24\)"),
-    (weights(24, np.nan), "weights of vertex 0"),
     (lambda s: {"thickness": 0.47}, r"its material is .* kg/m\^2, .* mm thick: give thickness in m"),
     (lambda s: {"thickness": 0.47e-6}, r"its material is .* kg/m\^2, .* mm thick: give thickness in m"),
 ]
@@ -180,8 +166,6 @@ def test_what_cannot_be_worn_is_refused_with_its_remedy(tmp_path, body, shirt, s
     change = spoil(shirt)
     mesh = {name: change[name] for name in ("positions", "faces") if name in change}
     file = GarmentFile(path=saved(tmp_path, shirt, **mesh))
-    if "weights" in change:
-        np.savez(file.weights, weights=change["weights"])
     if "thickness" in change:
         (tmp_path / "cotton.toml").write_text(f"thickness = {change['thickness']}\n")
         file = replace(file, material=tmp_path / "cotton.toml")

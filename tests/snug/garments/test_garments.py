@@ -163,12 +163,8 @@ def test_another_shape_carries_the_shirt_along(body, shirt):
     ("wrong", "says"),
     [
         ({"vertices": 99}, "vertices=99"),
-        ({"vertices": 10**6}, "vertices=1000000"),
-        ({"ease": -0.01}, "ease=-0.01"),
         ({"ease": 0.5}, "ease=0.5"),
         ({"ease": float("nan")}, "ease=nan"),
-        ({"clearance": 0.0}, "clearance=0.0"),
-        ({"sleeve": 1.2}, "sleeve=1.2"),
         ({"length": 1.0}, "length=1.0"),
         ({"strap": 0.05}, "strap: no measure of a tshirt: use vertices, ease, clearance, sleeve, length"),
         ({"name": "gown"}, "'gown'.*tshirt, tunic, skirt.*dress"),

@@ -49,7 +49,7 @@ CHAIN = """# comment
 """
 
 
-def cmu_like(splay: float = 20.0, radians: bool = False) -> str:
+def cmu_like(splay: float = 20.0) -> str:
     """A skeleton with CMU's bone names: legs splayed, arms along x, hinge axes tilted as CMU's are."""
     s, c = np.sin(np.radians(splay)), np.cos(np.radians(splay))
     down, up = {"l": (s, -c, 0), "r": (-s, -c, 0)}, (0, 1, 0)
@@ -76,16 +76,11 @@ def cmu_like(splay: float = 20.0, radians: bool = False) -> str:
             (f"{side}hand", (sign, 0, 0), 0.7, (0, sign * 90, sign * 90), "rx", f"{side}wrist"),
             (f"{side}fingers", (sign, 0, 0), 0.6, (0, sign * 90, sign * 90), "", f"{side}hand"),
         ]
-    turn = np.pi / 180 if radians else 1.0
-    text = f":units\n length {UNIT}\n angle {'rad' if radians else 'deg'}\n:root\n order TX TY TZ RX RY RZ\n"
+    text = f":units\n length {UNIT}\n angle deg\n:root\n order TX TY TZ RX RY RZ\n"
     text += " axis XYZ\n position 0 0 0\n orientation 0 0 0\n:bonedata\n"
     for name, direction, length, axis, dof, _ in bones:
         text += f"begin\n name {name}\n direction {' '.join(map(str, direction))}\n length {length}\n"
-        text += (
-            f" axis {' '.join(str(a * turn) for a in axis)} XYZ\n"
-            + (f" dof {dof}\n" if dof else "")
-            + "end\n"
-        )
+        text += f" axis {' '.join(map(str, axis))} XYZ\n" + (f" dof {dof}\n" if dof else "") + "end\n"
     return text + ":hierarchy\nbegin\n" + "".join(f" {b[5]} {b[0]}\n" for b in bones) + "end\n"
 
 

@@ -110,52 +110,28 @@ def test_missing_skeleton_file_folder_and_kind(tmp_path):
         assert "\n" not in str(caught.value) and path.name in str(caught.value)
 
 
-class TestRetargeting:
-    def limb(self, motion, joint, frame=0):
-        positions = joint_positions(motion.poses, motion.translations)[frame]
-        arm = positions[JOINT[LIMBS[joint]]] - positions[JOINT[joint]]
-        return arm / np.linalg.norm(arm)
+def test_hips_are_not_twisted_in_the_zero_pose(tmp_path):
+    """The knees' hinge lies across, tilted with the leg, and no joint turns where the skeletons agree."""
+    motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1)]), MotionFileOptions())
+    np.testing.assert_allclose(motion.poses[0, JOINT["spine2"]], 0.0, atol=1e-12)
+    hinge = global_rotations(motion.poses)[0, JOINT["left_knee"]] @ [1, 0, 0]
+    # Within the 3 degrees by which our own rest shank is splayed, and no more about the leg's length.
+    np.testing.assert_allclose(hinge, [np.cos(np.radians(20)), np.sin(np.radians(20)), 0], atol=0.06)
+    assert abs(hinge[2]) < 1e-9
 
-    def test_the_zero_pose_has_the_files_limb_directions(self, tmp_path):
-        motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1)]), MotionFileOptions())
-        s, c = np.sin(np.radians(20)), np.cos(np.radians(20))
-        expected = {
-            "left_hip": (s, -c, 0),
-            "right_knee": (-s, -c, 0),
-            "left_shoulder": (1, 0, 0),
-            "right_elbow": (-1, 0, 0),
-        }
-        for joint, direction in expected.items():
-            np.testing.assert_allclose(self.limb(motion, joint), direction, atol=1e-9)
-        # No turn where the skeletons agree; hips not twisted: the knees' hinge still lies across.
-        np.testing.assert_allclose(motion.poses[0, JOINT["spine2"]], 0.0, atol=1e-12)
-        hinge = global_rotations(motion.poses)[0, JOINT["left_knee"]] @ [1, 0, 0]
-        # Within the 3 degrees by which our own rest shank is splayed, and no more about the leg's length.
-        np.testing.assert_allclose(hinge, [c, s, 0], atol=0.06)
-        assert abs(hinge[2]) < 1e-9
 
-    def test_flexions_bend_the_right_way(self, tmp_path):
-        # The femur's axes are splayed by 20 degrees; rz brings the leg upright, then rx swings it forward.
-        frames = [
-            amc_frame(1, lfemur=(-90, 0, 0), rtibia=(60,), lradius=(90,)),
-            amc_frame(2, lfemur=(0, 0, -20), rradius=(90,), lhumerus=(0, 0, 70)),
-        ]
-        motion = read_asf_amc(write_clip(tmp_path, frames), MotionFileOptions())
-        assert self.limb(motion, "left_hip")[2] == pytest.approx(1.0, abs=0.01)
-        assert self.limb(motion, "right_knee")[2] < -0.8  # the shin goes back
-        assert self.limb(motion, "left_elbow")[2] > 0.8  # the forearm comes forward
-        assert self.limb(motion, "right_elbow", 1)[2] > 0.8
-        np.testing.assert_allclose(self.limb(motion, "left_hip", 1), [0, -1, 0], atol=1e-9)
-        # An elbow is a hinge about one axis of ours: the mesh's own.
-        elbow = motion.poses[0, JOINT["left_elbow"]]
-        assert elbow[1] < 0 and abs(elbow[1]) > 5 * max(abs(elbow[0]), abs(elbow[2]))
+def test_an_elbow_is_a_hinge_about_our_own_axis(tmp_path):
+    motion = read_asf_amc(write_clip(tmp_path, [amc_frame(1, lradius=(90,))]), MotionFileOptions())
+    elbow = motion.poses[0, JOINT["left_elbow"]]
+    assert elbow[1] < 0 and abs(elbow[1]) > 5 * max(abs(elbow[0]), abs(elbow[2]))
 
-    def test_root_path_is_scaled_to_our_legs(self, tmp_path):
-        frames = [amc_frame(1), amc_frame(2, root=(0, 0, 10, 0, 0, 0))]
-        motion = read_asf_amc(write_clip(tmp_path, frames), MotionFileOptions())
-        step = motion.translations[1] - motion.translations[0]
-        np.testing.assert_allclose(step, [0, 0, 10 * LEG_LENGTH / 14.4], atol=1e-12)
-        assert motion.fps == CMU_RATE
+
+def test_root_path_is_scaled_to_our_legs(tmp_path):
+    frames = [amc_frame(1), amc_frame(2, root=(0, 0, 10, 0, 0, 0))]
+    motion = read_asf_amc(write_clip(tmp_path, frames), MotionFileOptions())
+    step = motion.translations[1] - motion.translations[0]
+    np.testing.assert_allclose(step, [0, 0, 10 * LEG_LENGTH / 14.4], atol=1e-12)
+    assert motion.fps == CMU_RATE
 
 
 def test_limbs_of_our_body_point_where_the_recorded_ones_do(tmp_path):
