@@ -61,7 +61,7 @@ def _post_processed(entry: MethodEntry) -> MethodEntry:
     return replace(
         entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed",
         description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
-        options=entry.options | {"cleanup": True}, batched=False,
+        options={**entry.options, "cleanup": True}, batched=False,
         reporting=replace(entry.reporting, base=entry.name),
     )  # fmt: skip
 

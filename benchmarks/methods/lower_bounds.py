@@ -27,6 +27,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -210,7 +211,7 @@ class SubspaceFloor(Simulation):
         start = placements[0].posed(offsets)
         start[scene.cloth.pins] = scene.start[scene.cloth.pins]
 
-        around = {"basis": basis, "placements": placements[1:], "offsets": offsets}
+        around: dict[str, Any] = {"basis": basis, "placements": placements[1:], "offsets": offsets}
         self.options = {"method": partial(SubspaceNewton, **around)}
         state = np.stack([start, scene.start_velocity])
         super().prepare(dataclasses.replace(scene, settle=lambda: state))
