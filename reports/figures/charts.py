@@ -343,7 +343,7 @@ def dots(run: Run) -> Iterator[Drawing]:
         axes.grid(False, axis="y")
     panels[0].set_yticks(range(len(methods)), labels)
     panels[0].set_ylim(len(methods) - 0.4, -0.6)
-    fit(figure, height=(0.04 + 0.13 * lines) * len(methods))
+    fit(figure, height=(0.04 + 0.15 * lines) * len(methods))
     caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean"
     caption += ", of the relative excess its typical value." if excess else "."
     yield Drawing(figure, "dots", caption)
