@@ -116,7 +116,8 @@ class Plan:
         """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
         from benchmarks.assets import embedded_motions, open_assets  # loads numpy
 
-        names, read, train = [], self.inputs.motions, self.motions.train
+        names: list[str] = []
+        read, train = self.inputs.motions, self.motions.train
         for garment in self.garments:
             names += self.motions.measured_of(garment)
             names += [scene.motion for scene in self.scenes if scene.garment == garment]

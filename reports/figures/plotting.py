@@ -294,8 +294,8 @@ def _legend(figure: Figure, entries: Sequence[Style], columns: int) -> Legend:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=look.colour, linestyle=look.line, marker=look.marker, markersize=4.0,
-               label=wrapped(look.label, 30))
+        Line2D([], [], color=look.colour, marker=look.marker, markersize=4.0,
+               label=wrapped(look.label, 30), ls=look.line)
         for look in entries
     ]  # fmt: skip
     return figure.legend(
