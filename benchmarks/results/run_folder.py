@@ -84,10 +84,6 @@ class RunFolder:
         """Return the path of the settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")
 
-    def rest_areas_path(self, scene: str) -> Path:
-        """Return the path of rest areas (F,) [m^2] of the faces of a dressed scene's garment."""
-        return self.trajectory_path(scene, "rest_areas").with_suffix(".npy")
-
     def body_path(self, scene: str) -> Path:
         """Return the path of the posed body (T,B,3) [m] of a dressed scene: who reads it needs no torch."""
         return self.trajectory_path(scene, "body").with_suffix(".npy")

@@ -25,7 +25,7 @@ TOLERANCE = 1e-4  # mean vertex weights: the hem is measured in millimetres
 
 
 def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
-    """Write the garment settled in the first pose of a scene, the posed body and the areas at rest.
+    """Write the garment settled in the first pose of a scene, and the posed body.
 
     Where a scene has `start_of`, its start is what settled in that scene.
     """
@@ -38,18 +38,13 @@ def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
     write_body(run, built)
     with replacing(run.start_path(scene.name)) as temporary:
         write_array(temporary, read_array(run.start_path(shared)) if shared else built.start_state)
-    with replacing(run.rest_areas_path(scene.name)) as temporary:
-        write_array(temporary, built.cloth.areas)
     return Outcome(files=files_of_start(scene, run))
 
 
 def files_of_start(scene: Scene, run: RunFolder) -> tuple[str, ...]:
     """Return the names of the files that `settle_start` writes."""
     name = scene.name
-    paths = (
-        run.start_path(name), run.body_path(name), run.trajectory_path(name, "body"),
-        run.rest_areas_path(name),
-    )  # fmt: skip
+    paths = run.start_path(name), run.body_path(name), run.trajectory_path(name, "body")
     return tuple(map(run.relative, paths))
 
 

@@ -1,7 +1,5 @@
 """Charts of the report: error and total cost against time, energies, dots.
 
-Charts of the report: error and total cost against time, energies, dots.
-
 Relative excess takes the place of the total energy where the run has it. It spans decades and may be below
 zero, so its dots stand on the scale of its statistics, arcsinh(x / 1 %).
 """

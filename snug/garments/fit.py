@@ -65,7 +65,7 @@ class Fit:
 def measure_fit(body: Body, skin: Obstacle, positions: Array) -> Fit:
     """Return how a garment (V,3) [m] lies on the mean body, whose surface is `skin`."""
     size = float(np.ptp(positions, axis=0).max()) / body.height
-    at_ends = np.take(skin_following(body, ENDS), body.faces).all(axis=1)
+    at_ends = np.asarray(skin_following(body, ENDS)[body.faces].all(axis=1))
     share = float(at_ends[skin.planes(positions, 0).faces].mean())
     return Fit(skin.signed_distance(positions, 0), size, share)
 

@@ -1,4 +1,4 @@
-"""Motion as its file has it, before anything is checked or turned, and limits that every reader keeps."""
+"""Motion as its file has it, the limits that every reader keeps, and the mending of recording errors."""
 
 from __future__ import annotations
 

@@ -215,5 +215,3 @@ def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_pat
         task.run(context, {})
     one, other, fitted = (np.load(context.folder.start_path(n.replace("-", "/", 1))) for n in starts)
     assert len(settled) == 1 and np.array_equal(one, other) and not np.allclose(one, fitted)
-    areas = np.load(context.folder.rest_areas_path("out_of_distribution/ordinary"))
-    assert np.array_equal(areas, settled[0].areas)
