@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -241,19 +241,3 @@ class SceneRollOuts(Kept):
     def positions(self) -> list[np.ndarray]:
         """Positions (T,V,3) [m] of each roll-out."""
         return [roll_out.positions for roll_out in self.roll_outs]
-
-
-def skinned(group: SceneRollOuts) -> np.ndarray | None:
-    """Return the garment skinned to the poses as by the default recipe, (T,V,3) [m]; None without a body."""
-    if group.scene.dressed is None:
-        return None
-    from snug.networks.dressed_body import DressedBody  # loads torch
-    from snug.recipe import DEFAULT
-
-    dressed, kept = group.scene.dressed, group.scene.kept
-    motion = dressed.motion
-    if kept is not None:
-        motion = replace(motion, poses=motion.poses[kept], translations=motion.translations[kept])
-    return DressedBody(dressed.body, dressed.garment).skinned(
-        motion, dressed.betas, smoothing=DEFAULT.smoothing
-    )

@@ -203,6 +203,20 @@ class BuiltScene:
         """Velocities (V,3) [m/s] at the start."""
         return self.start_state[1]
 
+    @cached_property
+    def skinned(self) -> np.ndarray | None:
+        """The garment skinned to the poses as by the default recipe, (T,V,3) [m]; None without a body."""
+        if self.dressed is None:
+            return None
+        from snug.networks.dressed_body import DressedBody  # loads torch
+        from snug.recipe import DEFAULT
+
+        motion, kept = self.dressed.motion, self.kept
+        if kept is not None:
+            motion = replace(motion, poses=motion.poses[kept], translations=motion.translations[kept])
+        dressed = DressedBody(self.dressed.body, self.dressed.garment)
+        return dressed.skinned(motion, self.dressed.betas, smoothing=DEFAULT.smoothing)
+
     @property
     def simulated_energies(self) -> tuple[Energy, ...]:
         """Terms that a simulation minimises: those it is measured by, or these and self-contact."""

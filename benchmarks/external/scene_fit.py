@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.external.roll_out_files import RollOutFileError, StoredRollOut
-from benchmarks.metric import SceneRollOuts, skinned
 from reference_sim.files.mesh_files import to_metres_y_up
 
 if TYPE_CHECKING:
@@ -114,5 +113,4 @@ def _same_faces(theirs: np.ndarray, ours: np.ndarray) -> bool:
 
 def expected_positions(scene: BuiltScene) -> np.ndarray:
     """Return the garment skinned to the poses (T,V,3) [m]; without a body the start, (1,V,3)."""
-    positions = skinned(SceneRollOuts(scene))
-    return scene.start[None] if positions is None else positions
+    return scene.start[None] if scene.skinned is None else scene.skinned

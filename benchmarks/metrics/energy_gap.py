@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metric import Estimate, Measurements, metrics_of, skinned
+from benchmarks.metric import Estimate, Measurements, metrics_of
 from benchmarks.metrics.curvature import boundary_mask, mean_curvature
 from benchmarks.metrics.energy import copied_terms, freeze_step
 
@@ -88,7 +88,7 @@ def gap_scale(group: SceneRollOuts) -> float | None:
     frames = [] if reference is None else list(_judged(group.scene, reference.positions))
     if reference is None or not frames:
         return None
-    potential, bare = _potential(group.scene), group.kept(skinned)
+    potential, bare = _potential(group.scene), group.scene.skinned
     above = []
     for frame in frames:
         guess = freeze_step(group.scene, potential, reference.positions, frame)

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.assets import Assets
 from benchmarks.methods import find_method
-from benchmarks.metric import RollOut, SceneRollOuts, skinned
+from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import roll_out as metric
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import model_path
@@ -83,7 +83,7 @@ def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_
     assert np.array_equal(trajectory.positions, whole[scene.kept])
     assert [scene.kept[places].tolist() for places in scene.repeated] == [early.tolist(), late.tolist()]
     bare = dressed.skinned(motion, smoothing=20)
-    assert skinned(record.group) == pytest.approx(bare[scene.kept], abs=1e-12)
+    assert record.group.scene.skinned == pytest.approx(bare[scene.kept], abs=1e-12)
     # The state of an untrained network is soon forgotten.
     assert 0.0 < metric.measure_long_roll_out(record)["roll_out/drift"] < 1.0
 
