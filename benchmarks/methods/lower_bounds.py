@@ -211,8 +211,12 @@ class SubspaceFloor(Simulation):
         start = placements[0].posed(offsets)
         start[scene.cloth.pins] = scene.start[scene.cloth.pins]
 
-        around: dict[str, Any] = {"basis": basis, "placements": placements[1:], "offsets": offsets}
-        self.options = {"method": partial(SubspaceNewton, **around)}
+        # No `partial`: a trajectory's provenance would hold its arrays.
+        def in_subspace(potential: Potential, **options: Any) -> SubspaceNewton:
+            further: dict[str, Any] = {"offsets": offsets, **options}
+            return SubspaceNewton(potential, basis=basis, placements=placements[1:], **further)
+
+        self.options = {"method": in_subspace}
         state = np.stack([start, scene.start_velocity])
         super().prepare(dataclasses.replace(scene, settle=lambda: state))
 

@@ -1,6 +1,6 @@
 """Tables of a run, for CSV, PDF and page.
 
-TABLES lists them in order; each entry makes its tables of a run. A new table of means is one Pivot here.
+TABLES lists them in order; each entry makes its tables of a run.
 """
 
 from __future__ import annotations

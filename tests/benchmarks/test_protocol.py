@@ -30,8 +30,8 @@ def test_the_recorded_digests_are_those_of_the_code(parts):
     digests = {part: digest(content) for part, content in parts.items()}
     changed = {part: digests[part] for part in digests if digests[part] != DIGESTS.get(part)}
     assert changed == {}, (
-        f"no longer protocol {NUMBER}: raise NUMBER and set these DIGESTS in benchmarks/results/protocol.py, "
-        "and write down what changed in docs/protocol.md and CHANGELOG.md"
+        f"no longer protocol {NUMBER}: set DIGESTS (benchmarks/results/protocol.py) anew, raise NUMBER "
+        "unless something was only added, and write down what changed in docs/protocol.md and CHANGELOG.md"
     )
     assert list(DIGESTS) == list(parts) and digest(DIGESTS) == recorded.DIGEST
 

@@ -13,6 +13,7 @@ from benchmarks.metrics.energy import copied_terms, freeze_step
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
 from reference_sim import Potential, minimise
+from reference_sim.trajectory import Trajectory
 from snug.body.skinning import unskin
 from snug.networks.dressed_body import DressedBody
 from snug.networks.garment_network import make_network
@@ -56,6 +57,11 @@ def unposed(scene, positions) -> np.ndarray:
 
 def left_over(columns: np.ndarray, offsets: np.ndarray) -> float:
     return float(np.abs(columns @ np.linalg.lstsq(columns, offsets.T)[0] - offsets.T).max())
+
+
+def test_a_floor_can_be_stored(floor, tmp_path):
+    floor.save(tmp_path / "floor.vtkhdf")
+    assert Trajectory.load(tmp_path / "floor.vtkhdf").provenance["options"]["method"] == "in_subspace"
 
 
 def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertices(scene, floor):
