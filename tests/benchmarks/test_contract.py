@@ -200,12 +200,12 @@ def test_a_wrong_gradient_is_found_however_many_vertices_do_not_feel_it(factor, 
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        (None, "mine.py: no such file"),
+        (None, "unwanted.py: no such file"),
         ("", "declares none of METHODS, SCENES, METRICS"),
         (BOUND_FILE.replace('name="bound"', 'name="snug"'), "method 'snug' is declared twice"),
     ],
 )
 def test_the_check_refuses_what_a_run_refuses(source, message, tmp_path, refused):
     if source is not None:
-        (tmp_path / "mine.py").write_text(source)
-    refused(message, check.main, [str(tmp_path / "mine.py")])
+        (tmp_path / "unwanted.py").write_text(source)
+    refused(message, check.main, [str(tmp_path / "unwanted.py")])
