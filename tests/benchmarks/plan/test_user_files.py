@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +79,8 @@ def command(files: Path, *more: str) -> int:
 
 @pytest.fixture(scope="module")
 def done(files) -> RunFolder:
-    assert command(files) == 0
+    with contextmanager(as_before)():
+        assert command(files) == 0
     return RunFolder(files / "out")
 
 
