@@ -34,7 +34,7 @@ class InputError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """What was read from a user's file: a body of SMPL's family, or a garment on the body of the run.
+    """A user's file as read: a body of SMPL's family, or a garment on the body of the run.
 
     name: of the garment, and first part of the names of its scenes.
     """

@@ -80,8 +80,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         terms.append(energies.ContactPenalty(cloth))
     if options.self_contact:
         terms.append(energies.ContactBarrier(cloth))
-    moves = obstacle is not None and obstacle.frames > 1
-    frames = options.frames or (obstacle.frames if obstacle is not None and moves else FRAMES_ALONE)
+    frames = options.frames
+    if frames is None:
+        frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else FRAMES_ALONE
     found = simulate(cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, progress=path.name)
     found.save(path)
     fields = found.frame_fields

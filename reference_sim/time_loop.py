@@ -296,10 +296,10 @@ def simulate_with(
     stepper.check_start(x, v)
     state = State(x, v)
     record.add(x, 0.0, 0.0, _fields_of_start(stepper.potential.energies))
-    due: Iterable[int] = range(1, frames)
+    numbers: Iterable[int] = range(1, frames)
     if progress is not None:
-        due = progress_bar(due, desc=progress, unit="frame", initial=1, total=frames)
-    for frame in due:
+        numbers = progress_bar(numbers, desc=progress, unit="frame", initial=1, total=frames)
+    for frame in numbers:
         clock = time.perf_counter()
         after, results = stepper.advance(frame, state, pin_positions and pin_positions(frame))
         seconds = time.perf_counter() - clock

@@ -7,6 +7,7 @@ runs from perturbed starts differ by is the uncertainty of whatever is compared 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -45,10 +46,10 @@ def _pbns_springs(term: Energy) -> Energy:
 EXCHANGES = {"printed-bending": _printed_bending, "springs": _springs, "pbns-springs": _pbns_springs}
 
 
-def of_other_material(scene: BuiltScene, exchange: str) -> BuiltScene:
-    """Return the scene with some energies exchanged; the start stays that of its own material."""
-    start, change = scene.start_state, EXCHANGES[exchange]
-    energies, minimised = (tuple(map(change, terms)) for terms in (scene.energies, scene.minimised))
+def of_other_energies(scene: BuiltScene, exchange: Callable[[Energy], Energy]) -> BuiltScene:
+    """Return the scene with each energy exchanged by that function; the start stays that of its own ones."""
+    start = scene.start_state
+    energies, minimised = (tuple(map(exchange, terms)) for terms in (scene.energies, scene.minimised))
     return replace(scene, energies=energies, minimised=minimised, settle=lambda: start)
 
 
@@ -67,7 +68,7 @@ def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:
 
 def make_other_material(*, models: Path, seed: int, exchange: str) -> Simulation:
     """Make the reference with that exchange, one of EXCHANGES."""
-    return Simulation(change=partial(of_other_material, exchange=exchange))
+    return Simulation(change=partial(of_other_energies, exchange=EXCHANGES[exchange]))
 
 
 def make_perturbed_start(*, models: Path, seed: int, shift: float) -> Simulation:

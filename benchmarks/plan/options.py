@@ -52,7 +52,7 @@ SHORT = {  # field -> its placeholder in help; those of a scene first
 }  # fmt: skip
 OF_SCENES = tuple(SHORT)[:4]
 SINGLE = ("body", "garment", "trained")  # given once
-BEHIND_A_PATH = "units up fps other-mesh motion-up motion-fps joint-map garment-units garment-up"
+BEHIND_A_PATH = "units up fps other-mesh motion-up motion-fps garment-units garment-up"
 REPLACED = {  # former option, which people have in scripts -> what to say in its place
     **{f"--{f.name.replace('_', '-')}": f"--set {f.name}=..." for f in fields(Study) if f.name not in SHORT},
     **{f"--{name}": "say it behind the path: FILE,units=cm" for name in BEHIND_A_PATH.split()},

@@ -28,7 +28,7 @@ NOWHERE: Mapping[str, Any] = {}
 
 @dataclasses.dataclass(frozen=True)
 class Cached:
-    """What is known of a task before it is run.
+    """State of a task before it is run.
 
     Attributes:
         why: why it has to be run, or how it failed.

@@ -1,4 +1,4 @@
-"""What known answers share: flat cloths, solves that have to converge, orders of errors, the dead load."""
+"""Parts that known answers share: flat cloths, solves that have to converge, orders, the dead load."""
 
 from __future__ import annotations
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from recipe_contact import with_contact
 
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.methods.networks import Network
@@ -26,13 +27,11 @@ from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import GARMENT_SCENES
-from reference_sim.energies import ContactPenalty
 from snug.motion.library import TRAIN
 from snug.named_recipes import PAPER
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
-from snug.training.physics_loss import make_contact
 from snug.training.train_network import TrainingLoop
 
 KEPT = (1000, 2000, 3000, 4000, 6000, 8000, 10_000, 12_000, 17_000, 22_000)  # steps
@@ -86,13 +85,10 @@ def train(dressed: DressedBody, recipe, folder: Path) -> None:
 
 def compare(scene: BuiltScene, motion: str, folder: Path) -> None:
     """Print the excess of both simulations and of every set of weights, by both sets of energies."""
-    contact = make_contact(scene.cloth, PAPER)
-    terms = tuple(contact if isinstance(term, ContactPenalty) else term for term in scene.energies)
-    scenes = dict(zip(RECIPES, (replace(scene, energies=terms), scene)))
+    scenes = dict(zip(RECIPES, (with_contact(scene, PAPER), scene)))
     path = folder / f"{motion}.npz"
     if not path.exists():
-        start = scene.start_state
-        found = [simulated(replace(one, settle=lambda: start)) for one in scenes.values()]
+        found = [simulated(one) for one in scenes.values()]
         np.savez(path, **dict(zip(RECIPES, found)))
     dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
     positions = {f"simulation, {name}": x for name, x in np.load(path).items()}
@@ -112,7 +108,7 @@ def compare(scene: BuiltScene, motion: str, folder: Path) -> None:
 
 def simulated(scene: BuiltScene) -> np.ndarray:
     """Return positions (T, V, 3) [m] of the converged simulation."""
-    simulation = Simulation(options={})
+    simulation = Simulation()
     simulation.prepare(scene)
     return simulation.run().positions
 

@@ -13,15 +13,17 @@ it measures every method: by the contact of the scene.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from benchmarks import MethodEntry
+from benchmarks.methods.reference_variants import of_other_energies
 from benchmarks.methods.simulation import Simulation
 from benchmarks.scene import BuiltScene
 from reference_sim.energies import ContactPenalty
 from snug.named_recipes import PAPER
-from snug.recipe import DEFAULT
+from snug.recipe import DEFAULT, Recipe
 from snug.training.physics_loss import make_contact
 
 KEPT = "recipe's contact"
@@ -44,21 +46,13 @@ METHODS = tuple(
 )
 
 
-@dataclass(kw_only=True)
-class RecipeContact(Simulation):
-    """Reference simulation with another contact term. replaced: fields of Recipe taken from the default."""
-
-    replaced: tuple[str, ...]
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Exchange the contact term and prepare; the start stays that of the scene's own contact."""
-        start = scene.start_state
-        recipe = replace(PAPER, **{option: getattr(DEFAULT, option) for option in self.replaced})
-        contact = make_contact(scene.cloth, recipe)
-        terms = tuple(contact if isinstance(term, ContactPenalty) else term for term in scene.energies)
-        super().prepare(replace(scene, energies=terms, settle=lambda: start))
+def with_contact(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
+    """Return the scene with the contact of a recipe; the start stays that of the scene's own contact."""
+    contact = make_contact(scene.cloth, recipe)
+    return of_other_energies(scene, lambda term: contact if isinstance(term, ContactPenalty) else term)
 
 
-def make(*, models: Path, seed: int, replaced: tuple[str, ...]) -> RecipeContact:
-    """Make the simulation whose contact has these fields of the default recipe."""
-    return RecipeContact(options={}, replaced=replaced)
+def make(*, models: Path, seed: int, replaced: tuple[str, ...]) -> Simulation:
+    """Make the simulation with the recipe's contact, the fields `replaced` those of the default recipe."""
+    recipe = replace(PAPER, **{option: getattr(DEFAULT, option) for option in replaced})
+    return Simulation(change=partial(with_contact, recipe=recipe))

@@ -148,7 +148,7 @@ def write_run(path: Path) -> None:
 
 
 class Reader(NamedTuple):
-    """What writes a valid file, what reads it, and what may be raised. mutate: bytes, or values of JSON."""
+    """Writer of a valid file, its reader, the error that may be raised. mutate: bytes, or values of JSON."""
 
     name: str
     suffix: str
