@@ -39,20 +39,6 @@ def free_fall() -> float:
     return farthest(x, scene.exact)
 
 
-@known_answer(unit="m", expected=0.0, tolerance=1e-12, reason="round-off over a fall of half a metre")
-def free_fall_in_substeps() -> float:
-    """Return the largest distance of four steps a frame to the fall with a quarter of the time step."""
-    from benchmarks.scenes import sheets
-
-    scene, steps = sheets.build_free_fall(FALL, sheet_cells=6, sheet_frames=10), 4
-    x = motion(
-        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, start=scene.start, substeps=steps
-    )
-    n = steps * np.arange(scene.frames)
-    drop = 9.81 * (scene.dt / steps) ** 2 * n * (n + 1) / 2
-    return farthest(x, scene.start - drop[:, None, None] * np.array([0.0, 1.0, 0.0]))
-
-
 @known_answer(
     unit="m", expected=0.0, tolerance=1e-9, reason="round-off of the times at which the pins are asked for"
 )

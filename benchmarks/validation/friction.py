@@ -1,4 +1,4 @@
-"""Known answers of Coulomb friction: a patch on a slope and a belt, a point on a spring, a strip, a capstan.
+"""Known answers of Coulomb friction: a patch on a slope, a belt and a table, a capstan.
 
 Patch: all vertices press alike, for k and the mass are per area, so it keeps its shape and moves as a point.
 With u its slip speed over that of the smoothing, a step of backward Euler on a slope of tan(a) = r mu is
@@ -7,18 +7,6 @@ With u its slip speed over that of the smoothing, a step of backward Euler on a 
 
 Below the angle of friction it creeps at 1 - sqrt(1 - r) of the smoothing's speed, above it the path is that
 of a constant force.
-
-Point: the apex of a triangle that is its spring, held at the two other corners: it moves on a line. It sticks
-until the spring pulls with mu m g, and ends up behind the handle with that very pull, by steps of
-
-    m (x' - x - dt v) / dt^2 = T(handle' - x') - mu m g f'(|x' - x|),   T of uniaxial strain
-
-Strip, of modulus E2 and Poisson's ratio 0, pulled over a table: it slides from the pulled end on. Its tension
-per width falls by q = mu rho_a g per length from the pull F to zero over F/q, so the end is at
-
-    u(F) = integral over 0 <= X <= F/q of s(q X) - 1,    E2 s (s^2 - 1)/2 = T at stretch s              (2)
-
-until all of length L slides, with F = q L.
 
 Capstan: a strip held at both ends over a drum that turns under it. Once the tension has found its profile the
 friction of each vertex is mu N on its own tangent. Where the strip turns by b, forces balance where
@@ -30,7 +18,7 @@ which over a turn of phi is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,14 +27,12 @@ import reference_sim as sim
 from benchmarks.meshes import right_grid
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.contact import DRUM, RoundBody, box, strip_over_drum
-from benchmarks.validation.equilibrium import flat_cloth, motion, order
-from benchmarks.validation.large_bending import HANGING_MATERIAL, WEIGHT, string_stretch
+from benchmarks.validation.equilibrium import COTTON, flat_cloth, motion, order
 from reference_sim import energies
 
 MU = 0.5
 SPEED = 0.02  # [m/s] of the smoothing
 DT = 1 / 30
-SOLVED = 1e-11  # mean vertex weights that may be left of a step's gradient
 BELT = 0.5  # [m/s]
 THROWN, FALLING = 4.0, 1.0  # [m/s]
 LEVEL, STILL = np.eye(3), np.zeros((1, 1, 3))
@@ -54,17 +40,6 @@ PATH = partial(
     known_answer, unit="m", expected=0.0, tolerance=1e-10,
     reason="the residual gradient that the solver may leave, summed twice",
 )  # fmt: skip
-
-
-@known_answer(
-    {"friction_creep": {"ratio": 0.8}},
-    expected=1.0, tolerance=1e-9, reason="the residual gradient that the solver may leave",
-)  # fmt: skip
-def creep_speed(ratio: float) -> float:
-    """Return the speed of a patch on a slope of tan(a) = ratio mu, over that of u' = u in (1)."""
-    path, downhill = _slope(ratio)
-    speed = float((path[-1] - path[-2]) @ downhill) / DT
-    return speed / (SPEED * (1 - np.sqrt(1 - ratio)))
 
 
 @PATH({"friction_slope_below": {"ratio": 0.8}, "friction_slope_at": {"ratio": 1.0}})
@@ -126,139 +101,33 @@ def _slope(ratio: float) -> tuple[np.ndarray, np.ndarray]:
     return _patch(turn=turn, frames=31), -turn[:, 0]
 
 
-def _patch(**options: Any) -> np.ndarray:
-    """Return the path (T, 3) [m] of the middle of a patch; options: of `slid`."""
-    cloth = flat_cloth(*right_grid(2, 2, 0.1, 0.1), lies=True)
-    return slid(cloth, dt=DT, speed=SPEED, **options).mean(axis=1)
-
-
-def slid(
-    cloth: sim.Cloth,
+def _patch(
     *,
     frames: int,
-    dt: float,
-    speed: float,
     turn: np.ndarray = LEVEL,
     carried: np.ndarray = STILL,
-    pull: np.ndarray = STILL[0, 0],
     velocity: np.ndarray = STILL[0, 0],
-    quasi_static: bool = False,
     substeps: int = 1,
 ) -> np.ndarray:
-    """Simulate a cloth flat on the plane y = 0, both turned by `turn`, and return (frames, V, 3) [m].
+    """Return the path (frames, 3) [m] of the middle of a patch on the plane y = 0, both turned by `turn`.
 
-    It starts as deep in the margin as its weight presses it. The plane moves by carried (T, 1, 3) [m], pins
-    by pull (3,) [m] a frame; velocity (3,) [m/s] is that of the start. `speed` [m/s] is that of the
-    smoothing. Contact is on vertices.
+    It starts as deep in the margin as its weight presses it, with a velocity (3,) [m/s]. The plane moves by
+    carried (T, 1, 3) [m].
     """
     from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
 
+    cloth = flat_cloth(*right_grid(2, 2, 0.1, 0.1), lies=True)
     contact = energies.ContactPenalty(cloth, samples="vertices")
-    depth = np.sqrt(cloth.material.areal_density * sim.GRAVITY * turn[1, 1] / (3 * DEFAULT_STIFFNESS))
-    start = (cloth.rest_positions + np.array([0.0, contact.margin - depth, 0.0])) @ turn.T
-    friction = energies.ContactFriction(contact, coefficient=MU, speed=speed)
+    depth = np.sqrt(COTTON.areal_density * sim.GRAVITY * turn[1, 1] / (3 * DEFAULT_STIFFNESS))
+    friction = energies.ContactFriction(contact, coefficient=MU, speed=SPEED)
     corners, sides = box()
-    return motion(
-        cloth, [energies.StretchStVK(cloth), energies.Gravity(cloth), contact, friction], dt=dt,
-        frames=frames, obstacle=sim.Obstacle((corners + carried) @ turn.T, sides), start=start,
-        velocity=np.tile(velocity, (cloth.vertex_count, 1)),
-        pin_positions=lambda frame: start[cloth.pins] + frame * pull,
-        quasi_static=quasi_static, substeps=substeps, tolerance=SOLVED,
+    x = motion(
+        cloth, [energies.StretchStVK(cloth), energies.Gravity(cloth), contact, friction], dt=DT,
+        frames=frames, obstacle=sim.Obstacle((corners + carried) @ turn.T, sides),
+        start=(cloth.rest_positions + np.array([0.0, contact.margin - depth, 0.0])) @ turn.T,
+        velocity=np.tile(velocity, (cloth.vertex_count, 1)), substeps=substeps, tolerance=1e-11,
     )  # fmt: skip
-
-
-SOFT = sim.Material(young_modulus=7e3)  # a tenth of cotton's: the point breaks loose after 14 steps
-REACH, WIDTH = 0.3, 0.1  # [m] of the triangle
-HANDLE = 0.05  # [m/s]
-PULL_DT = 0.01
-LENGTH = 1.0  # [m] of the strip
-COLUMNS = 40
-
-
-@PATH()
-def friction_spring_path() -> float:
-    """Return the worst distance of a point that a spring pulls to discrete steps by scipy, 300 steps."""
-    path, exact = _pulled_point()[:2]
-    return float(np.abs(path - exact).max())
-
-
-@known_answer(expected=1.0, tolerance=1e-4, reason="what is left of its swing after 300 steps")
-def friction_spring_pull() -> float:
-    """Return the pull of that spring once the point slides, over mu m g: no more than to break it loose."""
-    return _pulled_point()[2]
-
-
-@cache
-def _pulled_point() -> tuple[np.ndarray, np.ndarray, float]:
-    from scipy.optimize import brentq
-
-    corners = np.array([[0.0, 0.0, 0.0], [REACH, 0.0, WIDTH / 2], [REACH, 0.0, -WIDTH / 2]])
-    cloth = sim.Cloth(corners, np.array([[0, 1, 2]]), SOFT, pins=[1, 2])
-    speed, frames = 1e-3, 301
-    x = slid(cloth, frames=frames, dt=PULL_DT, speed=speed, pull=np.array([HANDLE * PULL_DT, 0.0, 0.0]))
-    mass, area = cloth.masses[0], cloth.areas[0]
-    stiffness = area * (SOFT.lame_lambda + 2 * SOFT.lame_mu) / REACH
-
-    def pull(apart: float) -> float:
-        s = apart / REACH
-        return stiffness * s * (s * s - 1) / 2
-
-    def excess(at: float, held: float, before: float, v: float) -> float:
-        slip = (at - before) / (speed * PULL_DT)
-        grip = np.sign(slip) * (1.0 if abs(slip) > 1 else 2 * abs(slip) - slip**2)
-        return mass * ((at - before - PULL_DT * v) / PULL_DT**2 + MU * sim.GRAVITY * grip) - pull(held - at)
-
-    exact, v = [0.0], 0.0
-    for n in range(1, frames):
-        held, before = REACH + n * HANDLE * PULL_DT, exact[-1]
-        at = brentq(excess, before - 0.1, before + 0.1, (held, before, v), xtol=1e-16, rtol=1e-15)
-        v = (at - before) / PULL_DT
-        exact.append(at)
-    last = pull(x[-1, 1, 0] - x[-1, 0, 0]) / (MU * mass * sim.GRAVITY)
-    return x[:, 0, 0], np.array(exact), float(last)
-
-
-@known_answer(expected=0.0, tolerance=1e-3, reason="40 cells, and which of them slides last")
-def friction_strip_pull() -> float:
-    """Return the worst error of the pull on a strip that sticks to a table, over mu times its weight."""
-    from scipy.optimize import brentq
-
-    ends, pulls = _pulled_strip()
-    sticking = ends < _end(1.0)
-    exact = [brentq(lambda share, u=u: _end(share) - u, 0.0, 1.0) for u in ends[sticking]]
-    return float(np.abs(pulls[sticking] - exact).max())
-
-
-@known_answer(
-    expected=1.0, tolerance=1e-5, reason="its vertices move aside a little: all diagonals lean one way"
-)
-def friction_strip_slide() -> float:
-    """Return the pull on a strip of which all slides, over mu times its weight."""
-    ends, pulls = _pulled_strip()
-    return float(pulls[ends > 1.1 * _end(1.0)].mean())
-
-
-def _end(share: float) -> float:
-    """Return u [m] at which the pull is that share of mu times the strip's weight, by (2)."""
-    from scipy.integrate import quad
-
-    return quad(lambda X: string_stretch(MU * WEIGHT * X) - 1, 0, share * LENGTH, epsabs=1e-14)[0]
-
-
-@cache
-def _pulled_strip() -> tuple[np.ndarray, np.ndarray]:
-    """Return the place of the pulled end [m], and the pull over mu times the weight, step by step."""
-    width = LENGTH / COLUMNS
-    points, faces = right_grid(1, COLUMNS, width, LENGTH)
-    cloth = flat_cloth(points, faces, HANGING_MATERIAL, held=points[:, 0] > LENGTH - 1e-9, lies=True)
-    step = np.array([_end(1.0) / 20, 0.0, 0.0])
-    dt = 100.0  # s: inertia is nothing
-    x = slid(cloth, frames=31, dt=dt, speed=1e-4 * step[0] / dt, pull=step, quasi_static=True)
-    strain, pins = energies.StretchStVK(cloth), cloth.pins
-    # A pinned vertex slides too: the friction of its half of a cell is pulled as well.
-    pin_friction = MU * cloth.masses[pins].sum() * sim.GRAVITY
-    pulls = np.array([strain.value_and_gradient(frame)[1][pins, 0].sum() + pin_friction for frame in x[1:]])
-    return x[1:, pins[0], 0] - LENGTH, pulls / (MU * cloth.masses.sum() * sim.GRAVITY)
+    return x.mean(axis=1)
 
 
 HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep in the margin as on a body

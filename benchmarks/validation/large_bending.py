@@ -262,28 +262,16 @@ ANNULUS_MATERIAL = sim.Material(
 
 
 @known_answer(
-    {
-        "slit_annulus_inner_hinges_alone": {"which": "inner", "poisson_ratio": "hinges"},
-        "slit_annulus_outer_hinges_alone": {"which": "outer", "poisson_ratio": "hinges"},
-    },
-    unit="m", smoke=False, long=True, reason="reported: the price of nu = -1/3",
-)  # fmt: skip
-@known_answer(
     {"slit_annulus_inner": {"which": "inner"}, "slit_annulus_outer": {"which": "outer"}},
     unit="m", tolerance=0.08, smoke=False, long=True,
     reason="half of what 3 % of bending stiffness changes; the limit of three meshes is 0.04 m off",
 )  # fmt: skip
-def corner(which: str, poisson_ratio: str = "zero") -> tuple[float, float]:
-    """Return the lift of the free lip's corner in the limit of fine meshes, and that of shells.
+def corner(which: str) -> tuple[float, float]:
+    """Return the lift of the free lip's corner, "inner" or "outer", on infinitely fine meshes, and of shells.
 
     Edges on the border have no hinge, an error of first order in the cell: two meshes are extrapolated.
-
-    Args:
-        which: "inner" or "outer".
-        poisson_ratio: "zero", or "hinges" for that of the hinges alone, -1/3.
     """
-    zero = D if poisson_ratio == "zero" else 0.0
-    coarse, fine = (lifted(rows, zero) for rows in ANNULUS_ROWS)
+    coarse, fine = (lifted(rows, D) for rows in ANNULUS_ROWS)
     place = ("inner", "outer").index(which)
     return float((2 * fine - coarse)[place]), SZE[place]
 

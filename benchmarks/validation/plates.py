@@ -29,7 +29,7 @@ import numpy as np
 import reference_sim as sim
 from benchmarks.meshes import ROW, random_rotation, rectangle, right_grid
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import border, flat_cloth
+from benchmarks.validation.equilibrium import flat_cloth
 from reference_sim import energies
 from reference_sim.geometry.topology import boundary_loops, corner_angles
 
@@ -172,66 +172,6 @@ def _bent(family: str, cells: int, height: float, curvature: np.ndarray, terms: 
     inside = np.flatnonzero(~ring)
     w[inside] = spla.spsolve(K[inside][:, inside], -(K[inside][:, ring] @ w[ring]))
     return 0.5 * float(w @ (K @ w)) / STIFFNESS, float(cloth.hinge_areas.sum() / 3)
-
-
-@known_answer(
-    {"plate_morley_equilateral_unscaled": {"scaling": "none"}},
-    smoke=False, expected=3**0.5 / 2, tolerance=0.03 * (3**0.5 / 2),
-    reason="edges on the border have no hinge",
-)  # fmt: skip
-@known_answer(
-    {"plate_morley_equilateral_scaled": {"scaling": "length_area"}},
-    smoke=False, expected=0.25, tolerance=0.03 * 0.25, reason="edges on the border have no hinge",
-)  # fmt: skip
-def supported_plate(scaling: str) -> float:
-    """Return the D/k of the Kirchhoff plate that sags as much, on the mean, as hinges on a square.
-
-    Only equilateral triangles make an isotropic plate, whose number is known. Simply supported along straight
-    sides, uniform load: there the deflection does not depend on nu. The reference is solved with Morley's
-    element in scikit-fem.
-    """
-    import scipy.sparse.linalg as spla
-
-    columns = 24
-    rows = round(columns / ROW)
-    width = rows * ROW / columns
-    points, faces = rectangle("equilateral", columns, rows, 1.0, width)
-    cloth, K = _stiffness(points, faces, hinges(scaling))
-    inside = np.flatnonzero(~border(points))
-    areas = cloth.vertex_areas
-    w = np.zeros(len(points))
-    w[inside] = spla.spsolve(K[inside][:, inside], areas[inside])
-    return morley_deflection(width) / (float(areas @ w) / width) / STIFFNESS
-
-
-def morley_deflection(width: float) -> float:
-    """Return the mean deflection of a simply supported plate 1 x width [m], D = 1, unit load.
-
-    Morley's element is of second order here; two meshes are extrapolated.
-    """
-    coarse, fine = (_morley(width, cells) for cells in (24, 48))
-    return (4 * fine - coarse) / 3
-
-
-def _morley(width: float, cells: int) -> float:
-    import skfem
-
-    line = np.linspace(0, 1, cells + 1)
-    mesh = skfem.MeshTri.init_tensor(line, line * width)
-    basis = skfem.Basis(mesh, skfem.ElementTriMorley(), intorder=4)
-
-    @skfem.BilinearForm
-    def bending(u, v, _):
-        return np.einsum("ij...,ij...->...", u.hess, v.hess)  # nu = 0: any nu sags the same
-
-    @skfem.LinearForm
-    def load(v, _):
-        return v
-
-    K, f = bending.assemble(basis), load.assemble(basis)
-    supported = basis.nodal_dofs[0, mesh.boundary_nodes()]
-    w = skfem.solve(*skfem.condense(K, f, D=supported))
-    return float(f @ w) / width
 
 
 def _stiffness(points: np.ndarray, faces: np.ndarray, terms: Terms) -> tuple[sim.Cloth, sp.csr_matrix]:

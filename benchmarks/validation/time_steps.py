@@ -1,31 +1,26 @@
-"""Known answers of time integration: few vertices that scipy solves, and the order of whole sheets in dt.
+"""Known answers of time integration: a triangle that scipy solves, and the order of whole sheets in dt.
 
 Pendulum: one triangle hangs by its base; by symmetry its third vertex stays half-way between the two pins,
 at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) G^2, G = ((r/h)^2 - 1)/2.
-Rotor: six triangles around a free vertex; every one is stretched by r/R alike, E = A 2 (lambda + mu) G^2.
-
-Where a sheet has no exact motion, the order is that of the distance between the positions with dt and with
-dt/2: it is that of the distance to the limit, where there is a limit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import random_rotation, sheet, square_sheet
+from benchmarks.meshes import square_sheet
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.contact import RoundBody
-from benchmarks.validation.discrete_laws import HANGING, stretched_membrane
+from benchmarks.validation.discrete_laws import stretched_membrane
 from benchmarks.validation.equilibrium import (
     border,
     farthest,
     fitted_order,
-    minimum,
     motion,
     order,
     sheet_terms,
@@ -34,7 +29,6 @@ from reference_sim import energies
 
 SOFT = sim.Material(young_modulus=7e3)
 HEIGHT, BASE = 0.5, 0.4  # [m] of the triangle
-RADIUS = 0.2  # [m] of the rotor
 MASS = SOFT.areal_density * HEIGHT * BASE / 2 / 3
 RIGIDITY = HEIGHT * BASE / 2 * (SOFT.lame_lambda / 2 + SOFT.lame_mu)  # [J] A (lambda/2 + mu)
 
@@ -113,42 +107,6 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
     return float(left), float((1 + (frequency * dt) ** 2) ** -15)
 
 
-@known_answer(unit="m", expected=0.0, tolerance=1e-11, reason="round-off of 60 steps, summed twice")
-def rotor() -> float:
-    """Return the largest distance of a turning hexagon to its exact discrete steps, 60 steps.
-
-    The force is along z' itself, so z' (1 + dt^2 f(|z'|)) = 2 z - z_before: the direction is that of the
-    right side, and the radius the root of one equation.
-    """
-    from scipy.optimize import brentq
-
-    dt, spin = 1 / 30, 4.0
-    angle = np.arange(6) * np.pi / 3
-    ring = RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    flat = np.concatenate([[[0.0, 0.0]], ring])
-    turn = random_rotation(3)[:, :2]
-    faces = np.array([[0, 1 + i, 1 + (i + 1) % 6] for i in range(6)])
-    cloth = sim.Cloth(flat @ turn.T, faces, SOFT)
-    velocity = spin * np.stack([-flat[:, 1], flat[:, 0]], axis=1)
-    terms = [energies.StretchStVK(cloth)]
-    x = motion(cloth, terms, dt=dt, frames=61, velocity=velocity @ turn.T, tolerance=1e-11)
-    area = cloth.areas.sum()
-    rigidity = 2 * (SOFT.lame_lambda + SOFT.lame_mu) * area / 6  # for each vertex of the ring
-    mass = SOFT.areal_density * area / 9  # two thirds of a triangle
-
-    def too_long(r: float, straight: float) -> float:
-        return r + dt**2 / mass * rigidity * ((r / RADIUS) ** 2 - 1) * r / RADIUS**2 - straight
-
-    z = [complex(*ring[0]) - dt * spin * 1j * complex(*ring[0]), complex(*ring[0])]
-    for _ in range(60):
-        straight = 2 * z[-1] - z[-2]
-        r = brentq(too_long, 0.0, 10 * abs(straight), (abs(straight),), xtol=1e-15, rtol=1e-14)
-        z.append(r * straight / abs(straight))
-    exact = np.outer(np.real(z[1:]), turn[:, 0]) + np.outer(np.imag(z[1:]), turn[:, 1])
-    return farthest(x[:, 1], exact)
-
-
-VISCOSITY = 0.25  # [N s/m] of an edge: waves faster than about 100 rad/s do not swing
 BALL = 0.1  # [m] radius
 
 
@@ -166,24 +124,12 @@ def membrane_time_step_order() -> float:
     return order(error, (96, 192, 384), end)
 
 
-@known_answer(expected=1.0, tolerance=0.15, reason="backward Euler; faster vibrations still show at 1/1920 s")
-def swing_time_step_order() -> float:
-    """Return the order in dt of a sheet that swings from its upper edge, from 20 degrees, after 0.25 s."""
-    flat, faces = sheet((8, 6), (0.4, 0.3))
-    upright = np.stack([flat[:, 2], -flat[:, 0], flat[:, 1]], axis=1)
-    cloth = sim.Cloth(upright, faces, sim.Material(), pins=np.arange(7))
-    terms = sheet_terms(cloth)
-    hanging = minimum(terms, upright)
-    cosine, sine = np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))
-    turn = np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]])
-    edge = upright[0] * [0, 1, 0]
-    start = (hanging - edge) @ turn.T + edge
-    return halving_order(lambda n: _end(cloth, terms, start, 0.25, n), (60, 120, 240, 480))
-
-
 @known_answer(expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/1200 s")
 def pressed_time_step_order() -> float:
-    """Return the order in dt of a taut sheet that a ball, already in touch, is pressed into smoothly."""
+    """Return the order in dt of a taut sheet that a ball, already in touch, is pressed into smoothly.
+
+    It has no exact motion: the order is that of the distance between the ends with dt and with dt/2.
+    """
     end = 0.2
     flat, faces = square_sheet(8, 0.4)
     cloth = sim.Cloth(flat, faces, sim.Material(), pins=np.flatnonzero(border(flat[:, [0, 2]])))
@@ -200,65 +146,8 @@ def pressed_time_step_order() -> float:
     start = sim.simulate(
         cloth, terms, dt=1.0, frames=9, quasi_static=True, start=tent, obstacle=still, guess="previous"
     ).positions[-1]
-    return halving_order(
-        lambda n: _end(cloth, terms, start, end, n, obstacle=ball(n), guess="extrapolated"),
-        (30, 60, 120, 240),
-    )  # fmt: skip
-
-
-class Viscosity(energies.Energy):
-    """Viscosity of an edge, E = c/(2 dt) |(x_j - x_i) - (x_j - x_i)_t|^2 [J], c times relative velocity."""
-
-    name = "viscosity"
-
-    def __init__(self, cloth: sim.Cloth) -> None:
-        self.cloth, self.stencils = cloth, cloth.edges
-        self.before, self.factor = np.zeros((len(cloth.edges), 3)), 0.0
-
-    def prepare(self, step: energies.Step) -> None:
-        """Remember the edges at the start of the step."""
-        self.before = step.previous[self.stencils[:, 1]] - step.previous[self.stencils[:, 0]]
-        self.factor = VISCOSITY / step.dt
-
-    def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return the energy [J] and its gradient (V, 3) [N]."""
-        first, second = self.stencils.T
-        change = x[second] - x[first] - self.before
-        gradient = np.zeros_like(x)
-        np.add.at(gradient, second, self.factor * change)
-        np.add.at(gradient, first, -self.factor * change)
-        return 0.5 * self.factor * float((change**2).sum()), gradient
-
-    def hessian_blocks(self, x: np.ndarray) -> np.ndarray:
-        """Return the Hessian of each edge, (E, 6, 6) [N/m]."""
-        return np.kron(self.scalar_stiffness(x)[1], np.eye(3))
-
-    def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the edges and their blocks (E, 2, 2) [N/m], the same for all coordinates."""
-        block = self.factor * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        return np.arange(len(self.stencils)), np.broadcast_to(block, (len(self.stencils), 2, 2))
-
-
-@known_answer(
-    {"hanging_sheet_time_step_order": {"viscous": False}},
-    reason="reported: its vibrations are too fast for the steps, so the first order does not show",
-)
-@known_answer(
-    {"viscous_time_step_order": {"viscous": True}},
-    expected=1.0, tolerance=0.1, reason="backward Euler; nothing swings too fast for the steps",
-)  # fmt: skip
-def hanging_sheet_order(viscous: bool) -> float:
-    """Return the order in dt of a sheet held at two corners, wrinkled after 0.7 s."""
-    from benchmarks.scenes import sheets
-
-    scene = sheets.build_hanging_sheet(HANGING, sheet_cells=6, sheet_frames=22)
-    terms = [*scene.energies, *([Viscosity(scene.cloth)] if viscous else [])]
-    return halving_order(lambda n: _end(scene.cloth, terms, scene.start, 0.7, n), (42, 84, 168, 336))
-
-
-def halving_order(end: Callable[[int], np.ndarray], steps: Sequence[int]) -> float:
-    """Return the order of `end` (V,3) [m] over numbers of steps, each twice the one before."""
-    ends = [end(n) for n in steps]
+    steps = (30, 60, 120, 240)
+    ends = [_end(cloth, terms, start, end, n, obstacle=ball(n), guess="extrapolated") for n in steps]
     distances = [np.sqrt(((a - b) ** 2).sum(axis=1).mean()) for a, b in pairwise(ends)]
     return fitted_order(distances, [1 / n for n in steps[:-1]])
 

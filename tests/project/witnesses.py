@@ -6,14 +6,13 @@ WITNESSES = {
     "areas doubled": (
         "membrane_energy_scikit_fem", "membrane_gradient_scikit_fem", "membrane_hessian_scikit_fem",
         "membrane_uniaxial_strain", "membrane_uniaxial_stress", "membrane_equibiaxial",
-        "membrane_simple_shear", "membrane_collapse", "membrane_pull", "weight_of_a_square_metre",
+        "membrane_simple_shear", "membrane_collapse", "weight_of_a_square_metre",
         "hinges_folded_scaled", "contact_sampled_area", "contact_force_is_weight", "manufactured_order",
         "manufactured_gradient_order", "catenary_force", "plate_stiffness_right_scaled",
         "plate_stiffness_cross_scaled", "plate_stiffness_union_jack_scaled",
-        "plate_stiffness_equilateral_scaled", "plate_morley_equilateral_unscaled",
-        "plate_morley_equilateral_scaled", "slit_annulus_inner", "slit_annulus_outer",
+        "plate_stiffness_equilateral_scaled", "slit_annulus_inner", "slit_annulus_outer",
         "end_loaded_cantilever_1", "end_loaded_cantilever_3", "end_loaded_cantilever_10",
-        "clamped_stretch_force", "drum_tension", "drum_pressure",
+        "drum_tension", "drum_pressure",
     ),
     "mu without the thickness": (
         "constant_lame_mu", "rigid_motion_force", "rigid_zero_modes", "stretched_membrane_vibration",
@@ -30,12 +29,9 @@ WITNESSES = {
         "plate_stiffness_union_jack_unscaled", "plate_stiffness_equilateral_unscaled",
     ),
     "velocity backwards": (
-        "free_fall", "free_fall_in_substeps", "leaving_order", "leaving_point", "membrane_time_step_order",
-        "pressed_time_step_order", "viscous_time_step_order",
+        "free_fall", "leaving_order", "leaving_point", "membrane_time_step_order", "pressed_time_step_order",
     ),
-    "lambda and mu swapped": (
-        "pendulum", "rotor", "numerical_damping_10", "numerical_damping_20", "clamped_stretch_neck",
-    ),
+    "lambda and mu swapped": ("pendulum", "numerical_damping_10", "numerical_damping_20"),
     "first vertex feels one neighbour": ("momentum_balance", "angular_momentum_balance"),
     "hinge angle with the wrong sign": ("gradient_of_bending", "hessian_of_bending"),
     "contact dropped from the force": ("gradient_of_collision", "hessian_of_collision"),
@@ -58,13 +54,11 @@ WITNESSES = {
     "weight upwards in the force": ("gradient_of_gravity",),
     "inertia over dt in the force": ("hessian_of_inertia",),
     "inertia's energy doubled": ("gradient_of_inertia",),
-    "velocity forgets dt": ("energy_inequality", "swing_time_step_order"),
+    "velocity forgets dt": ("energy_inequality",),
     "contact stiffness without the area": ("penalty_depth",),
     "friction of two thirds of the force": (
-        "friction_spring_path", "friction_spring_pull", "friction_capstan_rough", "friction_capstan_smooth",
-        "friction_capstan_order", "friction_strip_pull", "friction_strip_slide",
+        "friction_capstan_rough", "friction_capstan_smooth", "friction_capstan_order",
     ),
-    "friction in proportion to slip": ("friction_creep",),
     "a first step without friction": (
         "friction_slope_below", "friction_slope_at", "friction_slide", "friction_landing",
     ),
